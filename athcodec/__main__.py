@@ -1,0 +1,10 @@
+"""`python -m athcodec`: the same as the command `athcodec`, see cli.py."""
+
+from __future__ import annotations
+
+import sys
+
+from .cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

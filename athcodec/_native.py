@@ -1,0 +1,148 @@
+"""The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
+
+Mirrors core/ath.h, the only declaration of the C API. Wrappers check dtypes, shapes and contiguity, so that no call can
+write outside an array; they release the GIL, and hold no state.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
+
+import numpy as np
+
+from athcodec._library import load_library
+from athcodec.errors import BadChunk
+
+PIECE_VERTICES = 64
+SEGMENT_FRAMES = 256
+MAX_DEPTH = 30
+SHEET, LOOSE, WHOLE = 1, 2, 4
+
+BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
+PIECE = np.dtype(
+    [("modes", "<i8"), ("basis", "<i8")]
+    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes "
+                                  "carrier carrier_index").split()]
+)
+NODE = np.dtype(
+    [("whitening", "<f8", (9,))]
+    + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
+)
+
+
+class Shape(ctypes.Structure):
+    """ath_shape."""
+
+    _fields_ = [(name, c_int32) for name in ("vertex_count branch_count piece_count node_count carrier_vertices "
+                                             "carrier_pieces height reserved").split()]
+    _fields_ += [(name, c_void_p) for name in "branches pieces nodes rest bases".split()]
+
+
+class Stream(ctypes.Structure):
+    """ath_stream."""
+
+    _fields_ = [("step", c_double), ("omega", c_double), ("temporal", c_void_p), ("temporal_rank", c_int32),
+                ("reserved", c_int32)]
+
+
+class Motion(ctypes.Structure):
+    """ath_motion."""
+
+    _fields_ = [("frames", c_int32), ("reserved", c_int32)]
+    _fields_ += [(name, c_void_p) for name in ("streams cosines coefficients tracks node_tracks node_steps carriers "
+                                               "carrier_frames work").split()]
+
+
+_SIGNATURES = {
+    "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
+    "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
+    "ath_plan": (None, [POINTER(Shape), c_void_p, c_void_p, c_void_p]),
+    "ath_basis_table_size": (c_size_t, [c_int32]),
+    "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_basis_fill": (None, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_plan_nodes": (None, [POINTER(Shape), c_void_p]),
+    "ath_cosine_basis": (None, [c_int32, c_void_p]),
+    "ath_model_size": (c_size_t, []),
+    "ath_decode_hierarchy": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_decode_rest": (c_int, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p]),
+    "ath_decode_temporal": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p]),
+    "ath_decode_stems": (c_int, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
+    "ath_decode_affines": (c_int, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
+    "ath_decode_corrections": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_double, c_int, c_void_p]),
+    "ath_motion_work": (c_size_t, [c_int32]),
+    "ath_pose": (None, [POINTER(Shape), POINTER(Motion), c_int32, c_void_p, c_int, c_void_p]),
+    "ath_node_matrices": (None, [POINTER(Shape), POINTER(Motion), c_int32, c_void_p, c_void_p]),
+    "ath_scatter": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_int32, c_int32, c_void_p]),
+    "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_void_p, c_void_p]),
+    "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
+    "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double, c_double]),
+    "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
+    "ath_find_corrections": (
+        c_int64, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_double, c_double, c_void_p, c_int64]),
+    "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_encode_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p]),
+    "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p]),
+    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
+    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
+    "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
+}
+
+
+def _bind() -> ctypes.CDLL:
+    library = load_library()
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+lib = _bind()
+
+
+def address(array: np.ndarray | None, dtype, size: int) -> int | None:
+    """Pointer to a contiguous array of at least `size` items of `dtype`.
+
+    Raises TypeError where the array is anything else: a mistake of the caller that would corrupt memory.
+    """
+    if array is None:
+        return None
+    if array.dtype != np.dtype(dtype) or not array.flags.c_contiguous or array.size < size:
+        raise TypeError(f"C core: got {array.dtype} {array.shape}, contiguous={array.flags.c_contiguous}; "
+                        f"expected at least {size} contiguous {np.dtype(dtype)}")
+    return array.ctypes.data
+
+
+def new_model() -> np.ndarray:
+    """Scratch memory for one coding call at a time."""
+    return np.empty(lib.ath_model_size() // 8 + 1, np.uint64)
+
+
+def as_bytes(data) -> np.ndarray:
+    """Bytes-like data as an array that can be handed to the core."""
+    return np.frombuffer(data, np.uint8) if len(data) else np.zeros(1, np.uint8)[:0]
+
+
+def crc32c(data, crc: int = 0) -> int:
+    """CRC-32C of bytes-like data, continuing from `crc`."""
+    array = as_bytes(data)
+    return lib.ath_crc32c(crc, array.ctypes.data, array.size)
+
+
+def encode_stream(function_name: str, capacity: int, *arguments) -> bytes:
+    """Runs one of the core's writers, with more room until its stream fits."""
+    model = new_model()
+    while True:
+        buffer = np.empty(capacity, np.uint8)
+        size = getattr(lib, function_name)(model.ctypes.data, buffer.ctypes.data, capacity, *arguments)
+        if size >= 0:
+            return buffer[:size].tobytes()
+        capacity *= 4
+
+
+def decode_stream(function_name: str, data, where: str, *arguments) -> None:
+    """Runs one of the core's readers. Raises BadChunk, naming `where`, when the stream is not valid."""
+    model, array = new_model(), as_bytes(data)
+    if getattr(lib, function_name)(model.ctypes.data, array.ctypes.data, array.size, *arguments) != 0:
+        raise BadChunk(f"{where}: got a stream of {array.size} bytes that does not decode; expected a valid one")

@@ -1,0 +1,750 @@
+"""The affine transform hierarchy (ATH) of a motion clip: which subtrees of a plant move as one affine map,
+and how well. Based on Song, Yang and Peng, "Hierarchical approximation of plant motion", Journal of Image
+and Graphics 16(8), 2011, sections 2 and 3: the affine fit (eq. 2), its residual (eq. 3), GAD, LAD and the
+acceptance test TAM. Where the paper's least squares have no unique answer (straight, flat or flattened
+subtrees) the fit is completed, so that the map stays invertible. One pass over the frames, the survey, serves
+any number of thresholds. Works on the unquantised motion; what a file stores and predicts from is decided
+elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .hierarchy import Hierarchy, hierarchy_of
+
+if TYPE_CHECKING:
+    from .clip import MotionClip
+
+MAX_DEPTH = 30
+RANK_TOLERANCE = 1e-3
+"""A subtree's principal extent counts as missing below this part of its largest one: its best-fit stretch
+along such a direction would be the noise of the rest pose."""
+MIN_STRETCH = 0.1
+"""Least stretch of any direction in a map, relative to its largest where that is below 1. A frame in which
+the best fit flattens a subtree would otherwise have no inverse, or residuals many times as long as the
+map's error."""
+
+_LEAST_SCALE = 1e-2         # MIN_STRETCH is relative to this at least: a subtree may shrink to a point
+_POINT_EXTENT = 1e-12       # of the plant's: below it a subtree is one point
+_READ_VALUES = 3 << 21      # numbers read from the clip at once
+_WORK_VERTICES = 1 << 16    # vertex-frames in work at once: a few arrays of them fit a processor's cache
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The parameters of TAM (section 3): epsilon and xi in scene units, eta in frames, lam in vertices."""
+
+    epsilon: float
+    eta: int
+    xi: float
+    lam: int
+
+    def __post_init__(self) -> None:
+        for name, kind in (("epsilon", float), ("eta", int), ("xi", float), ("lam", int)):
+            value = getattr(self, name)
+            if not value >= 0:
+                raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
+            object.__setattr__(self, name, kind(value))
+
+
+class CutPiece(NamedTuple):
+    """Vertices first_vertex .. stop_vertex - 1 (file order) moving as one: a branch's subtree or its stem."""
+
+    branch: int
+    first_vertex: int
+    stop_vertex: int
+    is_stem: bool
+
+
+class Gaps(NamedTuple):
+    """Distances where two pieces meet, over attach points and frames, in scene units; 0 where none meet."""
+
+    max: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class Ath:
+    """An affine transform hierarchy.
+
+    hierarchy    the branches and vertices it stands on, in file order
+    thresholds   what TAM was asked
+    rest         (N,3) float64, base pose V_0 in file order
+    node_branch  (M,) int32, the branch whose subtree a node stands for, ascending
+    node_parent  (M,) int32, parent node, -1 for a root
+    node_depth   (M,) int32, 0 for a root
+    whole        (M,) bool, the subtree moves as one: accepted by TAM, or cut at the depth limit
+    """
+
+    hierarchy: Hierarchy
+    thresholds: Thresholds
+    rest: np.ndarray
+    node_branch: np.ndarray
+    node_parent: np.ndarray
+    node_depth: np.ndarray
+    whole: np.ndarray
+
+    @property
+    def node_count(self) -> int:
+        return len(self.node_branch)
+
+    @property
+    def height(self) -> int:
+        """Largest depth h of a node: h + 1 levels of motion detail (section 4)."""
+        return int(self.node_depth.max())
+
+    @property
+    def is_inner(self) -> np.ndarray:
+        """(M,) bool: the node has child nodes."""
+        inner = np.zeros(self.node_count, bool)
+        inner[self.node_parent[self.node_parent >= 0]] = True
+        return inner
+
+    def whole_branches(self) -> np.ndarray:
+        """(B,) bool in file order: the branch is a node, and its subtree moves as one (see `whole`).
+
+        Branches inside such a subtree are no nodes: they are False.
+        """
+        result = np.zeros(self.hierarchy.branch_count, bool)
+        result[self.node_branch] = self.whole
+        return result
+
+    def table1(self) -> dict[str, float | int]:
+        """The paper's table 1: depth (levels of nodes), nodes, leaves, and the thresholds."""
+        thresholds = self.thresholds
+        return {
+            "depth": self.height + 1, "nodes": self.node_count, "leaves": int((~self.is_inner).sum()),
+            "epsilon": thresholds.epsilon, "eta": thresholds.eta, "xi": thresholds.xi, "lam": thresholds.lam,
+        }
+
+    def cut(self, depth: int) -> list[CutPiece]:
+        """The partition of the vertices that playback at a depth moves piece by piece, by first vertex.
+
+        Its pieces are the subtrees of the nodes of that depth, those of the leaves above it, and the stems
+        of the inner nodes above it. A depth beyond the height gives the cut at the height. Raises
+        ValueError for a negative depth.
+        """
+        pieces, shown, is_stem = self._cut_pieces(depth)
+        columns = (pieces.first_branch[shown], pieces.first[shown], pieces.stop[shown], is_stem)
+        return [CutPiece(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+
+    def affine(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
+        """A_t of a node's subtree (eq. 2): (T,3,4) float64, taking rest positions to those of each frame.
+
+        positions: a clip, or an array (T,N,3) in source order.
+        """
+        pieces, last = self._path(node)
+        return np.concatenate([pieces.fit(frames).matrices()[:, last] for frames in self._frames(positions)])
+
+    def affines(self, positions: MotionClip | np.ndarray) -> np.ndarray:
+        """A_t of all nodes: (T,M,3,4) float64, as affine() gives them one by one."""
+        hierarchy, rest = self.hierarchy, self.rest
+        pieces = _Pieces.subtrees(hierarchy, rest, self.node_branch, self.node_parent, self.node_depth)
+        return np.concatenate([pieces.fit(frames).matrices() for frames in self._frames(positions)])
+
+    def residual(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
+        """R_t of a node's subtree (eq. 3), in the space of the base pose: (T,K,3) float64.
+
+        Vertices are in file order. A_t R_t = V_t (eq. 4). positions: a clip, or an array (T,N,3) in source
+        order.
+        """
+        pieces, last = self._path(node)
+        vertices = slice(pieces.first[last], pieces.stop[last])
+        residuals = []
+        for frames in self._frames(positions):
+            inverse, offset = pieces.fit(frames).inverse_maps()
+            moved = np.moveaxis(frames[:, :, vertices], 0, 2) @ np.swapaxes(inverse[:, last], 1, 2)
+            residuals.append(moved + offset[:, last, None] + pieces.origin)
+        return np.concatenate(residuals)
+
+    def approximation(self, positions: np.ndarray, depth: int) -> np.ndarray:
+        """The motion cut at a depth: every piece of `cut(depth)` moves by its own least-squares affine map.
+
+        positions: (T,N,3) in source order; the result is (T,N,3) float64 in source order. The pieces' maps
+        are independent of each other, as in the paper, so they may gape where they meet: see
+        attachment_gaps().
+        """
+        pieces, shown, _ = self._cut_pieces(depth)
+        result = np.empty(np.shape(positions))
+        start = 0
+        for frames in self._frames(positions):
+            moved = pieces.fit(frames).apply(shown, pieces.vertices(shown), pieces.counts[shown])
+            stop = start + frames.shape[1]
+            result[start:stop, self.hierarchy.vertex_source] = np.moveaxis(moved, 0, 2) + pieces.origin
+            start = stop
+        return result
+
+    def attachment_gaps(self, positions: MotionClip | np.ndarray, depth: int) -> Gaps:
+        """How far the pieces of approximation() come apart where a branch sits on its parent's stem.
+
+        For every branch whose piece is another than its parent's: the distance between the places where the
+        two pieces' maps put the attach vertex, which is the gap that a viewer sees. positions: a clip, or
+        an array (T,N,3) in source order.
+        """
+        pieces, shown, _ = self._cut_pieces(depth)
+        piece_of_branch = np.repeat(shown, (pieces.stop_branch - pieces.first_branch)[shown])
+        parent = self.hierarchy.branch_parent
+        child = np.flatnonzero((parent >= 0) & (piece_of_branch != piece_of_branch[parent]))
+        if not len(child):
+            return Gaps(0.0, 0.0)
+        attach = self.hierarchy.attach[child]
+        once = np.ones(len(child), np.intp)
+        largest, total, count = 0.0, 0.0, 0
+        for frames in self._frames(positions):
+            fit = pieces.fit(frames)
+            placed_by_child = fit.apply(piece_of_branch[child], attach, once)
+            placed_by_parent = fit.apply(piece_of_branch[parent[child]], attach, once)
+            squares = ((placed_by_child - placed_by_parent) ** 2).sum(axis=0)
+            largest, total, count = max(largest, squares.max()), total + squares.sum(), count + squares.size
+        return Gaps(float(np.sqrt(largest)), float(np.sqrt(total / count)))
+
+    def _frames(self, positions: MotionClip | np.ndarray) -> Iterator[np.ndarray]:
+        return _file_order_frames(positions, self.hierarchy, self.rest.mean(axis=0))
+
+    def _path(self, node: int) -> tuple[_Pieces, int]:
+        if not 0 <= node < self.node_count:
+            raise IndexError(f"ATH node: got {node}, expected 0 to {self.node_count - 1}")
+        path = [node]
+        while self.node_parent[path[-1]] >= 0:
+            path.append(int(self.node_parent[path[-1]]))
+        branches = self.node_branch[path[::-1]]
+        order = np.arange(len(path))
+        return _Pieces.subtrees(self.hierarchy, self.rest, branches, order - 1, order), len(path) - 1
+
+    def _cut_pieces(self, depth: int) -> tuple[_Pieces, np.ndarray, np.ndarray]:
+        """All pieces the cut's maps depend on, the cut's own by first vertex, which of those are stems."""
+        if depth < 0:
+            raise ValueError(f"depth of a cut: got {depth}, expected 0 to {self.height}")
+        hierarchy = self.hierarchy
+        nodes = np.flatnonzero(self.node_depth <= depth)
+        renumbered = np.full(self.node_count + 1, -1)
+        renumbered[nodes] = np.arange(len(nodes))
+        parent = renumbered[self.node_parent[nodes]]
+        divided = np.flatnonzero(self.is_inner[nodes] & (self.node_depth[nodes] < depth))
+        branch = self.node_branch[nodes]
+        first_branch = np.concatenate([branch, branch[divided]])
+        stop_branch = np.concatenate([branch + hierarchy.subtree_branches[branch], branch[divided] + 1])
+        level = np.concatenate([self.node_depth[nodes], self.node_depth[nodes[divided]] + 1])
+        parent = np.concatenate([parent, divided])
+        pieces = _Pieces(hierarchy, self.rest, first_branch, stop_branch, parent, level)
+        shown = np.setdiff1d(np.arange(len(first_branch)), divided)
+        shown = shown[np.argsort(first_branch[shown])]
+        return pieces, shown, shown >= len(nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What a pass over all frames of a clip tells: its extent, its motion and TAM for any thresholds.
+
+    hierarchy         the branches and vertices, in file order
+    rest              (N,3) float64, base pose V_0 in file order
+    max_depth         nodes at this depth are taken whole
+    frame_count       frames read, all of whose positions are finite
+    low, high         (3,) float64, corners of the axis-aligned bounding box of all frames
+    rms_motion        root mean square, over frames and vertices, of a vertex's distance from its rest place
+    branches          (C,) the branches above max_depth, whose subtrees are tested
+    largest_gads      (E,C) float64, the largest GADs (eq. 5) of each subtree over the frames, descending;
+                      E is the surveyed eta + 1, or frame_count where that is fewer
+    largest_distance  (C,) float64, distance of the vertex that gets furthest from its base place
+    xi                the surveyed one; None where lam was 0
+    most_beyond_xi    (C,) integers, the most vertices beyond xi in a frame (LAD); None where lam was 0
+
+    Lengths are in scene units. Nothing is kept frame by frame.
+    """
+
+    hierarchy: Hierarchy
+    rest: np.ndarray
+    max_depth: int
+    frame_count: int
+    low: np.ndarray
+    high: np.ndarray
+    rms_motion: float
+    branches: np.ndarray
+    largest_gads: np.ndarray
+    largest_distance: np.ndarray
+    xi: float | None
+    most_beyond_xi: np.ndarray | None
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal over all frames, in scene units."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    def ath(self, thresholds: Thresholds) -> Ath:
+        """The ATH for some thresholds (section 3), without reading the clip again.
+
+        Any epsilon and any eta up to the surveyed one will do, and any xi where lam is 0; with a greater
+        lam, xi must be the surveyed one. Raises ValueError for others.
+        """
+        accepted = np.ones(self.hierarchy.branch_count, bool)
+        accepted[self.branches] = self._keeps_epsilon(thresholds) & self._keeps_xi(thresholds)
+        return _prune(self.hierarchy, thresholds, self.rest, accepted, self.max_depth)
+
+    def _keeps_epsilon(self, thresholds: Thresholds) -> np.ndarray | bool:
+        """TAM's first condition: at most eta frames have a GAD above epsilon."""
+        eta, surveyed = thresholds.eta, len(self.largest_gads) - 1
+        if eta >= self.frame_count:
+            return True
+        if eta > surveyed:
+            raise ValueError(f"thresholds: got eta {eta}, expected at most the surveyed {surveyed}")
+        return self.largest_gads[eta] <= thresholds.epsilon
+
+    def _keeps_xi(self, thresholds: Thresholds) -> np.ndarray:
+        """TAM's second condition: in every frame at most lam vertices are beyond xi."""
+        lam, xi = thresholds.lam, thresholds.xi
+        if lam == 0:
+            return self.largest_distance <= xi
+        if self.most_beyond_xi is None:
+            raise ValueError(f"thresholds: got lam {lam}, expected 0, since the survey was made with lam 0")
+        if xi != self.xi:
+            raise ValueError(f"thresholds: got xi {xi} with lam {lam}, expected the surveyed {self.xi}")
+        return self.most_beyond_xi <= lam
+
+
+def survey(
+    clip: MotionClip,
+    hierarchy: Hierarchy | None = None,
+    lam: int = 0,
+    xi: float | None = None,
+    max_depth: int = MAX_DEPTH,
+    progress: Callable[[float], object] | None = None,
+    *,
+    eta: int = 0,
+) -> Survey:
+    """All that the ATH needs of a clip's frames, for thresholds that are chosen afterwards.
+
+    clip       positions (T,N,3) and rest pose; every frame is read once, block by block
+    hierarchy  the clip's, where it is known already
+    lam        vertices; above 0 it is surveyed for a single xi, in scene units, which is then needed
+    max_depth  nodes at this depth are taken whole, whatever they do
+    progress   called now and then with the part of the frames done, at last with 1.0
+    eta        frames; the largest eta that Survey.ath() will be asked for
+
+    Raises ValueError where a number is negative or xi is missing, and ClipError for positions that are NaN
+    or infinite.
+    """
+    limits = Thresholds(0.0, eta, 0.0 if xi is None else xi, lam)
+    if limits.lam and xi is None:
+        raise ValueError(f"xi: got None with lam {lam}, expected the distance that lam counts from")
+    if max_depth < 0:
+        raise ValueError(f"max_depth: got {max_depth}, expected a number >= 0")
+    if hierarchy is None:
+        hierarchy = hierarchy_of(clip)
+    rest = np.asarray(clip.rest, float)[hierarchy.vertex_source]
+    branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
+    differences = _Differences(_tested_pieces(hierarchy, rest, branches), limits)
+    extent = _Extent(rest)
+    for portion in _file_order_portions(clip, hierarchy):
+        extent.add(portion)
+        differences.add(_seen_from(differences.pieces.origin, portion))
+        if progress is not None:
+            progress(extent.frame_count / clip.frame_count)
+    return Survey(
+        hierarchy=hierarchy, rest=rest, max_depth=max_depth, frame_count=extent.frame_count,
+        low=extent.low, high=extent.high, rms_motion=extent.rms_motion(), branches=branches,
+        largest_gads=differences.largest_gads.rows(), largest_distance=differences.largest_distance,
+        xi=limits.xi if limits.lam else None, most_beyond_xi=differences.most_beyond_xi,
+    )
+
+
+def build_ath(
+    clip: MotionClip,
+    epsilon: float | None = None,
+    eta: int = 0,
+    xi: float | None = None,
+    lam: int = 0,
+    hierarchy: Hierarchy | None = None,
+    max_depth: int = MAX_DEPTH,
+    *,
+    max_error: float | None = None,
+) -> Ath:
+    """The ATH of a clip (section 3), in one pass over its frames. See survey() for several thresholds.
+
+    clip       positions (T,N,3) and rest pose, read block by block
+    epsilon    scene units: a frame whose mean residual distance (GAD, eq. 5) exceeds it counts against eta
+    eta        at most so many frames may exceed epsilon
+    xi         scene units: a vertex further than this from its base place counts against lam (LAD)
+    lam        in every frame at most so many vertices may
+    max_error  instead of epsilon and xi: both are this, in scene units
+    hierarchy  the clip's, where it is known already
+    max_depth  nodes at this depth are taken whole, whatever they do
+
+    Where TAM accepts a subtree, its node is a leaf; otherwise the sub-branches are tried, down to a single
+    branch. Raises ValueError where thresholds are missing, given twice or negative, and ClipError for
+    positions that are NaN or infinite.
+    """
+    thresholds = _thresholds(epsilon, eta, xi, lam, max_error)
+    surveyed = survey(clip, hierarchy, thresholds.lam, thresholds.xi, max_depth, eta=thresholds.eta)
+    return surveyed.ath(thresholds)
+
+
+def _thresholds(
+    epsilon: float | None, eta: int, xi: float | None, lam: int, max_error: float | None
+) -> Thresholds:
+    if max_error is not None:
+        if epsilon is not None or xi is not None:
+            raise ValueError("ATH thresholds: got max_error beside epsilon or xi, expected one or the other")
+        epsilon = xi = max_error
+    if epsilon is None or xi is None:
+        raise ValueError(f"ATH thresholds: got epsilon {epsilon} and xi {xi}, expected both, or max_error")
+    return Thresholds(epsilon, eta, xi, lam)
+
+
+class _Extent:
+    """Bounding box, motion about the rest pose (N,3) and number of the frames added."""
+
+    def __init__(self, rest: np.ndarray) -> None:
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.frame_count = 0
+        self._rest = np.ascontiguousarray(rest.T)[:, None]
+        self._square_sum = 0.0
+
+    def add(self, frames: np.ndarray) -> None:
+        """Add frames (3,k,N) in the scene's coordinates."""
+        self.low = np.minimum(self.low, frames.min(axis=(1, 2)))
+        self.high = np.maximum(self.high, frames.max(axis=(1, 2)))
+        self.frame_count += frames.shape[1]
+        moved = frames - self._rest
+        moved *= moved
+        self._square_sum += float(moved.sum())
+
+    def rms_motion(self) -> float:
+        return float(np.sqrt(self._square_sum / (self.frame_count * self._rest.shape[2])))
+
+
+class _Differences:
+    """GAD and LAD of all pieces, as far as TAM asks for them over all frames; see Survey."""
+
+    def __init__(self, pieces: _Pieces, limits: Thresholds) -> None:
+        self.pieces = pieces
+        self.largest_gads = _Largest(limits.eta + 1)
+        self.largest_distance = np.zeros(len(pieces.first))
+        self.most_beyond_xi = np.zeros(len(pieces.first), np.int64) if limits.lam else None
+        self._xi = limits.xi
+
+    def add(self, frames: np.ndarray) -> None:
+        """Add frames (3,k,N), seen from the origin of the pieces."""
+        pieces = self.pieces
+        fit = pieces.fit(frames)
+        gad = np.empty((frames.shape[1], len(pieces.first)))
+        for level in pieces.levels:
+            distance, counts = fit.distances(level), pieces.counts[level]
+            starts = _starts(counts)
+            gad[:, level] = np.add.reduceat(distance, starts, axis=1) / counts
+            largest = np.maximum.reduceat(distance.max(axis=0), starts)
+            self.largest_distance[level] = np.maximum(self.largest_distance[level], largest)
+            if self.most_beyond_xi is not None:
+                beyond = np.add.reduceat(distance > self._xi, starts, axis=1, dtype=np.int64).max(axis=0)
+                self.most_beyond_xi[level] = np.maximum(self.most_beyond_xi[level], beyond)
+        self.largest_gads.add(gad)
+
+
+class _Largest:
+    """The `count` largest numbers of each column of the rows added: what TAM needs to allow eta frames."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._parts: list[np.ndarray] = []
+        self._held = 0
+
+    def add(self, rows: np.ndarray) -> None:
+        self._parts.append(rows)
+        self._held += len(rows)
+        # Sorting whenever the rows have doubled costs each row the same, however many are kept.
+        if self._held >= 2 * self._count:
+            self._parts = [self.rows()]
+            self._held = self._count
+
+    def rows(self) -> np.ndarray:
+        """(count or fewer, columns), each column descending."""
+        ascending = np.sort(np.concatenate(self._parts), axis=0)
+        return ascending[::-1][: self._count].copy()
+
+
+def stem_maps(hierarchy: Hierarchy, rest: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Least-squares maps (eq. 2) of every branch's stem: (k,B,3,4) float64 from rest to the positions of each frame.
+
+    rest is (N,3) and frames (k,N,3), both in file order; B branches in file order.
+    """
+    every = np.arange(hierarchy.branch_count)
+    pieces = _Pieces(hierarchy, np.asarray(rest, float), every, every + 1, hierarchy.branch_parent,
+                     hierarchy.branch_depth)
+    return pieces.fit(_seen_from(pieces.origin, np.moveaxis(np.asarray(frames), 2, 0))).matrices()
+
+
+def _tested_pieces(hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray) -> _Pieces:
+    """The subtrees of the given branches, which hold the parent of each."""
+    index = np.full(hierarchy.branch_count + 1, -1)
+    index[branches] = np.arange(len(branches))
+    parent = index[hierarchy.branch_parent[branches]]
+    return _Pieces.subtrees(hierarchy, rest, branches, parent, hierarchy.branch_depth[branches])
+
+
+def _prune(
+    hierarchy: Hierarchy, thresholds: Thresholds, rest: np.ndarray, accepted: np.ndarray, max_depth: int
+) -> Ath:
+    """Keep the branches above which no subtree was accepted."""
+    depth, parent = hierarchy.branch_depth, hierarchy.branch_parent
+    kept = depth == 0
+    for level in range(1, min(int(depth.max()), max_depth) + 1):
+        branches = np.flatnonzero(depth == level)
+        kept[branches] = kept[parent[branches]] & ~accepted[parent[branches]]
+    nodes = np.flatnonzero(kept).astype(np.int32)
+    index = np.full(hierarchy.branch_count + 1, -1, np.int32)
+    index[nodes] = np.arange(len(nodes))
+    return Ath(hierarchy, thresholds, rest, nodes, index[parent[nodes]], depth[nodes], accepted[nodes])
+
+
+def _file_order_frames(
+    positions: MotionClip | np.ndarray, hierarchy: Hierarchy, origin: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Frames in working portions: (3,k,N) float64, vertices in file order, seen from `origin`."""
+    for portion in _file_order_portions(positions, hierarchy):
+        yield _seen_from(origin, portion)
+
+
+def _seen_from(origin: np.ndarray, portion: np.ndarray) -> np.ndarray:
+    return portion.astype(float) - origin[:, None, None]
+
+
+def _file_order_portions(positions: MotionClip | np.ndarray, hierarchy: Hierarchy) -> Iterator[np.ndarray]:
+    """Frames in working portions as they are: (3,k,N) in the source's dtype, vertices in file order."""
+    count = hierarchy.vertex_count
+    at_once = max(1, _WORK_VERTICES // count)
+    for block in _blocks(positions, count):
+        for start in range(0, len(block), at_once):
+            axes = np.moveaxis(block[start : start + at_once], 2, 0)
+            yield np.take(axes, hierarchy.vertex_source, axis=2)
+
+
+def _blocks(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
+    if hasattr(positions, "blocks"):
+        yield from (block for _, block in positions.blocks(max(1, _READ_VALUES // (3 * vertex_count))))
+        return
+    if np.ndim(positions) != 3 or np.shape(positions)[1:] != (vertex_count, 3):
+        raise ValueError(f"positions: got shape {np.shape(positions)}, expected (T, {vertex_count}, 3)")
+    yield np.asarray(positions)
+
+
+class _Pieces:
+    """Sets of vertices that each get one affine map per frame, with what their fits need of the rest pose.
+
+    A piece is a range of branches: a subtree, or a single stem. `parent` is the piece that a straight one
+    inherits its free rotation from (-1: none), `level` a number greater than the parent's.
+    """
+
+    def __init__(
+        self,
+        hierarchy: Hierarchy,
+        rest: np.ndarray,
+        first_branch: np.ndarray,
+        stop_branch: np.ndarray,
+        parent: np.ndarray,
+        level: np.ndarray,
+    ) -> None:
+        bounds = np.append(hierarchy.first_vertex, hierarchy.vertex_count).astype(np.intp)
+        self.first_branch, self.stop_branch, self.parent = first_branch, stop_branch, parent
+        self.first, self.stop = bounds[first_branch], bounds[stop_branch]
+        self.counts = self.stop - self.first
+        self.levels = [np.flatnonzero(level == value) for value in np.unique(level)]
+        self.stem_starts = bounds[:-1]
+        self.origin = rest.mean(axis=0)
+        self.rest = np.ascontiguousarray((rest - self.origin).T)
+        self._describe_rest_pose()
+        self.lends_rotation = np.zeros(len(first_branch), bool)
+        self.lends_rotation[parent[(self.rank < 2) & (parent >= 0)]] = True
+
+    @classmethod
+    def subtrees(
+        cls,
+        hierarchy: Hierarchy,
+        rest: np.ndarray,
+        branches: np.ndarray,
+        parent: np.ndarray,
+        level: np.ndarray,
+    ) -> _Pieces:
+        stop_branch = branches + hierarchy.subtree_branches[branches]
+        return cls(hierarchy, rest, branches, stop_branch, parent, level)
+
+    def vertices(self, some: np.ndarray) -> np.ndarray:
+        """The vertices of some pieces, one piece after the other."""
+        counts = self.counts[some]
+        return np.arange(counts.sum()) + np.repeat(self.first[some] - _starts(counts), counts)
+
+    def fit(self, frames: np.ndarray) -> _Fit:
+        """The maps of all pieces in frames (3,k,N)."""
+        return _Fit(self, frames)
+
+    def _describe_rest_pose(self) -> None:
+        """Each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
+        count = len(self.first)
+        self.centroid = np.empty((count, 3))
+        covariance = np.empty((count, 3, 3))
+        for some in self.levels:    # level by level, since the pieces of one level do not overlap
+            vertices, counts = self.vertices(some), self.counts[some]
+            points = self.rest[:, vertices]
+            centroid = np.add.reduceat(points, _starts(counts), axis=1) / counts
+            points -= np.repeat(centroid, counts, axis=1)
+            products = np.add.reduceat(points[:, None] * points, _starts(counts), axis=2)
+            covariance[some] = (products / counts).transpose(2, 0, 1)
+            self.centroid[some] = centroid.T
+        variance, axes = np.linalg.eigh(covariance)
+        variance, self.axes = variance[:, ::-1], np.ascontiguousarray(axes[:, :, ::-1])
+        # Right-handed axes, so that completing a flat piece never mirrors it.
+        self.axes[:, :, 2] *= np.sign(np.linalg.det(self.axes))[:, None]
+        extent = np.sqrt(np.maximum(variance, 0.0))
+        smallest = _POINT_EXTENT * np.ptp(self.rest, axis=1).max()
+        present = (extent > RANK_TOLERANCE * extent[:, :1]) & (extent[:, :1] > smallest)
+        self.rank = present.sum(axis=1)
+        inverse_variance = np.divide(1.0, variance, out=np.zeros_like(variance), where=present)
+        self.pseudo_inverse = (self.axes * inverse_variance[:, None]) @ np.swapaxes(self.axes, 1, 2)
+
+
+class _Fit:
+    """The affine maps x -> linear (x - rest centroid) + centroid of all pieces in k frames.
+
+    linear and inverse are (k,n,3,3), centroid (k,n,3), all seen from the origin of the pieces.
+    """
+
+    def __init__(self, pieces: _Pieces, frames: np.ndarray) -> None:
+        self.pieces, self.frames = pieces, frames
+        sums = self._sums()
+        self.centroid = sums[..., 3] / pieces.counts[:, None]
+        covariance = sums[..., :3] / pieces.counts[:, None, None]
+        covariance -= self.centroid[..., None] * pieces.centroid[:, None]
+        self.linear = covariance @ pieces.pseudo_inverse
+        self.inverse = np.empty_like(self.linear)
+        rotation = np.broadcast_to(np.eye(3), (len(self.linear), len(pieces.first) + 1, 3, 3)).copy()
+        for some in pieces.levels:
+            self._complete(some, rotation)
+            self.linear[:, some], self.inverse[:, some] = _invertible(self.linear[:, some])
+            lenders = some[pieces.lends_rotation[some]]
+            rotation[:, lenders] = _nearest_rotation(self.linear[:, lenders])
+
+    def _sums(self) -> np.ndarray:
+        """Sums of x_i y_j and x_i over each piece's vertices, x now and y at rest: (k,n,3,4).
+
+        Running sums over the stems serve every subtree at once, because a subtree is a range of stems.
+        """
+        pieces, frames = self.pieces, self.frames
+        stems = np.empty((3, 4, frames.shape[1], len(pieces.stem_starts) + 1))
+        stems[..., 0] = 0.0
+        for j in range(3):
+            np.add.reduceat(frames * pieces.rest[j], pieces.stem_starts, axis=2, out=stems[:, j, :, 1:])
+        np.add.reduceat(frames, pieces.stem_starts, axis=2, out=stems[:, 3, :, 1:])
+        np.cumsum(stems, axis=3, out=stems)
+        sums = stems[..., pieces.stop_branch] - stems[..., pieces.first_branch]
+        return np.ascontiguousarray(sums.transpose(2, 3, 0, 1))
+
+    def _complete(self, some: np.ndarray, rotation: np.ndarray) -> None:
+        """Give the maps of flat, straight and point-like pieces the directions that their rest pose lacks."""
+        pieces = self.pieces
+        rank = pieces.rank[some]
+        flat, straight, points = some[rank == 2], some[rank == 1], some[rank == 0]
+        if len(flat):
+            axes = pieces.axes[flat]
+            images = self.linear[:, flat] @ axes[:, :, :2]
+            normal = _unit(np.cross(images[..., 0], images[..., 1]))
+            self.linear[:, flat] += normal[..., None] * axes[:, None, :, 2]
+        if len(straight):
+            axis = pieces.axes[straight][:, :, 0]
+            image = _unit((self.linear[:, straight] @ axis[..., None])[..., 0])
+            inherited = rotation[:, pieces.parent[straight]]
+            turn = _least_rotation((inherited @ axis[..., None])[..., 0], image)
+            across = np.eye(3) - axis[:, :, None] * axis[:, None]
+            self.linear[:, straight] += turn @ inherited @ across
+        self.linear[:, points] = rotation[:, pieces.parent[points]]
+
+    def matrices(self) -> np.ndarray:
+        """(k,n,3,4) from rest positions to positions of each frame, in the scene's coordinates."""
+        pieces = self.pieces
+        base = (pieces.centroid + pieces.origin)[..., None]
+        offset = self.centroid + pieces.origin - (self.linear @ base)[..., 0]
+        return np.concatenate([self.linear, offset[..., None]], axis=3)
+
+    def inverse_maps(self) -> tuple[np.ndarray, np.ndarray]:
+        """(k,n,3,3) and (k,n,3): x goes to its residual as inverse x + offset, both seen from the origin."""
+        offset = self.pieces.centroid - (self.inverse @ self.centroid[..., None])[..., 0]
+        return self.inverse, offset
+
+    def apply(self, some: np.ndarray, vertices: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """Where some pieces' maps put vertices, counts[i] of them by piece some[i]: (3,k,sum of counts)."""
+        linear = self.linear[:, some]
+        offset = self.centroid[:, some] - (linear @ self.pieces.centroid[some][..., None])[..., 0]
+        return _map_points(linear, offset, self.pieces.rest[:, None, vertices], counts)
+
+    def distances(self, some: np.ndarray) -> np.ndarray:
+        """How far the residuals of some pieces are from their base places (eq. 5): (k, vertices of each)."""
+        pieces = self.pieces
+        counts, vertices = pieces.counts[some], pieces.vertices(some)
+        inverse = self.inverse[:, some]
+        offset = pieces.centroid[some] - (inverse @ self.centroid[:, some, :, None])[..., 0]
+        residual = _map_points(inverse, offset, np.take(self.frames, vertices, axis=2), counts)
+        residual -= pieces.rest[:, None, vertices]
+        residual *= residual
+        return np.sqrt(residual[0] + residual[1] + residual[2])
+
+
+def _starts(counts: np.ndarray) -> np.ndarray:
+    return np.cumsum(counts) - counts
+
+
+def _map_points(linear: np.ndarray, offset: np.ndarray, points: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """linear x + offset, (k,n,3,3) and (k,n,3); map i serves the next counts[i] points of (3,k or 1,V)."""
+    result = np.empty((3, len(linear), points.shape[2]))
+    for i in range(3):
+        result[i] = np.repeat(offset[..., i], counts, axis=1)
+        for j in range(3):
+            result[i] += np.repeat(linear[..., i, j], counts, axis=1) * points[j]
+    return result
+
+
+def _invertible(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The maps (k,n,3,3) with every direction stretched by MIN_STRETCH at least, and their inverses."""
+    a, b, c = linear[..., 0], linear[..., 1], linear[..., 2]
+    adjugate = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+    determinant = (a * adjugate[..., 0, :]).sum(axis=-1)
+    # The least stretch is at least 1 / |inverse|, so the few suspects alone are decomposed.
+    suspect = np.linalg.norm(adjugate, axis=(-2, -1)) * MIN_STRETCH >= np.abs(determinant)
+    inverse = adjugate / np.where(suspect, 1.0, determinant)[..., None, None]
+    if suspect.any():
+        linear = linear.copy()
+        linear[suspect], inverse[suspect] = _stretched(linear[suspect])
+    return linear, inverse
+
+
+def _stretched(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    left, stretch, right = np.linalg.svd(linear)
+    least = MIN_STRETCH * np.clip(stretch[:, 0], _LEAST_SCALE, 1.0)
+    # Which side a flattened subtree shows is noise: it is not turned inside out.
+    mirrored = (np.linalg.det(left) * np.linalg.det(right) < 0) & (stretch[:, 2] < least)
+    left[mirrored, :, 2] *= -1.0
+    stretch = np.maximum(stretch, least[:, None])[:, None]
+    return (left * stretch) @ right, (np.swapaxes(right, 1, 2) / stretch) @ np.swapaxes(left, 1, 2)
+
+
+def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
+    left, _, right = np.linalg.svd(linear)
+    left[..., 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))[..., None]
+    return left @ right
+
+
+def _least_rotation(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """(...,3,3): turns unit vectors `start` into `goal` and nothing else; the identity where goal is zero."""
+    axis = np.cross(start, goal)
+    cosine = (start * goal).sum(axis=-1)
+    turn = np.zeros((*axis.shape, 3))
+    turn[..., 0, 1], turn[..., 0, 2], turn[..., 1, 2] = -axis[..., 2], axis[..., 1], -axis[..., 0]
+    turn -= np.swapaxes(turn, -1, -2)
+    # Opposite vectors have no least rotation: they stay as they are.
+    return np.eye(3) + turn + turn @ turn / np.maximum(1.0 + cosine, 1e-9)[..., None, None]
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

@@ -1,0 +1,684 @@
+"""The command `athcodec`: arguments, progress and printing.
+
+Results go to stdout, as a table or with --json as one JSON object; messages and progress go to stderr,
+progress only where that is a terminal. Exit codes: 0 done, 1 an error or a failed check, 2 wrong usage,
+130 interrupted. An error is one line; its traceback comes with --debug. How a clip is coded is not known here
+(encoder.py, decoder.py), nor what an error measure is (metrics.py).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import re
+import signal
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+import athcodec
+
+from .ath import Thresholds
+from .clip import MotionClip
+from .decoder import Decoder, Depth
+from .errors import AthError, ClipError, LevelUnavailable
+from .exporters import Hdf5Writer
+from .metrics import ErrorMeter, compare_clips
+from .transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from .units import Length, parse_length, parse_size
+
+DEFAULT_REL_ERROR = 1e-4
+INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
+"""Exit codes: 128 and the number of the signal, as shells have it."""
+
+ROUNDING = 1e-6
+"""How far, relatively, two ways to add up the same error may differ."""
+
+TRACEBACK = "show the traceback of an error"
+WRITTEN = "file to write; replaced when the new one is complete"
+LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
+
+_TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
+
+Report = Callable[[str, float], None]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (default: that of the process) and return its exit code.
+
+    Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 when told to terminate.
+    """
+    args = _parser().parse_args(argv)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name need not be valid text
+    try:
+        with _termination_unwinds():
+            code = args.run(args)
+            sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read stdout has left. What is still buffered goes nowhere, or Python complains at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except Exception as error:
+        if args.debug:
+            traceback.print_exc()
+        _say("error", _one_line(error))
+        return 1
+
+
+# ---- the verbs ----
+
+
+def _encode(args: argparse.Namespace) -> int:
+    _check_output(args.output, args.input)
+    with athcodec.read_hdf5(args.input, args.rest) as clip, _naming(args.input), _progress() as report:
+        unit = clip.metadata.get("unit")
+        athcodec.encode(
+            clip,
+            args.output,
+            segment_frames=args.segment_frames,
+            tam=_thresholds(args.tam, unit),
+            exact_rest=args.exact_rest,
+            attributes=args.attributes,
+            effort=args.effort,
+            progress=report,
+            **_bound(args, unit),
+        )
+    with _open(args.output, strict=True) as decoder:
+        _print_file(args.output, decoder, args.json)
+    return 0
+
+
+def _decode(args: argparse.Namespace) -> int:
+    _check_output(args.output, args.input)
+    with _open(args.input, allow_partial=args.allow_partial) as decoder:
+        depth = decoder.deepest if args.depth is None else args.depth
+        frames = _frames(args.frames, decoder.frame_count)
+        with _progress() as report:
+            _write_hdf5(decoder, args.output, depth, frames, args.gzip, report)
+        if decoder.missing:
+            _say("warning", f"{args.input}: decoded to level {depth}; {_what_is_missing(decoder)}")
+        print(f"{args.output}: {len(frames):,} frames, {decoder.vertex_count:,} vertices, level {depth}")
+    return 0
+
+
+def _info(args: argparse.Namespace) -> int:
+    with _open(args.file) as decoder:
+        _print_file(args.file, decoder, args.json)
+    return 0
+
+
+def _verify(args: argparse.Namespace) -> int:
+    result: dict[str, Any] = {"file": args.file, "against": args.against, "ok": False}
+    try:
+        with _open(args.file, strict=True) as decoder:
+            decoder.check()
+            result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
+            if args.against:
+                result["depths"] = _measure_against(decoder, args.against)
+                _refuse_broken_promises(result)
+        result["ok"] = True
+    except AthError as error:
+        result["error"] = _one_line(error)
+    if args.json:
+        _print_json(result)
+    else:
+        _print_verdict(result)
+    if not result["ok"]:
+        _say("error", result["error"])
+    return 0 if result["ok"] else 1
+
+
+def _truncate(args: argparse.Namespace) -> int:
+    _check_output(args.output, args.input)
+    with _naming(args.input):
+        athcodec.truncate(args.input, args.output, args.depth)
+    before, after = (os.path.getsize(path) for path in (args.input, args.output))
+    print(f"{args.output}: levels 0 to {args.depth}, {after:,} of {before:,} bytes")
+    return 0
+
+
+def _demo(args: argparse.Namespace) -> int:
+    with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        source = athcodec.sample_path()
+        encoded = Path(folder, f"{source.stem}.ath")
+        with athcodec.read_hdf5(source) as clip, _progress() as report:
+            athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
+            with _open(encoded, strict=True) as decoder:
+                meters = [_decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
+                _print_demo(_facts(encoded, decoder), meters)
+        if args.keep is not None:
+            print(f"The file and its decoded levels are in {folder}.")
+    return 0
+
+
+# ---- what they do with clips and decoders ----
+
+
+@contextmanager
+def _open(path: str | Path, **options: bool) -> Iterator[Decoder]:
+    with _naming(path), athcodec.open(path, **options) as decoder:
+        yield decoder
+
+
+@contextmanager
+def _naming(path: str | Path) -> Iterator[None]:
+    """Let the errors of the block say which file they are about."""
+    try:
+        yield
+    except AthError as error:
+        if str(error).startswith(f"{path}: "):
+            raise
+        raise type(error)(f"{path}: {error}") from error
+
+
+def _bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
+    """The one keyword of encode() that says how far off the clip may be, or how large the file."""
+    if args.max_error is not None:
+        return {"max_error": args.max_error.in_scene_units(unit)}
+    if args.target_size is not None:
+        return {"target_size": args.target_size}
+    return {"rel_error": args.rel_error or DEFAULT_REL_ERROR}
+
+
+def _thresholds(tam: tuple[Length, int, Length, int] | None, unit: Any) -> Thresholds | None:
+    if tam is None:
+        return None
+    epsilon, eta, xi, lam = tam
+    return Thresholds(epsilon.in_scene_units(unit), eta, xi.in_scene_units(unit), lam)
+
+
+def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
+    """Frames A to B - 1 of A:B, where None is the clip's end; LevelUnavailable beyond it."""
+    start = 0 if bounds[0] is None else bounds[0]
+    stop = frame_count if bounds[1] is None else bounds[1]
+    if not start < stop <= frame_count:
+        raise LevelUnavailable(f"frames: got {start}:{stop}, expected A:B with A < B <= {frame_count}")
+    return range(start, stop)
+
+
+def _write_hdf5(
+    decoder: Decoder,
+    path: str | Path,
+    depth: int,
+    frames: range,
+    gzip: bool = False,
+    report: Report | None = None,
+) -> None:
+    """Decode segment by segment, so that a clip larger than memory works."""
+    writer = Hdf5Writer(
+        path,
+        time=decoder.time[frames.start : frames.stop],
+        vertex_branch=decoder.vertex_branch,
+        branch_parent=decoder.branch_parent,
+        rest=decoder.rest,
+        dtype=decoder.dtype,
+        stem_index=decoder.stem_index,
+        edges=decoder.edges,
+        faces=decoder.faces,
+        attributes=decoder.attributes,
+        metadata=decoder.metadata,
+        gzip=gzip,
+    )
+    with writer:
+        for start, block in decoder.blocks(depth, frames=slice(frames.start, frames.stop)):
+            writer.add(block)
+            if report:
+                report("decode", (start + len(block) - frames.start) / len(frames))
+
+
+def _measure_against(decoder: Decoder, path: str) -> list[dict[str, Any]]:
+    """One entry per level: what it promises, and how far off the clip in `path` it is."""
+    with athcodec.read_hdf5(path) as clip, _naming(path), _progress() as report:
+        got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
+        if got != expected:
+            raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
+        meters = [ErrorMeter(clip.rest) for _ in decoder.depths]
+        for start, stop in decoder.segments:
+            reference = clip.block(start, stop)
+            for depth, meter in enumerate(meters):
+                meter.add(reference, decoder.positions(slice(start, stop), depth))
+            if report:
+                report("measure", stop / clip.frame_count)
+    return [_measured(level, meter) for level, meter in zip(decoder.depths, meters, strict=True)]
+
+
+def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
+    return {
+        "depth": level.depth,
+        "promised_max_error": level.max_error,
+        "max_error": meter.max_error,
+        "rms_error": meter.rms_error,
+        "kg_error_percent": meter.kg_error,
+        "motion_normalised_error": meter.motion_normalised_error,
+        "kept": meter.max_error <= level.max_error * (1 + ROUNDING),
+    }
+
+
+def _refuse_broken_promises(result: dict[str, Any]) -> None:
+    levels = result["depths"]
+    broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
+    if levels[-1]["max_error"] > result["max_error_bound"]:
+        broken.append((levels[-1], result["max_error_bound"]))
+    for level, promised in broken[:1]:
+        raise AthError(
+            f"{result['file']}: level {level['depth']}: got max error {level['max_error']:.6g} against "
+            f"{result['against']}, expected at most {promised:.6g}"
+        )
+
+
+def _decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth: int) -> ErrorMeter:
+    decoded = encoded.with_name(f"{encoded.stem}_level_{depth}.h5")
+    _write_hdf5(decoder, decoded, depth, range(decoder.frame_count))
+    with athcodec.read_hdf5(decoded) as again:
+        return compare_clips(clip, again)
+
+
+def _check_output(path: str, source: str) -> None:
+    """Refuse, before any work, what can only fail after it, and what would destroy the input."""
+    folder = os.path.dirname(path) or "."
+    if not os.path.isdir(folder):
+        raise FileNotFoundError(f"{path}: the directory {folder} does not exist")
+    if os.path.isdir(path):
+        raise IsADirectoryError(f"{path}: got a directory, expected a file name")
+    if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
+        raise FileExistsError(f"{path}: is the input, expected another file name")
+
+
+def _what_is_missing(decoder: Decoder) -> str:
+    if decoder.complete:
+        return decoder.missing
+    got, expected = decoder.info()["available_bytes"], decoder.file_length
+    return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.missing}"
+
+
+# ---- printing ----
+
+
+def _print_file(path: str, decoder: Decoder, as_json: bool) -> None:
+    facts = _facts(path, decoder)
+    if as_json:
+        _print_json(facts)
+    else:
+        _print_facts(facts)
+
+
+def _facts(path: str | Path, decoder: Decoder) -> dict[str, Any]:
+    """decoder.info(), and per level what it adds to the file cut before it."""
+    facts = {"file": os.fspath(path)} | decoder.info()
+    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
+    facts["raw_bytes"] = decoder.frame_count * decoder.vertex_count * 12
+    facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
+    before = decoder.container.prelude_length
+    for level in facts["depths"]:
+        level["added_bytes"] = level["bytes"] - before
+        level["share"] = level["added_bytes"] / facts["bytes"]
+        before = level["bytes"]
+    return facts
+
+
+def _print_facts(facts: dict[str, Any]) -> None:
+    ath = facts["ath"]
+    rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
+    print(
+        f"{facts['file']}: {_count(facts['vertices'], 'vertex', 'vertices')} on "
+        f"{_count(facts['branches'], 'branch', 'branches')}, {_count(facts['frames'], 'frame')}{rate} in "
+        f"{_count(facts['segments'], 'segment')}, format {facts['format']}"
+    )
+    print(
+        f"ATH: depth {ath['depth']}, {_count(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves; "
+        f"epsilon {ath['epsilon']:g}, eta {ath['eta']}, xi {ath['xi']:g}, lambda {ath['lam']}"
+    )
+    unit = f" {facts['unit']}" if facts["unit"] else ""
+    print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    if facts["levels"] < facts["full_levels"]:
+        print(f"Holds levels 0 to {facts['levels'] - 1} of 0 to {facts['full_levels'] - 1}.")
+    if facts["missing"]:
+        print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
+    _print_levels(facts)
+
+
+def _print_levels(facts: dict[str, Any]) -> None:
+    columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
+    cells = [
+        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"]
+        for level in facts["depths"]
+    ]
+    _print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
+
+
+def _level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
+    """One row per level, ending in its `cells`, between what the file holds before and behind them."""
+    levels, total = facts["depths"], facts["bytes"]
+
+    def row(name: str, nodes: str, size: int) -> list[str]:
+        return [name, nodes, f"{size:,}", f"{size / total:.1%}"]
+
+    rows = [row("prelude", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
+    for level, more in zip(levels, cells, strict=True):
+        name = f"{level['depth']}" if level["available"] else f"{level['depth']} (incomplete)"
+        rows.append(row(name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
+    behind = total - levels[-1]["bytes"]
+    return [*rows, row("arrays", "", behind)] if behind else rows
+
+
+def _print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
+    seconds = facts["frames"] / facts["fps"]
+    columns = [*(_head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
+    cells = []
+    for level, meter in zip(facts["depths"], meters, strict=True):
+        errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
+        relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
+        cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
+    print(
+        f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, decoded every "
+        "depth and measured it against the source:"
+    )
+    _print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
+    print(_size(facts))
+
+
+def _print_verdict(result: dict[str, Any]) -> None:
+    levels = result.get("depths", [])
+    if levels:
+        names = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
+        columns = ["depth", *(_head(name, result["unit"]) for name in ("promised", "max", "RMS"))]
+        rows = [
+            [f"{level['depth']}", *(f"{level[name]:.4g}" for name in names), "yes" if level["kept"] else "NO"]
+            for level in levels
+        ]
+        _print_table([*columns, "KG (%)", "RMS/motion", "kept"], rows)
+    if result["ok"]:
+        more = f"; every depth is as close to {result['against']} as the file says" if levels else ""
+        print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
+
+
+def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for index, name in enumerate(columns):
+        table.add_column(Text(name), justify="right" if index else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)
+
+
+def _print_json(facts: dict[str, Any]) -> None:
+    print(json.dumps(_finite(facts), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    """`value` for JSON, which knows neither infinity nor NaN: they become null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _count(number: int, one: str, many: str = "") -> str:
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def _head(name: str, unit: Any) -> str:
+    return f"{name} ({unit})" if unit else name
+
+
+def _size(facts: dict[str, Any]) -> str:
+    return (
+        f"{facts['bytes']:,} bytes, 1 : {facts['ratio']:.1f} of the {facts['raw_bytes']:,} bytes of the positions "
+        "as float32."
+    )
+
+
+def _say(kind: str, message: str) -> None:
+    print(f"athcodec: {kind}: {message}", file=sys.stderr)
+
+
+def _one_line(error: Exception) -> str:
+    """What went wrong, where, got, expected. An error that nobody foresaw is named by its class."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)}: {error.strerror}"
+    text = " ".join(str(error).split())
+    foreseen = isinstance(error, (AthError, OSError))
+    return text if foreseen and text else f"{type(error).__name__}: {text} (--debug shows where)"
+
+
+# ---- the process ----
+
+
+@contextmanager
+def _progress() -> Iterator[Report | None]:
+    """A function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def report(stage: str, fraction: float) -> None:
+            # Each stage counts from 0, at its own pace: the time left is that of the stage.
+            if stage != bar.tasks[task].description or fraction < bar.tasks[task].completed:
+                bar.reset(task, total=1.0, description=stage)
+            bar.update(task, completed=fraction)
+
+        yield report
+
+
+@contextmanager
+def _termination_unwinds() -> Iterator[None]:
+    """Let SIGTERM end the block as an exception does, so that unfinished files are removed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+# ---- arguments ----
+
+
+def _parser() -> argparse.ArgumentParser:
+    shared = argparse.ArgumentParser(add_help=False)
+    shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
+    parser = argparse.ArgumentParser(
+        prog="athcodec",
+        description="A codec for plant motion: levels of detail over the branch hierarchy, within an error bound.",
+        epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 an error or a failed check, 2 usage.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"athcodec {athcodec.__version__}")
+    parser.add_argument("--debug", action="store_true", help=TRACEBACK)
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+
+    def verb(name: str, run: Callable, text: str, more: str = "") -> argparse.ArgumentParser:
+        description = f"{text[0].upper()}{text[1:]}. {more}"
+        sub = verbs.add_parser(name, parents=[shared], allow_abbrev=False, help=text, description=description)
+        sub.set_defaults(run=run)
+        return sub
+
+    _encode_arguments(verb(
+        "encode", _encode, "compress the motion of an HDF5 file into an .ath file",
+        f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}.",
+    ))
+    _decode_arguments(verb(
+        "decode", _decode, "write the motion of an .ath file to an HDF5 file",
+        "A file that was cut off is decoded to its deepest complete level, with a warning.",
+    ))
+    _info_arguments(verb("info", _info, "show what an .ath file holds, level by level"))
+    _verify_arguments(verb(
+        "verify", _verify, "check that an .ath file is whole and undamaged, and how far off its source it is",
+        "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
+    ))
+    _truncate_arguments(verb("truncate", _truncate, "leave out the levels beyond a depth, without decoding"))
+    _demo_arguments(verb("demo", _demo, "encode the sample that comes with it, decode and measure every depth"))
+    return parser
+
+
+def _encode_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("input", metavar="IN.h5", help="HDF5: positions, time, rest, vertex_branch, branch_parent")
+    verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
+    bound = verb.add_mutually_exclusive_group()
+    bound.add_argument(
+        "--max-error", metavar="LENGTH", type=_argument(_positive_length),
+        help="largest distance of any vertex in any frame from the source: in scene units, or 1mm, 0.5cm, 2in "
+        "(m, cm, mm, km, in, ft) where the clip says its unit",
+    )
+    bound.add_argument(
+        "--rel-error", metavar="FRACTION", type=_argument(_fraction),
+        help="the same as a fraction of the diagonal of the bounding box over all frames "
+        f"(default {DEFAULT_REL_ERROR:g})",
+    )
+    bound.add_argument(
+        "--target-size", metavar="SIZE", type=_argument(parse_size),
+        help="the smallest error whose file is not larger: bytes, 50kB, 1.5MB (1 kB = 1,000 bytes), 48KiB, 2MiB",
+    )
+    verb.add_argument(
+        "--segment-frames", metavar="FRAMES", type=_argument(_segment_frames),
+        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}): shorter ones "
+        "seek faster and make larger files",
+    )
+    verb.add_argument(
+        "--tam", metavar="EPS,ETA,XI,LAMBDA", type=_argument(_tam),
+        help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI lengths, "
+        "ETA frames, LAMBDA vertices (default: where the error bound allows it)",
+    )
+    verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
+    verb.add_argument(
+        "--attributes", choices=("all", "none"), default="all",
+        help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",
+    )
+    verb.add_argument(
+        "--effort", choices=("fast", "default", "best"), default="default",
+        help="how long to look for a smaller file",
+    )
+    verb.add_argument(
+        "--rest", choices=("auto", "first", "mean"), default="auto",
+        help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all "
+        "(default auto)",
+    )
+    verb.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def _decode_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("input", metavar="IN.ath")
+    verb.add_argument("output", metavar="OUT.h5", help=WRITTEN)
+    verb.add_argument(
+        "--depth", metavar="LEVEL", type=_argument(_whole),
+        help="level of detail, from 0, the whole plant as one piece (default: the deepest complete one)",
+    )
+    verb.add_argument(
+        "--frames", metavar="A:B", type=_argument(_frame_bounds), default=(None, None),
+        help="frames A to B - 1, counted from 0; A: to the end, :B from the start (default: all)",
+    )
+    verb.add_argument("--gzip", action="store_true", help="compress the HDF5 file without loss: smaller and slower")
+    verb.add_argument(
+        "--allow-partial", action="store_true",
+        help="leave out a damaged level and those beyond it instead of giving up",
+    )
+
+
+def _info_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("file", metavar="FILE.ath")
+    verb.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def _verify_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("file", metavar="FILE.ath")
+    verb.add_argument("--against", metavar="SOURCE.h5", help="the source: measure the error of every depth")
+    verb.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("input", metavar="IN.ath")
+    verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
+    verb.add_argument(
+        "--depth", metavar="LEVEL", type=_argument(_whole), required=True, help="the last level to keep"
+    )
+
+
+def _demo_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded depth there")
+
+
+def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
+    """`parse` for argparse, which shows the message of its own kind of error only."""
+
+    def parsed(text: str) -> Any:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parsed
+
+
+def _positive_length(text: str) -> Length:
+    length = parse_length(text)
+    if not length.value > 0:
+        raise ValueError(f"got {text!r}, expected a length above 0")
+    return length
+
+
+def _fraction(text: str) -> float:
+    value = _number(text, float)
+    if not 0 < value < 1:
+        raise ValueError(f"got {text!r}, expected a number between 0 and 1, such as 1e-4")
+    return value
+
+
+def _segment_frames(text: str) -> int:
+    value = _number(text, int)
+    if not MIN_SEGMENT <= value <= MAX_SEGMENT:
+        raise ValueError(f"got {text!r}, expected {MIN_SEGMENT} to {MAX_SEGMENT} frames")
+    return value
+
+
+def _frame_bounds(text: str) -> tuple[int | None, int | None]:
+    match = re.fullmatch(r"(\d*):(\d*)", text)
+    if not match:
+        raise ValueError(f"got {text!r}, expected A:B, A: or :B")
+    start, stop = (int(bound) if bound else None for bound in match.groups())
+    return start, stop
+
+
+def _tam(text: str) -> tuple[Length, int, Length, int]:
+    parts = text.split(",")
+    if len(parts) != 4:
+        raise ValueError(f"got {text!r}, expected four values: EPS,ETA,XI,LAMBDA")
+    epsilon, eta, xi, lam = parts
+    return parse_length(epsilon), _whole(eta), parse_length(xi), _whole(lam)
+
+
+def _whole(text: str) -> int:
+    value = _number(text, int)
+    if value < 0:
+        raise ValueError(f"got {text!r}, expected a whole number, 0 or more")
+    return value
+
+
+def _number(text: str, kind: type) -> Any:
+    try:
+        return kind(text)
+    except ValueError:
+        raise ValueError(f"got {text!r}, expected a {'whole ' if kind is int else ''}number") from None

@@ -1,0 +1,370 @@
+"""The motion clip: what every source reader makes and every later stage reads.
+
+A clip is positions over time, a rest pose, the branch of every vertex and any named static arrays. It checks
+its own structure when it is made, and the positions while they are read in blocks of frames, so that a clip
+larger than memory works. It knows no file format and derives no hierarchy (see sources/ and hierarchy.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .errors import ClipError
+
+BLOCK_BYTES = 32 << 20
+DEFAULT_FPS = 30.0
+RESERVED_NAMES = frozenset(
+    ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces")
+)
+
+
+@dataclass(eq=False, repr=False)
+class MotionClip:
+    """One moving plant: T frames of N vertices on B branches.
+
+    positions      (T, N, 3) float32 or float64, in `metadata["unit"]`: an array, or anything that has shape
+                   and dtype and is sliced by frames (an h5py.Dataset, a numpy.memmap). Never read whole.
+    time           (T,) seconds, strictly increasing; becomes float64. The steps may differ.
+    vertex_branch  (N,) integers, the branch of each vertex; becomes int32.
+    branch_parent  (B,) integers, -1 for a root (several are allowed); becomes int32.
+    rest           (N, 3) float32 or float64; becomes float64, `rest_dtype` keeps what was given. None: made
+                   from the motion as `rest_pose` says.
+    rest_pose      "first" (the first frame) or "mean" (of all frames, one pass over the clip); used where
+                   rest is None.
+    stem_index     (N,) integers, the place of each vertex on its stem, 0 at the base. None where the vertices
+                   of every branch already run from base to tip in the order of their numbers.
+    edges, faces   (E, 2) and (F, k) vertex numbers of any integer dtype, or None.
+    attributes     further named static arrays (radius, colours ...) of any shape; numbers, booleans,
+                   bytes or records of them.
+    metadata       "unit", "up_axis" and whatever else describes the clip: str, int, float, bool or lists of
+                   them.
+    resource       something with close(), closed with the clip: the open file behind lazily read positions.
+
+    Raises ClipError at construction where the structure is wrong, and from block() and blocks() at the first
+    position that is NaN or infinite.
+    """
+
+    positions: Any
+    time: np.ndarray
+    vertex_branch: np.ndarray
+    branch_parent: np.ndarray
+    rest: np.ndarray | None = None
+    edges: np.ndarray | None = None
+    faces: np.ndarray | None = None
+    attributes: dict[str, np.ndarray] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
+    rest_pose: str = "first"
+    stem_index: np.ndarray | None = None
+    resource: Any = None
+    rest_dtype: np.dtype = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not (hasattr(self.positions, "shape") and hasattr(self.positions, "dtype")):
+            self.positions = np.asarray(self.positions)
+        self.check()
+
+    def __repr__(self) -> str:
+        return (
+            f"MotionClip({self.frame_count} frames, {self.vertex_count} vertices, "
+            f"{self.branch_count} branches, {self.dtype})"
+        )
+
+    def __enter__(self) -> MotionClip:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file behind the clip, if there is one; positions cannot be read from it afterwards."""
+        if self.resource is not None:
+            self.resource.close()
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.time)
+
+    @property
+    def vertex_count(self) -> int:
+        return len(self.vertex_branch)
+
+    @property
+    def branch_count(self) -> int:
+        return len(self.branch_parent)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """float32 or float64 in native byte order: the dtype of the blocks."""
+        return self._dtype
+
+    @property
+    def fps(self) -> float:
+        """Median frame rate in frames per second; for a single frame metadata["fps"], else 30."""
+        if self.frame_count > 1:
+            return float(1.0 / np.median(np.diff(self.time)))
+        return frame_rate(self.metadata)
+
+    def check(self) -> None:
+        """Check the structure and bring the small arrays to their documented dtypes; raises ClipError.
+
+        The positions themselves are not read here, except for a rest pose that was not given.
+        """
+        frame_count, vertex_count = self._check_positions()
+        self.time = check_time(self.time, frame_count)
+        self.vertex_branch, self.branch_parent = check_branches(
+            self.vertex_branch, self.branch_parent, vertex_count
+        )
+        self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
+        self.edges = check_indices("edges", self.edges, vertex_count, width=2)
+        self.faces = check_indices("faces", self.faces, vertex_count)
+        self.attributes = check_attributes(self.attributes)
+        self.metadata = dict(self.metadata or {})
+        self._check_rest()
+
+    def block(self, start: int, stop: int) -> np.ndarray:
+        """Frames start to stop - 1 as a read-only (stop - start, N, 3) array in the clip's dtype.
+
+        Raises IndexError for frames that do not exist, ClipError for positions that are NaN or infinite.
+        """
+        if not 0 <= start < stop <= self.frame_count:
+            raise IndexError(f"frames {start} to {stop}: expected 0 <= start < stop <= {self.frame_count}")
+        try:
+            frames = np.asarray(self.positions[start:stop], dtype=self.dtype).view()
+        except (ValueError, OSError, RuntimeError) as error:
+            raise ClipError(f"positions: frames {start} to {stop - 1} cannot be read: {error}") from error
+        check_finite(frames, start)
+        frames.flags.writeable = False
+        return frames
+
+    def blocks(self, max_frames: int | None = None) -> Iterator[tuple[int, np.ndarray]]:
+        """All frames in order as (start, block), see block().
+
+        A block has at most `max_frames` frames and 32 MiB, but at least one frame; its length is a
+        multiple of the source's HDF5 chunk length where that is no longer.
+        """
+        length = self._block_length(max_frames)
+        for start in range(0, self.frame_count, length):
+            yield start, self.block(start, min(start + length, self.frame_count))
+
+    def _block_length(self, max_frames: int | None) -> int:
+        if max_frames is not None and max_frames < 1:
+            raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
+        length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))
+        length = min(length, max_frames or length)
+        chunk_frames = (getattr(self.positions, "chunks", None) or (1,))[0]
+        return length - length % chunk_frames if chunk_frames <= length else length
+
+    def _check_positions(self) -> tuple[int, int]:
+        shape, dtype = tuple(self.positions.shape or ()), self.positions.dtype
+        if len(shape) != 3 or shape[2] != 3:
+            raise ClipError(f"positions: got shape {shape}, expected (frames, vertices, 3)")
+        check_float_dtype("positions", dtype)
+        if shape[0] == 0:
+            raise ClipError("positions: got no frames, expected at least one")
+        if shape[1] == 0:
+            raise ClipError("positions: got no vertices, expected at least one")
+        self._dtype = dtype.newbyteorder("=")
+        return shape[0], shape[1]
+
+    def _check_rest(self) -> None:
+        if self.rest_pose not in ("first", "mean"):
+            raise ClipError(f'rest_pose: got {self.rest_pose!r}, expected "first" or "mean"')
+        if self.rest is None:
+            pose = self.block(0, 1)[0] if self.rest_pose == "first" else self._mean_pose()
+            self.rest_dtype = pose.dtype
+            self.rest = pose.astype(np.float64)
+            return
+        rest = np.asarray(self.rest)
+        if rest.shape != (self.vertex_count, 3):
+            raise ClipError(f"rest: got shape {rest.shape}, expected ({self.vertex_count}, 3)")
+        check_float_dtype("rest", rest.dtype)
+        bad = np.flatnonzero(~np.isfinite(rest).all(axis=1))
+        if bad.size:
+            raise ClipError(f"rest: vertex {bad[0]} is {_point(rest[bad[0]])}, expected finite numbers")
+        self.rest_dtype = rest.dtype.newbyteorder("=")
+        self.rest = rest.astype(np.float64)
+
+    def _mean_pose(self) -> np.ndarray:
+        total = np.zeros((self.vertex_count, 3))
+        for _, frames in self.blocks():
+            total += frames.sum(axis=0, dtype=np.float64)
+        return total / self.frame_count
+
+
+def check_float_dtype(name: str, dtype: np.dtype) -> None:
+    if dtype.kind != "f" or dtype.itemsize not in (4, 8):
+        raise ClipError(f"{name}: got dtype {dtype}, expected float32 or float64")
+
+
+def check_finite(frames: np.ndarray, start: int = 0) -> None:
+    """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite."""
+    finite = np.isfinite(frames)
+    if finite.all():
+        return
+    frame, vertex = np.argwhere(~finite.all(axis=2))[0]
+    point = _point(frames[frame, vertex])
+    raise ClipError(f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers")
+
+
+def check_time(time: Any, frame_count: int) -> np.ndarray:
+    """(T,) float64 seconds; ClipError unless finite, strictly increasing and one per frame."""
+    time = np.asarray(time)
+    if time.shape != (frame_count,):
+        raise ClipError(f"time: got shape {time.shape}, expected ({frame_count},), one time per frame")
+    if time.dtype.kind not in "fiu":
+        raise ClipError(f"time: got dtype {time.dtype}, expected float64 seconds")
+    time = time.astype(np.float64)
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size:
+        raise ClipError(f"time: frame {bad[0]} is at {time[bad[0]]}, expected a finite number of seconds")
+    late = np.flatnonzero(np.diff(time) <= 0)
+    if late.size:
+        frame = late[0] + 1
+        raise ClipError(
+            f"time: frame {frame} is at {time[frame]} after {time[frame - 1]}, expected strictly increasing"
+        )
+    return time
+
+
+def frame_rate(metadata: Mapping[str, Any]) -> float:
+    """Frames per second in `metadata["fps"]`, 30 where it is missing; ClipError for no positive number."""
+    fps = metadata.get("fps", DEFAULT_FPS)
+    is_number = isinstance(fps, (int, float)) and not isinstance(fps, bool)
+    if not is_number or not 0 < fps < float("inf"):
+        raise ClipError(f"fps: got {fps!r}, expected a positive number")
+    return float(fps)
+
+
+def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
+    """`indices` as an array of its own integer dtype, every entry in 0 .. stop - 1; ClipError otherwise."""
+    if indices is None:
+        return None
+    indices = np.asarray(indices)
+    expected = f"(rows, {width or 'k'})"
+    if indices.ndim != 2 or (width is not None and indices.shape[1] != width):
+        raise ClipError(f"{name}: got shape {indices.shape}, expected {expected}")
+    if indices.dtype.kind not in "iu":
+        raise ClipError(f"{name}: got dtype {indices.dtype}, expected integers")
+    bad = np.argwhere((indices < 0) | (indices >= stop))
+    if bad.size:
+        row, column = bad[0]
+        raise ClipError(f"{name}: row {row} names vertex {indices[row, column]}, expected 0 to {stop - 1}")
+    return indices
+
+
+def check_branches(
+    vertex_branch: Any, branch_parent: Any, vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) and (B,) int32 labels and parents; ClipError unless a forest of branches that have vertices."""
+    branch_parent = _integers("branch_parent", branch_parent)
+    branch_count = len(branch_parent)
+    vertex_branch = _integers("vertex_branch", vertex_branch)
+    if len(vertex_branch) != vertex_count:
+        raise ClipError(
+            f"vertex_branch: got {len(vertex_branch)} entries, expected {vertex_count}, one per vertex"
+        )
+    bad = np.flatnonzero((vertex_branch < 0) | (vertex_branch >= branch_count))
+    if bad.size:
+        got = vertex_branch[bad[0]]
+        raise ClipError(
+            f"vertex_branch: vertex {bad[0]} is on branch {got}, expected 0 to {branch_count - 1}"
+        )
+    vertex_branch = vertex_branch.astype(np.int32)
+    empty = np.flatnonzero(np.bincount(vertex_branch, minlength=branch_count) == 0)
+    if empty.size:
+        raise ClipError(f"vertex_branch: branch {empty[0]} has no vertices, expected at least one")
+    return vertex_branch, _check_parents(branch_parent)
+
+
+def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray | None:
+    """(N,) int32, or None where it only repeats the order of the vertex numbers.
+
+    Raises ClipError unless every branch with n vertices has the places 0 .. n - 1 once each.
+    """
+    if stem_index is None:
+        return None
+    stem_index = _integers("stem_index", stem_index)
+    if stem_index.shape != vertex_branch.shape:
+        raise ClipError(
+            f"stem_index: got {len(stem_index)} entries, expected {len(vertex_branch)}, one per vertex"
+        )
+    stem_index = stem_index.astype(np.int64)
+    places = source_stem_index(vertex_branch)
+    order = np.lexsort((stem_index, vertex_branch))
+    expected = np.sort(places + vertex_branch * np.int64(len(places)))
+    found = stem_index[order] + vertex_branch[order] * np.int64(len(places))
+    bad = np.flatnonzero(found != expected)
+    if bad.size:
+        vertex = order[bad[0]]
+        raise ClipError(
+            f"stem_index: vertex {vertex} has place {stem_index[vertex]} on branch {vertex_branch[vertex]}, "
+            "expected each place from 0 on once"
+        )
+    return None if np.array_equal(stem_index, places) else stem_index.astype(np.int32)
+
+
+def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
+    """(N,) int32 place of each vertex on its stem where vertices run from base to tip by their numbers."""
+    order = np.argsort(vertex_branch, kind="stable")
+    labels = vertex_branch[order]
+    places = np.empty(len(order), np.int32)
+    places[order] = np.arange(len(order)) - np.searchsorted(labels, labels)
+    return places
+
+
+def check_attributes(attributes: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
+    checked = {}
+    for name, values in (attributes or {}).items():
+        if not isinstance(name, str) or not name.strip("/") or name in RESERVED_NAMES:
+            raise ClipError(f"attributes: got the name {name!r}, expected one that is free and not empty")
+        checked[name] = np.asarray(values)
+        dtype = checked[name].dtype
+        if dtype.hasobject or dtype.kind not in "biufcSV":
+            raise ClipError(f"attributes: {name} has dtype {dtype}, expected numbers, booleans or bytes")
+    return checked
+
+
+def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
+    branch_count = len(branch_parent)
+    bad = np.flatnonzero((branch_parent < -1) | (branch_parent >= branch_count))
+    if bad.size:
+        got = branch_parent[bad[0]]
+        raise ClipError(f"branch_parent: branch {bad[0]} has parent {got}, expected -1 to {branch_count - 1}")
+    own = np.flatnonzero(branch_parent == np.arange(branch_count))
+    if own.size:
+        raise ClipError(f"branch_parent: branch {own[0]} is its own parent, expected another branch or -1")
+    branch_parent = branch_parent.astype(np.int32)
+    on_cycle = _branch_on_cycle(branch_parent)
+    if on_cycle is not None:
+        got = branch_parent[on_cycle]
+        raise ClipError(
+            f"branch_parent: branch {on_cycle} (parent {got}) is its own ancestor, expected no cycle"
+        )
+    return branch_parent
+
+
+def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
+    count = len(branch_parent)
+    ancestor = np.append(np.where(branch_parent < 0, count, branch_parent), count)
+    for _ in range(count.bit_length()):
+        ancestor = ancestor[ancestor]
+    # At least `count` steps have been taken, so what has not left through a root goes round.
+    left = np.flatnonzero(ancestor[:count] < count)
+    return int(ancestor[left[0]]) if left.size else None
+
+
+def _integers(name: str, values: Any) -> np.ndarray:
+    values = np.asarray(values)
+    if values.ndim != 1:
+        raise ClipError(f"{name}: got shape {values.shape}, expected one dimension")
+    if values.dtype.kind not in "iu":
+        raise ClipError(f"{name}: got dtype {values.dtype}, expected integers")
+    return values
+
+
+def _point(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in point) + ")"

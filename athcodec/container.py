@@ -1,0 +1,589 @@
+"""The .ath file: the only module that knows byte offsets, checksums and limits (FORMAT.md, "File").
+
+A file is a header, a chunk table and an error table, then the chunks in table order without gaps, so that offsets are
+never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (clip, level, segment, kind),
+other attributes last. This module packs and parses; what the streams inside mean is the business of entropy.py.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import dataclass, field
+from typing import BinaryIO
+
+import numpy as np
+import zstandard
+
+from athcodec._native import crc32c
+from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, LimitExceeded, NotAnAthFile,
+                             TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
+
+MAGIC = b"\x89ATH\r\n\x1a\n"
+MAJOR, MINOR = 0, 1
+NO_LEVEL = 255
+OPTIONAL = 0x8000
+
+HIERARCHY, REST, TIME = 1, 2, 3
+METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
+STEMS, AFFINES, CORRECTIONS = 16, 17, 18
+ATTRIBUTE = OPTIONAL | 32
+KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
+              STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", ATTRIBUTE: "ATTRIBUTE"}
+
+_HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
+_CHUNK = struct.Struct("<HBBIII")
+_ERRORS = struct.Struct("<ff")
+_CHECKSUM_AT = 12
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a reader accepts; FORMAT.md, "Limits"."""
+
+    chunks: int = 1 << 20
+    table_bytes: int = 16 << 20
+    metadata_bytes: int = 1 << 20
+    vertices: int = 1 << 26
+    branches: int = 1 << 20
+    frames: int = 1 << 20
+    attributes: int = 256
+    string_bytes: int = 4096
+    chunk_bytes: int = 256 << 20
+    decoded_chunk_bytes: int = 256 << 20
+    memory_bytes: int = 2 << 30
+
+
+@dataclass
+class Header:
+    """The fixed header. `max_error` is the promise of the deepest stored level, in scene units."""
+
+    vertex_count: int
+    branch_count: int
+    frame_count: int
+    segment_count: int
+    level_count: int
+    full_level_count: int
+    max_error: float
+    wide: bool = False
+    chunk_count: int = 0
+    file_length: int = 0
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """One entry of the chunk table, with the offset that follows from those before it."""
+
+    kind: int
+    level: int
+    segment: int
+    length: int
+    checksum: int
+    offset: int = 0
+    clip: int = 0
+
+    @property
+    def is_motion(self) -> bool:
+        return self.kind in (STEMS, AFFINES, CORRECTIONS)
+
+    def __str__(self) -> str:
+        name = KIND_NAMES.get(self.kind, f"kind {self.kind:#06x}")
+        place = f" of level {self.level}, segment {self.segment}" if self.is_motion else ""
+        return f"chunk {name}{place} at byte {self.offset}"
+
+
+def _pack_header(header: Header, checksum: int) -> bytes:
+    return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
+                        header.branch_count, header.frame_count, header.segment_count, header.level_count,
+                        header.full_level_count, 1, int(header.wide), header.max_error, 0)
+
+
+def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
+    """Header, chunk table and error table.
+
+    errors: (levels, segments, 2) of max and RMS error in scene units; the maximum is rounded up to float32.
+    """
+    table = b"".join(_CHUNK.pack(c.kind, c.clip, c.level, c.segment, c.length, c.checksum) for c in chunks)
+    table += np.ascontiguousarray(_round_up(errors)).astype("<f4").tobytes()
+    header.chunk_count = len(chunks)
+    header.file_length = _HEADER.size + len(table) + sum(c.length for c in chunks)
+    checksum = crc32c(_pack_header(header, 0) + table)
+    return _pack_header(header, checksum) + table
+
+
+def _round_up(values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, np.float64)
+    single = values.astype(np.float32)
+    return np.where(single < values, np.nextafter(single, np.float32(np.inf)), single)
+
+
+def _order(chunk: Chunk) -> tuple:
+    if chunk.is_motion:
+        return (1, chunk.clip, chunk.level, chunk.segment, chunk.kind)
+    if chunk.kind & ~OPTIONAL < 16:
+        return (0, chunk.kind & ~OPTIONAL)
+    return (2, chunk.kind & ~OPTIONAL)
+
+
+@dataclass
+class ChunkStore:
+    """Chunks on their way into a file: payloads in a spool, in any order."""
+
+    spool: BinaryIO
+    entries: list[tuple[Chunk, int]] = field(default_factory=list)
+
+    def add(self, kind: int, payload: bytes, level: int = NO_LEVEL, segment: int = 0) -> None:
+        place = self.spool.seek(0, 2)
+        self.spool.write(payload)
+        self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+
+    def size(self, header: Header) -> int:
+        """Bytes of the whole file."""
+        tables = len(self.entries) * _CHUNK.size + header.level_count * header.segment_count * _ERRORS.size
+        return _HEADER.size + tables + sum(chunk.length for chunk, _ in self.entries)
+
+    def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
+        """Writes the whole file in its order and returns its chunks."""
+        entries = sorted(self.entries, key=lambda entry: _order(entry[0]))
+        out.write(pack_front(header, [chunk for chunk, _ in entries], errors))
+        chunks = []
+        for chunk, place in entries:
+            chunks.append(_at(chunk, out.tell()))
+            self.spool.seek(place)
+            out.write(self.spool.read(chunk.length))
+        return chunks
+
+
+def _at(chunk: Chunk, offset: int) -> Chunk:
+    return Chunk(chunk.kind, chunk.level, chunk.segment, chunk.length, chunk.checksum, offset, chunk.clip)
+
+
+class Container:
+    """An opened .ath file: header, chunks, errors, and the bytes of any chunk that is there.
+
+    `strict` refuses a file that is shorter or longer than its header says; otherwise what is missing is known
+    (`available_length`) and only a file cut inside its prelude is refused. Counts bytes in `bytes_read`.
+    """
+
+    def __init__(self, file: BinaryIO, *, strict: bool = False, limits: Limits | None = None):
+        self.file, self.limits = file, limits or Limits()
+        self.bytes_read = 0
+        self.available_length = file.seek(0, 2)
+        self.header, front = self._read_header()
+        self.chunks, self.errors = self._read_tables(front)
+        self._check_length(strict)
+
+    def _read(self, offset: int, length: int, what: str) -> bytes:
+        self.file.seek(offset)
+        data = self.file.read(length)
+        self.bytes_read += len(data)
+        if len(data) < length:
+            raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
+        return data
+
+    def _read_header(self) -> tuple[Header, bytes]:
+        self.file.seek(0)
+        front = self.file.read(_HEADER.size)
+        self.bytes_read += len(front)
+        if front[:8] != MAGIC[: len(front)] or not front:
+            raise NotAnAthFile(f"file: got {front[:8]!r} at byte 0; expected {MAGIC!r}")
+        if len(front) >= 12:
+            major, minor = struct.unpack_from("<HH", front, 8)
+            if major != MAJOR:
+                raise UnsupportedVersion(f"file: got format version {major}.{minor}; expected {MAJOR}.x")
+        if len(front) < _HEADER.size:
+            raise Truncated(f"header: got {len(front)} bytes; expected {_HEADER.size}")
+        (_, _, _, self._checksum, length, chunk_count, vertices, branches, frames, segments, levels, full_levels, clips,
+         flags, max_error, reserved) = _HEADER.unpack(front)
+        header = Header(vertices, branches, frames, segments, levels, full_levels, max_error, bool(flags & 1),
+                        chunk_count, length)
+        self._check_header(header, clips, flags, reserved)
+        return header, front
+
+    def _check_header(self, header: Header, clips: int, flags: int, reserved: int) -> None:
+        limits = self.limits
+        for name, value, limit in (("Vertex_Count", header.vertex_count, limits.vertices),
+                                   ("Branch_Count", header.branch_count, limits.branches),
+                                   ("Frame_Count", header.frame_count, limits.frames),
+                                   ("Segment_Count", header.segment_count, limits.frames),
+                                   ("Chunk_Count", header.chunk_count, limits.chunks)):
+            if value < 1:
+                raise BadHeader(f"header: got {name} 0; expected at least 1")
+            if value > limit:
+                raise LimitExceeded(f"header: got {name} {value}; the limit is {limit}")
+        checks = [
+            (header.branch_count <= header.vertex_count, "Branch_Count", header.branch_count, "at most Vertex_Count"),
+            (header.segment_count <= header.frame_count <= 256 * header.segment_count, "Segment_Count",
+             header.segment_count, "segments of 1 to 256 frames"),
+            (2 <= header.full_level_count <= 32, "Full_Level_Count", header.full_level_count, "2 to 32"),
+            (1 <= header.level_count <= header.full_level_count, "Level_Count", header.level_count,
+             "1 to Full_Level_Count"),
+            (clips == 1, "Clip_Count", clips, "1"),
+            (flags < 2, "Flags", flags, "reserved bits 0"),
+            (reserved == 0, "Reserved", reserved, "0"),
+            (math.isfinite(header.max_error) and header.max_error >= 0, "Max_Error", header.max_error,
+             "a finite length"),
+        ]
+        for valid, name, value, expected in checks:
+            if not valid:
+                raise BadHeader(f"header: got {name} {value}; expected {expected}")
+
+    def _read_tables(self, front: bytes) -> tuple[list[Chunk], np.ndarray]:
+        header = self.header
+        table_size = header.chunk_count * _CHUNK.size
+        size = table_size + header.level_count * header.segment_count * _ERRORS.size
+        if size > self.limits.table_bytes:
+            raise LimitExceeded(f"chunk table: got {size} bytes; the limit is {self.limits.table_bytes}")
+        table = self._read(_HEADER.size, size, "chunk table")
+        blank = front[:_CHECKSUM_AT] + b"\0\0\0\0" + front[_CHECKSUM_AT + 4:]
+        if crc32c(blank + table) != self._checksum:
+            raise BadChecksum(f"header and chunk table: got checksum {crc32c(blank + table):#010x}; "
+                              f"expected {self._checksum:#010x}")
+        errors = np.frombuffer(table, "<f4", offset=table_size).reshape(header.level_count, header.segment_count, 2)
+        if not np.isfinite(errors).all() or (errors < 0).any():
+            raise BadChunkTable("error table: got a value that is negative or not finite")
+        return self._parse_chunks(table, _HEADER.size + size), errors.astype(np.float64)
+
+    def _parse_chunks(self, table: bytes, offset: int) -> list[Chunk]:
+        chunks = []
+        for i in range(self.header.chunk_count):
+            kind, clip, level, segment, length, checksum = _CHUNK.unpack_from(table, i * _CHUNK.size)
+            chunk = Chunk(kind, level, segment, length, checksum, offset, clip)
+            self._check_chunk(chunk)
+            if chunks and self._misplaced(chunks[-1], chunk):
+                raise BadChunkTable(f"chunk table: {chunk}: expected after {chunks[-1]} in file order, each once")
+            chunks.append(chunk)
+            offset += length
+        if offset != self.header.file_length:
+            raise BadChunkTable(f"chunk table: chunks end at byte {offset}; expected {self.header.file_length}")
+        return [chunk for chunk in chunks if chunk.kind in KIND_NAMES]
+
+    @staticmethod
+    def _misplaced(before: Chunk, chunk: Chunk) -> bool:
+        repeatable = chunk.kind & OPTIONAL and chunk.kind & ~OPTIONAL >= 32
+        return _order(chunk) < _order(before) or (_order(chunk) == _order(before) and not repeatable)
+
+    def _check_chunk(self, chunk: Chunk) -> None:
+        if chunk.kind not in KIND_NAMES and not chunk.kind & OPTIONAL:
+            raise UnknownChunk(f"{chunk}: got a required kind that this decoder does not know")
+        if chunk.length > self.limits.chunk_bytes:
+            raise LimitExceeded(f"{chunk}: got {chunk.length} bytes; the limit is {self.limits.chunk_bytes}")
+        level_valid = chunk.level < self.header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
+        segment_valid = chunk.segment < (self.header.segment_count if chunk.is_motion else 1)
+        if chunk.clip != 0 or not level_valid or not segment_valid:
+            raise BadChunkTable(f"{chunk}: got clip {chunk.clip}, level {chunk.level}, segment {chunk.segment}; "
+                                f"expected what the header announces")
+
+    def _check_length(self, strict: bool) -> None:
+        expected, got = self.header.file_length, self.available_length
+        if got < self.prelude_length:
+            raise Truncated(f"prelude: got {got} bytes; expected {self.prelude_length}")
+        if strict and got < expected:
+            raise Truncated(f"file: got {got} bytes; expected {expected}")
+        if got > expected and strict:
+            raise TrailingBytes(f"file: got {got} bytes; expected {expected}")
+
+    @property
+    def prelude_length(self) -> int:
+        """Bytes before the first motion chunk."""
+        motion = [chunk.offset for chunk in self.chunks if _order(chunk)[0] > 0]
+        return min(motion, default=self.header.file_length)
+
+    def is_available(self, chunk: Chunk) -> bool:
+        return chunk.offset + chunk.length <= self.available_length
+
+    def find(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> Chunk | None:
+        return next((c for c in self.chunks if (c.kind, c.level, c.segment) == (kind, level, segment)), None)
+
+    def level_end(self, level: int) -> int:
+        """Bytes of the file cut after `level`."""
+        ends = [c.offset + c.length for c in self.chunks if _order(c)[0] == 0 or (c.is_motion and c.level <= level)]
+        return max(ends)
+
+    def payload(self, chunk: Chunk) -> bytes:
+        """A chunk's bytes. Raises Truncated, BadChecksum."""
+        data = self._read(chunk.offset, chunk.length, str(chunk))
+        if crc32c(data) != chunk.checksum:
+            raise BadChecksum(f"{chunk}: got checksum {crc32c(data):#010x}; expected {chunk.checksum:#010x}")
+        return data
+
+    def required(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> bytes:
+        """The bytes of a chunk that must be there. Raises BadChunkTable where the table has none."""
+        chunk = self.find(kind, level, segment)
+        if chunk is None:
+            place = "" if level == NO_LEVEL else f" of level {level}, segment {segment}"
+            raise BadChunkTable(f"chunk table: got no {KIND_NAMES[kind]}{place}; expected one")
+        return self.payload(chunk)
+
+
+def truncated_front(container: Container, level: int) -> tuple[bytes, list[Chunk]]:
+    """Front of a file that stores the levels up to `level`, and the chunks to copy behind it."""
+    header = container.header
+    chunks = [c for c in container.chunks if not c.is_motion or c.level <= level]
+    errors = container.errors[: level + 1]
+    promise = header.max_error if level + 1 == header.full_level_count else float(errors[level, :, 0].max())
+    shorter = Header(header.vertex_count, header.branch_count, header.frame_count, header.segment_count, level + 1,
+                     header.full_level_count, promise, header.wide)
+    return pack_front(shorter, chunks, errors), chunks
+
+
+# ---- heads of the chunks ----------------------------------------------------------------------------------------
+
+_HIERARCHY = struct.Struct("<ffII")
+_REST = struct.Struct("<BBH3dd")
+_TIME = struct.Struct("<B")
+_TIME_UNIFORM = struct.Struct("<Bdd")
+_STEMS = struct.Struct("<fBBH")
+_BASIS_LENGTH = struct.Struct("<I")
+_CORRECTIONS = struct.Struct("<f")
+_ARRAY = struct.Struct("<H")
+
+
+def _head(form: struct.Struct, data: bytes, what: str) -> tuple:
+    if len(data) < form.size:
+        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {form.size}")
+    return form.unpack_from(data)
+
+
+def _positive(value: float, what: str) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise BadChunk(f"{what}: got {value}; expected a finite number above 0")
+    return value
+
+
+def pack_hierarchy(thresholds, stream: bytes) -> bytes:
+    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam)."""
+    epsilon, eta, xi, lam = thresholds
+    clip = float(np.finfo(np.float32).max)
+    return _HIERARCHY.pack(min(epsilon, clip), min(xi, clip), int(eta), int(lam)) + stream
+
+
+def parse_hierarchy(data: bytes) -> tuple[tuple[float, int, float, int], bytes]:
+    """((epsilon, eta, xi, lam), stream)."""
+    epsilon, xi, eta, lam = _head(_HIERARCHY, data, "HIERARCHY")
+    if not (math.isfinite(epsilon) and math.isfinite(xi) and epsilon >= 0 and xi >= 0):
+        raise BadChunk(f"HIERARCHY: got thresholds {epsilon}, {xi}; expected finite numbers")
+    return (epsilon, eta, xi, lam), data[_HIERARCHY.size:]
+
+
+@dataclass
+class Rest:
+    """Head of REST: `exact` holds the pose itself (N, 3) in file order, else `stream` and `step` do."""
+
+    origin: np.ndarray
+    step: float
+    source_dtype: np.dtype
+    stream: bytes = b""
+    exact: np.ndarray | None = None
+
+
+def pack_rest(rest: Rest) -> bytes:
+    exact = rest.exact is not None
+    body = _compress(rest.exact) if exact else rest.stream
+    return _REST.pack(int(exact), int(rest.source_dtype == np.float64), 0, *rest.origin, rest.step) + body
+
+
+def parse_rest(data: bytes, vertex_count: int, limits: Limits) -> Rest:
+    exact, wide, reserved, x, y, z, step = _head(_REST, data, "REST")
+    if exact > 1 or wide > 1 or reserved or not all(map(math.isfinite, (x, y, z))):
+        raise BadChunk(f"REST: got method {exact}, type {wide}, origin {(x, y, z)}; expected 0 or 1, finite")
+    dtype, body = np.dtype("<f8" if wide else "<f4"), data[_REST.size:]
+    rest = Rest(np.array([x, y, z]), _positive(step, "REST step"), dtype)
+    if not exact:
+        rest.stream = body
+        return rest
+    rest.exact = _decompress(body, dtype, (vertex_count, 3), "REST", limits)
+    if not np.isfinite(rest.exact).all():
+        raise BadChunk("REST: got a coordinate that is not finite")
+    return rest
+
+
+def pack_time(time: np.ndarray) -> bytes:
+    """Times in seconds, (T,) float64, exactly: by a rule where one gives the very same numbers."""
+    index, first = np.arange(len(time)), float(time[0])
+    if len(time) > 1:
+        steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
+        for step in steps:
+            if (first + index * step == time).all():
+                return _TIME_UNIFORM.pack(0, first, step)
+        for rate in {round(1 / step * 1000) / 1000 for step in steps if step > 0} - {0.0}:
+            if (first + index / rate == time).all():
+                return _TIME_UNIFORM.pack(1, first, rate)
+    return _TIME.pack(2) + _compress(np.asarray(time, "<f8"))
+
+
+def parse_time(data: bytes, frame_count: int, limits: Limits) -> np.ndarray:
+    (method,) = _head(_TIME, data, "TIME")
+    if method == 2:
+        time = _decompress(data[_TIME.size:], np.dtype("<f8"), (frame_count,), "TIME", limits)
+    elif method < 2 and len(data) == _TIME_UNIFORM.size:
+        _, first, step = _TIME_UNIFORM.unpack(data)
+        _positive(step, "TIME step")
+        index = np.arange(frame_count)
+        time = first + index * step if method == 0 else first + index / step
+    else:
+        raise BadChunk(f"TIME: got method {method}, {len(data)} bytes; expected 0 to 2")
+    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise BadChunk("TIME: got times that are not finite and increasing")
+    return time.astype(np.float64)
+
+
+@dataclass
+class StemsHead:
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any."""
+
+    step: float
+    omega: int
+    bits: int = 0
+    rank: int = 0
+    basis: bytes = b""
+
+
+def pack_stems(head: StemsHead, stream: bytes) -> bytes:
+    data = _STEMS.pack(head.step, head.omega.bit_length(), head.bits, head.rank)
+    if head.bits:
+        data += _BASIS_LENGTH.pack(len(head.basis)) + head.basis
+    return data + stream
+
+
+def parse_stems(data: bytes, frames: int, where: str) -> tuple[StemsHead, bytes]:
+    step, omega, bits, rank = _head(_STEMS, data, where)
+    if omega > 4 or (bits != 0 and not 8 <= bits <= 16) or not (1 <= rank <= frames if bits else rank == 0):
+        raise BadChunk(f"{where}: got rotation {omega}, bits {bits}, rank {rank}; expected 0 to 4, 0 or 8 to 16, "
+                       f"1 to {frames}")
+    head, body = StemsHead(_positive(step, f"{where}: step"), 1 << omega >> 1, bits, rank), data[_STEMS.size:]
+    if bits:
+        (length,) = _head(_BASIS_LENGTH, body, where)
+        if length > len(body) - _BASIS_LENGTH.size:
+            raise BadChunk(f"{where}: got a basis of {length} bytes; expected at most what the chunk holds")
+        head.basis = body[_BASIS_LENGTH.size: _BASIS_LENGTH.size + length]
+        body = body[_BASIS_LENGTH.size + length:]
+    return head, body
+
+
+def pack_corrections(step: float, stream: bytes) -> bytes:
+    return _CORRECTIONS.pack(step) + stream
+
+
+def parse_corrections(data: bytes, where: str) -> tuple[float, bytes]:
+    (step,) = _head(_CORRECTIONS, data, where)
+    return _positive(step, f"{where}: step"), data[_CORRECTIONS.size:]
+
+
+# ---- static data --------------------------------------------------------------------------------------------------
+
+_ZSTD_WINDOW = 8 << 20
+
+
+def _compress(array: np.ndarray) -> bytes:
+    """zstd over the array's bytes, shuffled: all first bytes of the items, then all second bytes, ..."""
+    array = np.ascontiguousarray(array)
+    shuffled = np.frombuffer(array.tobytes(), np.uint8).reshape(-1, array.dtype.itemsize).T.tobytes()
+    return zstandard.ZstdCompressor(level=19, write_content_size=True, write_checksum=False).compress(shuffled)
+
+
+def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str, limits: Limits) -> np.ndarray:
+    size = math.prod(shape) * dtype.itemsize
+    raw = np.frombuffer(zstd_decompress_exact(data, size, what, limits), np.uint8)
+    return np.frombuffer(raw.reshape(dtype.itemsize, -1).T.tobytes(), dtype).reshape(shape)
+
+
+def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits) -> bytes:
+    """One zstd frame that says it holds `expected` bytes and does; anything else raises BadChunk or LimitExceeded."""
+    if expected > limits.decoded_chunk_bytes:
+        raise LimitExceeded(f"{what}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
+    try:
+        if expected == 0 or zstandard.frame_content_size(data) != expected:
+            raise BadChunk(f"{what}: got a zstd frame of another size; expected {expected} bytes")
+        return zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW).decompress(data, allow_extra_data=False)
+    except (zstandard.ZstdError, MemoryError) as error:
+        raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
+
+
+def _type_of(dtype: np.dtype) -> object:
+    return np.lib.format.dtype_to_descr(dtype)
+
+
+def _dtype_from(description: object, what: str) -> np.dtype:
+    def tuples(item):
+        return [tuple(tuples(x) if isinstance(x, list) else x for x in entry) for entry in item]
+
+    try:
+        dtype = np.lib.format.descr_to_dtype(tuples(description) if isinstance(description, list) else description)
+    except (TypeError, ValueError, IndexError, KeyError):
+        dtype = None
+    if dtype is None or dtype.hasobject or dtype.itemsize == 0 or dtype.itemsize > 1 << 20:
+        raise BadChunk(f"{what}: got type {description!r}; expected plain numbers, bytes or records")
+    return dtype
+
+
+def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> bytes:
+    """A named static array, any plain dtype and shape; None stores only the notes."""
+    head: dict[str, object] = dict(notes)
+    if name:
+        head["name"] = name
+    if array is not None:
+        head |= {"dtype": _type_of(array.dtype), "shape": list(array.shape)}
+    text = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
+    body = _compress(array) if array is not None and array.size else b""
+    return _ARRAY.pack(len(text)) + text + body
+
+
+def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
+    """(head, array): array is None where only notes were stored."""
+    (length,) = _head(_ARRAY, data, what)
+    head = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what)
+    if "dtype" not in head:
+        return head, None
+    dtype, shape = _dtype_from(head["dtype"], what), head.get("shape")
+    if not isinstance(shape, list) or len(shape) > 32 or not all(isinstance(n, int) and 0 <= n < 1 << 40 for n in shape):
+        raise BadChunk(f"{what}: got shape {shape!r}; expected a list of sizes")
+    if math.prod(shape) == 0:
+        return head, np.zeros(shape, dtype)
+    return head, _decompress(data[_ARRAY.size + length:], dtype, tuple(shape), what, limits)
+
+
+def array_name(data: bytes, what: str, limits: Limits) -> str:
+    """The name of a static array without its data."""
+    (length,) = _head(_ARRAY, data, what)
+    name = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what).get("name")
+    if not isinstance(name, str) or not name or len(name.encode()) > limits.string_bytes:
+        raise BadChunk(f"{what}: got name {name!r}; expected 1 to {limits.string_bytes} bytes of text")
+    return name
+
+
+def pack_metadata(metadata: dict) -> bytes:
+    """JSON, zstd-compressed where that is shorter."""
+    text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False).encode()
+    packed = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
+    return b"\1" + packed if len(packed) < len(text) else b"\0" + text
+
+
+def parse_metadata(data: bytes, limits: Limits) -> dict:
+    if not data or data[0] > 1:
+        raise BadChunk("METADATA: got an unknown method; expected 0 or 1")
+    text = data[1:]
+    if data[0] == 1:
+        try:
+            size = zstandard.frame_content_size(text)
+        except zstandard.ZstdError:
+            size = -1
+        if not 0 < size <= limits.metadata_bytes:
+            raise LimitExceeded(f"METADATA: got {size} bytes; the limit is {limits.metadata_bytes}")
+        text = zstd_decompress_exact(text, size, "METADATA", limits)
+    if len(text) > limits.metadata_bytes:
+        raise LimitExceeded(f"METADATA: got {len(text)} bytes; the limit is {limits.metadata_bytes}")
+    return _parse_json(text, "METADATA")
+
+
+def _parse_json(text: bytes, what: str) -> dict:
+    try:
+        value = json.loads(text.decode())
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise BadChunk(f"{what}: got {text[:40]!r}; expected a JSON object")
+    return value
+
+

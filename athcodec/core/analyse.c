@@ -1,0 +1,285 @@
+/* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
+ * decoder will have of its parent. Encoder only. */
+#include "motion.h"
+
+enum { KABSCH_ITERATIONS = 40 };
+
+static double absolute(double x) { return x < 0.0 ? -x : x; }
+
+/* Uniform quantiser with a dead zone: zero below dead_zone * step, rounding biased towards zero by as much. */
+static int32_t quantise(double value, double step, double dead_zone)
+{
+    double units = absolute(value) / step + (1.0 - dead_zone);
+    int32_t magnitude = units < 1.0 ? 0 : units > 1073741823.0 ? 1073741823 : (int32_t)units;
+    return value < 0.0 ? -magnitude : magnitude;
+}
+
+/* Transforms one axis over time and quantises it. A row whose length is below the dead zone has no coefficient
+ * beyond it, so the transform is left out. */
+ATH_HOT static void forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
+                                     const double *row, int32_t *quantised)
+{
+    double length2 = 0.0;
+    for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
+    memset(quantised, 0, (size_t)T * sizeof *quantised);
+    if (!(length2 > dead_zone * step * dead_zone * step * 0.9)) return;
+    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+        const double *wave = stream->temporal + (size_t)k * (size_t)T;
+        double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0, sum3 = 0.0;
+        int32_t t = 0;
+        for (; t + 4 <= T; t += 4) {
+            sum0 += wave[t] * row[t];
+            sum1 += wave[t + 1] * row[t + 1];
+            sum2 += wave[t + 2] * row[t + 2];
+            sum3 += wave[t + 3] * row[t + 3];
+        }
+        for (; t < T; t++) sum0 += wave[t] * row[t];
+        quantised[k] = quantise((sum0 + sum1) + (sum2 + sum3), step, dead_zone);
+    }
+}
+
+static void code_track(const ath_stream *stream, int32_t T, double step, double dead_zone, double *track,
+                       int32_t *quantised)
+{
+    for (int32_t axis = 0; axis < 3; axis++) {
+        forward_temporal(stream, T, step, dead_zone, track + axis * T, quantised + axis * T);
+        ath_inverse_temporal(stream, T, step, quantised + axis * T, track + axis * T);
+    }
+}
+
+/* out = R^T (x - c) */
+ATH_HOT static void into_rest_space(int32_t T, const ath_frames *at, const double *x, double *restrict out)
+{
+    const double *R = at->rotation, *c = at->point;
+    for (int32_t t = 0; t < T; t++) {
+        double dx = x[t] - c[t], dy = x[T + t] - c[T + t], dz = x[2 * T + t] - c[2 * T + t];
+        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz;
+        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz;
+        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz;
+    }
+}
+
+static void rotate_by_quaternion(const double q[4], const double v[3], double out[3])
+{
+    double tx = 2.0 * (q[2] * v[2] - q[3] * v[1]), ty = 2.0 * (q[3] * v[0] - q[1] * v[2]);
+    double tz = 2.0 * (q[1] * v[1] - q[2] * v[0]);
+    out[0] = v[0] + q[0] * tx + (q[2] * tz - q[3] * ty);
+    out[1] = v[1] + q[0] * ty + (q[3] * tx - q[1] * tz);
+    out[2] = v[2] + q[0] * tz + (q[1] * ty - q[2] * tx);
+}
+
+/* Turns the unit quaternion towards the rotation nearest to H (column k is what rest axis k became). */
+static void kabsch(const double H[9], double size2, double q[4])
+{
+    for (int32_t iteration = 0; iteration < KABSCH_ITERATIONS; iteration++) {
+        double w[3] = {0}, trace = 0.0;
+        for (int32_t k = 0; k < 3; k++) {
+            double axis[3] = {k == 0, k == 1, k == 2}, r[3], hx = H[k], hy = H[3 + k], hz = H[6 + k];
+            rotate_by_quaternion(q, axis, r);
+            w[0] += r[1] * hz - r[2] * hy;
+            w[1] += r[2] * hx - r[0] * hz;
+            w[2] += r[0] * hy - r[1] * hx;
+            trace += r[0] * hx + r[1] * hy + r[2] * hz;
+        }
+        double scale = 0.5 / (absolute(trace) + 1e-12 * size2);
+        double x = w[0] * scale, y = w[1] * scale, z = w[2] * scale;
+        double p[4] = {q[0] - x * q[1] - y * q[2] - z * q[3], q[1] + x * q[0] + y * q[3] - z * q[2],
+                       q[2] + y * q[0] + z * q[1] - x * q[3], q[3] + z * q[0] + x * q[2] - y * q[1]};
+        double unit = 1.0 / ath_sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+        for (int32_t i = 0; i < 4; i++) q[i] = p[i] * unit;
+        if (x * x + y * y + z * z < 1e-28) break;
+    }
+}
+
+/* The piece's own rotation against its predicted one, as omega over time, unwrapped: scratch->rows holds the vertices
+ * relative to the attach point in the predicted frame. */
+static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local, double *omega)
+{
+    const double *a = ath_rest_attach(shape, piece);
+    double q[4] = {1.0, 0.0, 0.0, 0.0};
+    for (int32_t t = 0; t < T; t++) {
+        double H[9] = {0}, size2 = 0.0;
+        for (int32_t i = 0; i < piece->count; i++) {
+            const double *x0 = ath_rest_of(shape, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
+            for (int32_t k = 0; k < 3; k++) {
+                double d = x0[k] - a[k];
+                size2 += d * d;
+                for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
+            }
+        }
+        for (int32_t k = 0; k < 3; k++) H[4 * k] += 1e-7 * size2;
+        if (size2 > 0.0) kabsch(H, size2, q);
+        double w = q[0];
+        if (w < -0.9) { /* beyond about 310 degrees: wind back */
+            for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
+            w = q[0];
+        }
+        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = 4.0 * q[k + 1] / (1.0 + w);
+    }
+}
+
+ATH_HOT static void project(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local,
+                            double *restrict rows)
+{
+    for (int32_t m = 0; m < piece->rank; m++) {
+        const double *mode = shape->bases + piece->basis + (size_t)m * (size_t)piece->count;
+        double *row = rows + (size_t)m * 3 * (size_t)T;
+        for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
+        for (int32_t v = 0; v < piece->count; v++) {
+            double weight = mode[v];
+            const double *x = local + (size_t)v * 3 * (size_t)T;
+            for (int32_t i = 0; i < 3 * T; i++) row[i] += weight * x[i];
+        }
+    }
+}
+
+static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
+                     const double *source, double *local)
+{
+    for (int32_t i = 0; i < piece->count; i++)
+        into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
+}
+
+static void subtract_rest(const ath_shape *shape, int32_t T, const ath_piece *piece, double *local)
+{
+    const double *a = ath_rest_attach(shape, piece);
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *x0 = ath_rest_of(shape, piece->first + i);
+        for (int32_t axis = 0; axis < 3; axis++) {
+            double d = x0[axis] - a[axis], *row = local + ((size_t)i * 3 + (size_t)axis) * (size_t)T;
+            for (int32_t t = 0; t < T; t++) row[t] -= d;
+        }
+    }
+}
+
+static void analyse_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch,
+                          const double *source, double dead_zone)
+{
+    const ath_piece *piece = shape->pieces + p;
+    const ath_stream *base = ath_base_stream(motion, piece);
+    int32_t T = motion->frames;
+    ath_attach(shape, motion, piece, scratch->at);
+    if (ath_has_shift(piece)) {
+        const double *x = source + (size_t)piece->first * 3 * (size_t)T;
+        const double *a = ath_rest_attach(shape, piece), *x0 = ath_rest_of(shape, piece->first);
+        for (int32_t i = 0; i < 3 * T; i++)
+            scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
+        code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, ath_shift_track(motion, p));
+        ath_move_point(T, scratch->track, scratch->at.point);
+    }
+    double *local = scratch->placed;
+    double omega_step = ath_omega_step(shape, piece, base);
+    to_local(T, piece, &scratch->at, source, local);
+    if (omega_step > 0.0) {
+        fit_omega(shape, T, piece, local, scratch->track);
+        code_track(base, T, omega_step, dead_zone, scratch->track, ath_omega_track(motion, p));
+        ath_turn(T, scratch->track, scratch->at.rotation);
+        to_local(T, piece, &scratch->at, source, local);
+    }
+    subtract_rest(shape, T, piece, local);
+    project(shape, T, piece, local, scratch->rows);
+    for (int32_t m = 0; m < piece->rank; m++) {
+        const ath_stream *stream = m < piece->low_modes ? base : motion->streams + piece->level;
+        code_track(stream, T, stream->step, dead_zone, scratch->rows + (size_t)m * 3 * (size_t)T,
+                   ath_coefficients_of(motion, piece->first + m));
+    }
+    ath_place(shape, motion, piece, scratch);
+    ath_carry(shape, motion, piece, scratch);
+}
+
+void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double *source, double dead_zone)
+{
+    ath_scratch scratch = ath_motion_scratch(motion);
+    for (int32_t p = 0; p < shape->piece_count; p++) analyse_piece(shape, motion, p, &scratch, source, dead_zone);
+}
+
+/* Sums over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of e * w_r,
+ * track 3 the mean of e, `centre` the mean of w. Returns the sum over frames of the mean square of e. */
+static double node_moments(const ath_shape *shape, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                           const double *source, double *tracks, double centre[3])
+{
+    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    double *local = scratch->placed, square = 0.0, weight = 1.0 / (double)node->count;
+    memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
+    centre[0] = centre[1] = centre[2] = 0.0;
+    for (int32_t v = node->first; v < node->first + node->count; v++) {
+        const double *x0 = ath_rest_of(shape, v);
+        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+        into_rest_space(T, &scratch->at, source + (size_t)v * 3 * (size_t)T, local);
+        for (int32_t axis = 0; axis < 3; axis++)
+            for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
+                local[t] -= d[axis];
+                square += local[t] * local[t] * weight;
+                tracks[9 * T + t] += local[t] * weight;
+            }
+        for (int32_t r = 0; r < node->rank; r++) {
+            const double *w = node->whitening + 3 * r;
+            double value = (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) * weight, *track = tracks + r * 3 * T;
+            centre[r] += value;
+            for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
+        }
+    }
+    return square;
+}
+
+/* Turns the moments into the least-squares map e = Y w (attached nodes) or e = s + Y w (roots, which hang on nothing).
+ * Returns the mean square of what it leaves, over vertices and frames. */
+static double fit_node(const ath_node *node, int root, int32_t T, double *tracks, const double centre[3], double square)
+{
+    double *shift = tracks + 9 * T, left = 1.0;
+    for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
+    for (int32_t i = 0; i < 3 * T; i++) {
+        double mean = shift[i], explained = 0.0;
+        shift[i] = 0.0;
+        if (root && left > 1e-6) {
+            for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
+            shift[i] = mean / left;
+            explained += shift[i] * mean;
+        }
+        for (int32_t r = 0; r < node->rank; r++) {
+            double *y = tracks + 3 * r * T + i;
+            explained += *y * *y;
+            *y -= shift[i] * centre[r];
+        }
+        square -= explained;
+    }
+    return square > 0.0 ? square / (double)T : 0.0;
+}
+
+/* The largest half-octave step that is not above `step`. */
+static int32_t half_octaves(double step)
+{
+    int32_t exponent = 0;
+    if (!(step > 1e-30)) return -200;
+    if (step > 1e30) return 200;
+    for (; step >= 2.0; exponent += 2) step *= 0.5;
+    for (; step < 1.0; exponent -= 2) step *= 2.0;
+    return step >= 1.4142135623730951 ? exponent + 1 : exponent;
+}
+
+static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch,
+                         const double *source, double quality, double dead_zone)
+{
+    const ath_node *node = shape->nodes + n;
+    const ath_piece *piece = shape->pieces + node->piece;
+    int32_t T = motion->frames;
+    double *tracks = scratch->rows, centre[3];
+    int root = piece->parent < 0;
+    ath_attach(shape, motion, piece, scratch->at);
+    double square = node_moments(shape, node, T, scratch, source, tracks, centre);
+    square = fit_node(node, root, T, tracks, centre, square);
+    motion->node_steps[n] = half_octaves(quality * ath_sqrt(square));
+    double step = ath_node_step(motion, n);
+    ath_stream stream = ath_node_stream(motion, step);
+    for (int32_t r = 0; r < node->rank; r++)
+        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, ath_node_track(motion, n, r));
+    if (root) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
+}
+
+void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source, double node_quality,
+                       double dead_zone)
+{
+    ath_scratch scratch = ath_motion_scratch(motion);
+    for (int32_t n = 0; n < shape->node_count; n++)
+        if (shape->nodes[n].coded) analyse_node(shape, motion, n, &scratch, source, node_quality, dead_zone);
+}

@@ -1,0 +1,312 @@
+/* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, cosines in
+ * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
+#include "internal.h"
+
+#define PI 3.14159265358979323846
+
+/* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
+ * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). */
+static void tridiagonalise(int32_t n, double *a, double *q, double *d, double *e)
+{
+    double v[ATH_PIECE_VERTICES], p[ATH_PIECE_VERTICES];
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j < n; j++) q[i * n + j] = i == j ? 1.0 : 0.0;
+    for (int32_t k = 0; k + 2 < n; k++) {
+        double norm2 = 0.0;
+        for (int32_t i = k + 1; i < n; i++) norm2 = norm2 + a[i * n + k] * a[i * n + k];
+        double below2 = norm2 - a[(k + 1) * n + k] * a[(k + 1) * n + k];
+        if (!(below2 > norm2 * 1e-30)) continue;
+        double norm = ath_sqrt(norm2), head = a[(k + 1) * n + k];
+        double alpha = head > 0.0 ? -norm : norm;
+        double scale = 1.0 / (norm2 - head * alpha);  /* 2 / v.v, halved: v.v = 2 (norm2 - head alpha) */
+        v[k + 1] = head - alpha;
+        for (int32_t i = k + 2; i < n; i++) v[i] = a[i * n + k];
+        double vp = 0.0;
+        for (int32_t i = k; i < n; i++) {
+            double sum = 0.0;
+            for (int32_t j = k + 1; j < n; j++) sum = sum + a[i * n + j] * v[j];
+            p[i] = sum * scale;
+        }
+        for (int32_t i = k + 1; i < n; i++) vp = vp + v[i] * p[i];
+        double half = 0.5 * scale * vp;
+        for (int32_t i = k + 1; i < n; i++) p[i] = p[i] - half * v[i];
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = k + 1; j < n; j++) a[i * n + j] = a[i * n + j] - v[i] * p[j] - p[i] * v[j];
+        a[(k + 1) * n + k] = alpha;
+        a[k * n + k + 1] = alpha;
+        for (int32_t i = k + 2; i < n; i++) a[i * n + k] = a[k * n + i] = 0.0;
+        for (int32_t j = 0; j < n; j++) {
+            double sum = 0.0;
+            for (int32_t i = k + 1; i < n; i++) sum = sum + v[i] * q[i * n + j];
+            sum = sum * scale;
+            for (int32_t i = k + 1; i < n; i++) q[i * n + j] = q[i * n + j] - sum * v[i];
+        }
+    }
+    for (int32_t i = 0; i < n; i++) {
+        d[i] = a[i * n + i];
+        e[i] = i > 0 ? a[i * n + i - 1] : 0.0;
+    }
+}
+
+/* Implicit QL on the tridiagonal matrix; rotates the rows of q into eigenvectors. The iteration count is capped, so
+ * that the time is bounded for every input; the cap is never reached by the matrices of cantilever(). */
+static void diagonalise(int32_t n, double *d, double *e, double *q)
+{
+    for (int32_t i = 1; i < n; i++) e[i - 1] = e[i];
+    e[n - 1] = 0.0;
+    for (int32_t l = 0; l < n; l++) {
+        for (int32_t iteration = 0; iteration < 50; iteration++) {
+            int32_t m = l;
+            for (; m < n - 1; m++) {
+                double size = (d[m] < 0 ? -d[m] : d[m]) + (d[m + 1] < 0 ? -d[m + 1] : d[m + 1]);
+                double off = e[m] < 0 ? -e[m] : e[m];
+                if (!(off > size * 1e-16)) break;
+            }
+            if (m == l) break;
+            double g = (d[l + 1] - d[l]) / (2.0 * e[l]);
+            double r = ath_sqrt(g * g + 1.0);
+            g = d[m] - d[l] + e[l] / (g >= 0.0 ? g + r : g - r);
+            double s = 1.0, c = 1.0, p = 0.0;
+            int32_t i = m - 1;
+            for (; i >= l; i--) {
+                double f = s * e[i], b = c * e[i];
+                r = ath_sqrt(f * f + g * g);
+                e[i + 1] = r;
+                if (r == 0.0) {
+                    d[i + 1] = d[i + 1] - p;
+                    e[m] = 0.0;
+                    break;
+                }
+                s = f / r;
+                c = g / r;
+                g = d[i + 1] - p;
+                r = (d[i] - g) * s + 2.0 * c * b;
+                p = s * r;
+                d[i + 1] = g + p;
+                g = c * r - b;
+                double *low = q + i * n, *high = q + (i + 1) * n;
+                for (int32_t k = 0; k < n; k++) {
+                    double h = high[k], w = low[k];
+                    high[k] = s * w + c * h;
+                    low[k] = c * w - s * h;
+                }
+            }
+            if (r == 0.0 && i >= l) continue;
+            d[l] = d[l] - p;
+            e[l] = g;
+            e[m] = 0.0;
+        }
+    }
+}
+
+/* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
+ * `gaps` (small positive integers) add up to: an integrated Wiener process, some free rotation, some roughness. */
+static void cantilever(int32_t n, const uint8_t *gaps, double *basis, double *work)
+{
+    double s[ATH_PIECE_VERTICES], d[ATH_PIECE_VERTICES], e[ATH_PIECE_VERTICES];
+    double *a = work, *q = work + n * n;
+    int32_t total = 0, along = 0;
+    for (int32_t i = 0; i < n; i++) total += gaps[i];
+    for (int32_t i = 0; i < n; i++) {
+        along += gaps[i];
+        s[i] = (double)along / (double)total;
+    }
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t j = 0; j <= i; j++) {
+            double low = s[j], high = s[i];
+            double bend = low * low * (3.0 * high - low) / 6.0;
+            a[i * n + j] = a[j * n + i] = bend + 0.1 * (low * high) + 0.001 * low;
+        }
+    tridiagonalise(n, a, q, d, e);
+    diagonalise(n, d, e, q);
+    for (int32_t m = 0; m < n; m++) {
+        int32_t best = 0;
+        for (int32_t i = 1; i < n; i++)
+            if (d[i] > d[best]) best = i;
+        double sign = q[best * n + n - 1] < 0.0 ? -1.0 : 1.0;
+        for (int32_t i = 0; i < n; i++) basis[m * n + i] = sign * q[best * n + i];
+        d[best] = -1e300;
+    }
+}
+
+/* Adds `candidate` to the `count` orthonormal rows of `basis` after removing what they hold of it, twice for
+ * accuracy. Returns the new count: unchanged when less than `keep` of its squared length is left. */
+static int32_t append_orthonormal(int32_t n, double *basis, int32_t count, double *candidate, double keep)
+{
+    double before = 0.0, after = 0.0;
+    for (int32_t i = 0; i < n; i++) before = before + candidate[i] * candidate[i];
+    for (int32_t pass = 0; pass < 2; pass++)
+        for (int32_t m = 0; m < count; m++) {
+            double dot = 0.0;
+            for (int32_t i = 0; i < n; i++) dot = dot + basis[m * n + i] * candidate[i];
+            for (int32_t i = 0; i < n; i++) candidate[i] = candidate[i] - dot * basis[m * n + i];
+        }
+    for (int32_t i = 0; i < n; i++) after = after + candidate[i] * candidate[i];
+    if (!(after > before * keep)) return count;
+    double scale = 1.0 / ath_sqrt(after);
+    for (int32_t i = 0; i < n; i++) basis[count * n + i] = candidate[i] * scale;
+    return count + 1;
+}
+
+/* The functions x0 - a over the piece's vertices first (flat and straight pieces have fewer than three), then what is
+ * left of the modes of an evenly spaced cantilever. Returns the rank. */
+static int32_t sheet(const ath_piece *piece, const double *rest, const double *modes, double *basis)
+{
+    int32_t n = piece->count, rank = 0;
+    double column[3][ATH_PIECE_VERTICES], length2[3], candidate[ATH_PIECE_VERTICES];
+    const double *origin = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    for (int32_t k = 0; k < 3; k++) {
+        length2[k] = 0.0;
+        for (int32_t i = 0; i < n; i++) {
+            column[k][i] = rest[3 * (size_t)(piece->first + i) + (size_t)k] - origin[k];
+            length2[k] = length2[k] + column[k][i] * column[k][i];
+        }
+    }
+    for (int32_t taken = 0; taken < 3; taken++) {
+        int32_t best = 0;
+        for (int32_t k = 1; k < 3; k++)
+            if (length2[k] > length2[best]) best = k;
+        if (length2[best] > 0.0 && rank < n) rank = append_orthonormal(n, basis, rank, column[best], 1e-4);
+        length2[best] = -1.0;
+    }
+    for (int32_t m = 0; m < n && rank < n; m++) {
+        memcpy(candidate, modes + m * n, (size_t)n * sizeof(double));
+        rank = append_orthonormal(n, basis, rank, candidate, 1e-10);
+    }
+    return rank;
+}
+
+static double distance(const double *a, const double *b)
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return ath_sqrt(x * x + y * y + z * z);
+}
+
+/* Distances along the piece in quarters of their mean, rounded, 1 to 64: coarse enough that evenly meshed stems share
+ * one basis, and never 0, so that coincident vertices do no harm. */
+static void piece_gaps(const ath_piece *piece, const double *rest, uint8_t *gaps)
+{
+    double length[ATH_PIECE_VERTICES], total = 0.0;
+    const double *before = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first);
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *here = rest + 3 * (size_t)(piece->first + i);
+        length[i] = piece->flags & ATH_SHEET ? 0.0 : distance(here, before);
+        total = total + length[i];
+        before = here;
+    }
+    for (int32_t i = 0; i < piece->count; i++) {
+        double quarters = total > 0.0 ? 4.0 * length[i] * (double)piece->count / total + 0.5 : 4.0;
+        gaps[i] = (uint8_t)(quarters < 1.0 ? 1 : quarters >= 64.0 ? 64 : (int32_t)quarters);
+    }
+}
+
+static uint32_t gaps_hash(const uint8_t *gaps, int32_t n)
+{
+    uint32_t hash = 2166136261u;
+    for (int32_t i = 0; i < n; i++) hash = (hash ^ gaps[i]) * 16777619u;
+    return hash ^ (hash >> 15);
+}
+
+static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
+{
+    for (int32_t i = 0; i < n; i++)
+        if (a[i] != b[i]) return 0;
+    return 1;
+}
+
+/* Pieces with equal gaps share one basis. `table` is an open-addressing hash of pieces that own theirs. */
+static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, uint8_t *gaps, int32_t *table, uint32_t mask)
+{
+    const uint8_t *mine = gaps + pieces[p].first;
+    uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
+    while (table[at] >= 0) {
+        const ath_piece *other = pieces + table[at];
+        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)) return table[at];
+        at = (at + 1) & mask;
+    }
+    table[at] = p;
+    return p;
+}
+
+size_t ath_basis_table_size(int32_t piece_count)
+{
+    size_t size = 16;
+    while (size < 2 * (size_t)piece_count) size *= 2;
+    return size;
+}
+
+int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps, int32_t *table)
+{
+    int64_t next = 0;
+    size_t size = ath_basis_table_size(piece_count);
+    for (size_t i = 0; i < size; i++) table[i] = -1;
+    for (int32_t p = 0; p < piece_count; p++) {
+        ath_piece *piece = pieces + p;
+        piece_gaps(piece, rest, gaps + piece->first);
+        int32_t owner = owner_of_basis(pieces, p, gaps, table, (uint32_t)size - 1);
+        piece->rank = piece->count;
+        piece->modes = owner == p ? next : pieces[owner].modes;
+        if (owner == p) next += (int64_t)piece->count * piece->count;
+        piece->basis = piece->modes;
+        if (piece->flags & ATH_SHEET) {
+            piece->basis = next;
+            next += (int64_t)piece->count * piece->count;
+        }
+    }
+    return next;
+}
+
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *bases)
+{
+    double work[2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES];
+    int64_t filled = 0;
+    for (int32_t p = 0; p < piece_count; p++) {
+        ath_piece *piece = pieces + p;
+        if (piece->modes >= filled) {
+            cantilever(piece->count, gaps + piece->first, bases + piece->modes, work);
+            filled = piece->modes + (int64_t)piece->count * piece->count;
+        }
+        if (piece->flags & ATH_SHEET) {
+            piece->rank = sheet(piece, rest, bases + piece->modes, bases + piece->basis);
+            filled = piece->basis + (int64_t)piece->count * piece->count;
+        }
+    }
+}
+
+/* cos(x) and sin(x) for 0 <= x <= pi/4 by their series. */
+static double cos_series(double x)
+{
+    double x2 = x * x, sum = 1.0;
+    for (int32_t k = 18; k >= 2; k -= 2) sum = 1.0 - sum * x2 / (double)(k * (k - 1));
+    return sum;
+}
+
+static double sin_series(double x)
+{
+    double x2 = x * x, sum = 1.0;
+    for (int32_t k = 19; k >= 3; k -= 2) sum = 1.0 - sum * x2 / (double)(k * (k - 1));
+    return x * sum;
+}
+
+/* cos(pi j / (2 T)), by symmetry from the first eighth of the circle. */
+static double cos_of_fraction(int64_t j, int64_t T)
+{
+    j = j % (4 * T);
+    if (j > 2 * T) j = 4 * T - j;
+    double sign = 1.0;
+    if (j > T) {
+        j = 2 * T - j;
+        sign = -1.0;
+    }
+    double value = 2 * j <= T ? cos_series(PI * (double)j / (double)(2 * T))
+                              : sin_series(PI * (double)(T - j) / (double)(2 * T));
+    return sign * value;
+}
+
+void ath_cosine_basis(int32_t frames, double *basis)
+{
+    double first = ath_sqrt(1.0 / (double)frames), other = ath_sqrt(2.0 / (double)frames);
+    for (int32_t k = 0; k < frames; k++)
+        for (int32_t t = 0; t < frames; t++)
+            basis[k * frames + t] = (k == 0 ? first : other) * cos_of_fraction((int64_t)(2 * t + 1) * k, frames);
+}

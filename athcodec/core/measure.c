@@ -1,0 +1,115 @@
+/* What the encoder measures on decoded positions, and the corrections that keep its promise. */
+#include "motion.h"
+
+static double position_at(int wide, const void *positions, size_t at)
+{
+    return wide ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
+}
+
+static void set_position(int wide, void *positions, size_t at, double value)
+{
+    if (wide)
+        ((double *)positions)[at] = value;
+    else
+        ((float *)positions)[at] = (float)value;
+}
+
+void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
+               const double origin[3], double *max_error, double *sum_squares)
+{
+    double largest = 0.0, sum = 0.0;
+    size_t T = (size_t)frames;
+    for (size_t v = 0; v < (size_t)vertex_count; v++)
+        for (size_t t = 0; t < T; t++) {
+            double square = 0.0;
+            for (size_t axis = 0; axis < 3; axis++) {
+                size_t at = (v * 3 + axis) * T + t;
+                double e = position_at(wide, positions, at) - (source[at] + origin[axis]);
+                square += e * e;
+            }
+            sum += square;
+            if (square > largest) largest = square;
+        }
+    *max_error = ath_sqrt(largest);
+    *sum_squares = sum;
+}
+
+static double rounded(int wide, double value) { return wide ? value : (double)(float)value; }
+
+static double corrected_error(int wide, const double here[3], const double want[3], const int32_t q[3], double step)
+{
+    double square = 0.0;
+    for (int32_t k = 0; k < 3; k++) {
+        double e = rounded(wide, ath_corrected(here[k], q[k], step)) - want[k];
+        square += e * e;
+    }
+    return square;
+}
+
+static int32_t to_steps(double value)
+{
+    return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5);
+}
+
+/* The correction with fewest non-zero axes, then the smallest error, that comes within the limit. */
+static int choose_correction(int wide, const double here[3], const double want[3], double limit, double step,
+                             int32_t best[3])
+{
+    int32_t steps[3], found = 0;
+    for (int32_t k = 0; k < 3; k++) {
+        double units = (want[k] - here[k]) / step;
+        if (!(units > -1e9 && units < 1e9)) return 0;
+        steps[k] = to_steps(units);
+        if (steps[k] == 0) steps[k] = units < 0.0 ? -1 : 1;
+    }
+    for (int32_t axes = 1; axes <= 3 && !found; axes++) {
+        double least = limit * limit;
+        for (int32_t mask = 1; mask < 8; mask++) {
+            int32_t q[3];
+            if ((mask & 1) + (mask >> 1 & 1) + (mask >> 2) != axes) continue;
+            for (int32_t k = 0; k < 3; k++) q[k] = mask >> k & 1 ? steps[k] : 0;
+            double square = corrected_error(wide, here, want, q, step);
+            if (square > least) continue;
+            least = square;
+            found = 1;
+            memcpy(best, q, sizeof q);
+        }
+    }
+    return found;
+}
+
+int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions, const double *source,
+                             const double origin[3], double limit, double step, int32_t *corrections, int64_t capacity)
+{
+    size_t T = (size_t)frames;
+    int64_t count = 0;
+    for (int32_t v = 0; v < vertex_count; v++)
+        for (int32_t t = 0; t < frames; t++) {
+            double here[3], want[3], square = 0.0;
+            for (size_t k = 0; k < 3; k++) {
+                size_t at = ((size_t)v * 3 + k) * T + (size_t)t;
+                here[k] = position_at(wide, positions, at);
+                want[k] = source[at] + origin[k];
+                square += (here[k] - want[k]) * (here[k] - want[k]);
+            }
+            if (!(square > limit * limit)) continue;
+            int32_t q[3];
+            if (!choose_correction(wide, here, want, limit, step, q)) return -1;
+            if (count < capacity) {
+                int32_t *row = corrections + 5 * count;
+                row[0] = v;
+                row[1] = t;
+                memcpy(row + 2, q, sizeof q);
+            }
+            count++;
+        }
+    if (count > capacity) return count;
+    for (int64_t i = 0; i < count; i++) {
+        const int32_t *row = corrections + 5 * i;
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = ((size_t)row[0] * 3 + k) * T + (size_t)row[1];
+            if (row[2 + k] != 0) set_position(wide, positions, at, ath_corrected(position_at(wide, positions, at), row[2 + k], step));
+        }
+    }
+    return count;
+}

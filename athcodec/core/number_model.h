@@ -1,0 +1,78 @@
+/* Adaptive codes for integers (FORMAT.md, "Numbers"), compiled once for each direction. */
+#ifndef ATH_NUMBER_MODEL_H
+#define ATH_NUMBER_MODEL_H
+
+#include "range_coder.h"
+
+enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30 };
+
+typedef struct {
+    ath_context size[NUMBER_CLASSES][NUMBER_BINS];
+    ath_context mantissa[NUMBER_BINS][4];
+} number_model;
+
+/* Bits in x: 0 for 0, 1 for 1, 2 for 2 and 3, ... */
+ATH_INLINE int32_t bit_length(uint32_t x)
+{
+#if defined(__GNUC__)
+    return x == 0 ? 0 : 32 - __builtin_clz(x);
+#else
+    int32_t length = 0;
+    for (; x; x >>= 1) length++;
+    return length;
+#endif
+}
+
+ATH_INLINE uint32_t magnitude_of(int32_t value) { return (uint32_t)(value < 0 ? -value : value); }
+
+/* Half-octave classes of an expected magnitude in 1/16: 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
+ATH_INLINE int32_t number_class(uint32_t expected)
+{
+    int32_t length = bit_length(expected);
+    if (length < 2) return length;
+    int32_t class = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
+    return class < NUMBER_CLASSES ? class : NUMBER_CLASSES - 1;
+}
+
+/* Starting probabilities are those of a geometric distribution with the class's mean. */
+static void number_model_init(number_model *model)
+{
+    for (int32_t class = 0; class < NUMBER_CLASSES; class++) {
+        uint32_t mean = class < 2 ? (uint32_t)(class * 8 + 1)
+                                  : (uint32_t)(5 + (class & 1) * 2) << (class / 2 - 1); /* in 1/32, mid of the class */
+        uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
+        for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {
+            context_init(&model->size[class][bin], more);
+            if (bin > 0) more = (uint32_t)(((uint64_t)more * more) >> 16);
+        }
+    }
+    for (int32_t bin = 0; bin < NUMBER_BINS; bin++)
+        for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
+}
+
+/* One number below 2^30 under an expected magnitude in 1/16. */
+ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
+{
+    ath_context *size = model->size[number_class(expected)];
+    int32_t length = bit_length(value), coded = 0;
+    while (coded < NUMBER_BINS && coder_bit(coder, &size[coded], coded < length)) coded++;
+    if (coded == 0) return 0;
+    uint32_t built = 1;
+    for (int32_t bit = coded - 2; bit >= 0; bit--) {
+        int given = (int)(value >> bit & 1);
+        int32_t taken = coded - 2 - bit; /* bits of the mantissa so far: the first two are modelled */
+        int coded_bit = taken < 2 ? coder_bit(coder, &model->mantissa[coded - 1][taken ? 1 + (built & 1) : 0], given)
+                                  : coder_raw_bit(coder, given);
+        built = built << 1 | (uint32_t)coded_bit;
+    }
+    return built;
+}
+
+ATH_INLINE int32_t code_signed(ath_coder *coder, number_model *model, uint32_t expected, int32_t value)
+{
+    uint32_t magnitude = code_unsigned(coder, model, expected, magnitude_of(value));
+    if (magnitude == 0) return 0;
+    return coder_raw_bit(coder, value < 0) ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+#endif

@@ -1,0 +1,175 @@
+/* From branches to pieces and nodes: how stems are cut, what hangs where, which level's stream holds what. */
+#include "motion.h"
+
+/* Smallest second moment that counts as a direction, relative to the largest. */
+#define RANK_TOLERANCE 1e-4
+
+static int32_t pieces_of(int32_t count) { return (count + ATH_PIECE_VERTICES - 1) / ATH_PIECE_VERTICES; }
+
+int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count)
+{
+    int32_t total = 0, next = 0;
+    for (int32_t b = 0; b < branch_count; b++) {
+        ath_branch *branch = branches + b;
+        if (branch->parent >= b || branch->parent < -1 || branch->count < 1 || branch->count > vertex_count - next) return 0;
+        branch->first = next;
+        branch->subtree = 1;
+        branch->depth = 0;
+        if (branch->parent >= 0) {
+            const ath_branch *parent = branches + branch->parent;
+            branch->depth = parent->depth + 1;
+            if (branch->attach < parent->first || branch->attach >= parent->first + parent->count) return 0;
+        } else if (branch->attach != -1) {
+            return 0;
+        }
+        next += branch->count;
+        total += pieces_of(branch->count);
+    }
+    for (int32_t b = branch_count - 1; b > 0; b--)
+        if (branches[b].parent >= 0) branches[branches[b].parent].subtree += branches[b].subtree;
+    for (int32_t b = 1; b < branch_count; b++) { /* depth-first order: a branch lies inside its parent's subtree */
+        const ath_branch *parent = branches + branches[b].parent;
+        if (branches[b].parent >= 0 && b + branches[b].subtree > branches[b].parent + parent->subtree) return 0;
+    }
+    return next == vertex_count ? total : 0;
+}
+
+/* The branch after the node's subtree when the node of `b` is a leaf of the ATH, else the next branch. */
+static int32_t next_node(const ath_branch *branches, int32_t b)
+{
+    return branches[b].flags & ATH_WHOLE ? b + branches[b].subtree : b + 1;
+}
+
+int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count)
+{
+    int32_t count = 0;
+    for (int32_t b = 0; b < branch_count; b = next_node(branches, b)) count++;
+    return count;
+}
+
+static int32_t subtree_vertices(const ath_branch *branches, int32_t b)
+{
+    const ath_branch *last = branches + b + branches[b].subtree - 1;
+    return last->first + last->count - branches[b].first;
+}
+
+static void split_branch(const ath_branch *branches, int32_t b, ath_piece *pieces, int32_t next,
+                         int32_t *piece_of_vertex)
+{
+    const ath_branch *branch = branches + b;
+    int32_t parts = pieces_of(branch->count);
+    for (int32_t j = 0; j < parts; j++) {
+        ath_piece *piece = pieces + next + j;
+        int32_t from = (int32_t)((int64_t)branch->count * j / parts), to = (int32_t)((int64_t)branch->count * (j + 1) / parts);
+        memset(piece, 0, sizeof *piece);
+        piece->first = branch->first + from;
+        piece->count = to - from;
+        piece->attach = j == 0 ? branch->attach : piece->first - 1;
+        piece->parent = piece->attach < 0 ? -1 : piece_of_vertex[piece->attach];
+        piece->branch = b;
+        piece->flags = j == 0 ? branch->flags : branch->flags & ~ATH_LOOSE;
+        piece->rank = piece->count;
+        piece->low_level = -1;
+        piece->carrier = -1;
+        for (int32_t v = piece->first; v < piece->first + piece->count; v++) piece_of_vertex[v] = next + j;
+    }
+}
+
+static void place_carriers(ath_shape *shape, ath_piece *pieces)
+{
+    for (int32_t p = 0; p < shape->piece_count; p++)
+        if (pieces[p].parent >= 0) pieces[pieces[p].parent].carrier = 0;
+    shape->carrier_vertices = shape->carrier_pieces = 0;
+    for (int32_t p = 0; p < shape->piece_count; p++) {
+        if (pieces[p].carrier < 0) continue;
+        pieces[p].carrier = shape->carrier_vertices;
+        pieces[p].carrier_index = shape->carrier_pieces++;
+        shape->carrier_vertices += pieces[p].count;
+    }
+}
+
+/* A leaf that is one short stem needs no map of its own: its first modes come with its node's level. */
+static void plan_node(const ath_shape *shape, ath_piece *pieces, ath_node *node, int32_t b, int32_t piece)
+{
+    const ath_branch *branch = shape->branches + b;
+    memset(node, 0, sizeof *node);
+    node->branch = b;
+    node->piece = piece;
+    node->first = branch->first;
+    node->count = subtree_vertices(shape->branches, b);
+    node->level = branch->depth;
+    node->last = branch->flags & ATH_WHOLE ? shape->height : branch->depth;
+    node->coded = branch->subtree > 1 || branch->count > ATH_PIECE_VERTICES;
+    if (!node->coded) {
+        pieces[piece].low_level = node->level;
+        pieces[piece].low_modes = ath_min(branch->count, branch->flags & ATH_SHEET ? 3 : 2);
+    }
+}
+
+void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *piece_of_vertex)
+{
+    const ath_branch *branches = shape->branches;
+    int32_t next_piece = 0, node = 0, following = 0;
+    shape->height = 0;
+    for (int32_t b = 0; b < shape->branch_count; b = next_node(branches, b))
+        shape->height = ath_max(shape->height, branches[b].depth);
+    for (int32_t b = 0; b < shape->branch_count; b++) {
+        int32_t parts = pieces_of(branches[b].count), level = shape->height + 1;
+        split_branch(branches, b, pieces, next_piece, piece_of_vertex);
+        if (b == following) {
+            plan_node(shape, pieces, nodes + node++, b, next_piece);
+            following = next_node(branches, b);
+            if (!(branches[b].flags & ATH_WHOLE)) level = branches[b].depth + 1;
+        }
+        for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].level = level;
+        next_piece += parts;
+    }
+    place_carriers(shape, pieces);
+}
+
+/* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes
+ * with the most left first, orthonormalised under the second moments; directions of no extent are left out. */
+static void whiten(const ath_shape *shape, ath_node *node)
+{
+    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    double moment[9] = {0}, largest = 0.0;
+    int used[3] = {0, 0, 0};
+    for (int32_t v = node->first; v < node->first + node->count; v++) {
+        const double *x0 = ath_rest_of(shape, v);
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t j = 0; j < 3; j++) moment[3 * i + j] = moment[3 * i + j] + (x0[i] - a[i]) * (x0[j] - a[j]);
+    }
+    for (int32_t i = 0; i < 9; i++) moment[i] = moment[i] / (double)node->count;
+    for (node->rank = 0; node->rank < 3; node->rank++) {
+        double best_w[3] = {0.0, 0.0, 0.0}, best = 0.0;
+        int32_t best_axis = -1;
+        for (int32_t axis = 0; axis < 3; axis++) {
+            if (used[axis]) continue;
+            double w[3] = {0.0, 0.0, 0.0}, left = moment[4 * axis];
+            w[axis] = 1.0;
+            for (int32_t r = 0; r < node->rank; r++) {
+                const double *earlier = node->whitening + 3 * r;
+                double shared = earlier[0] * moment[axis] + earlier[1] * moment[3 + axis] + earlier[2] * moment[6 + axis];
+                left = left - shared * shared;
+                for (int32_t k = 0; k < 3; k++) w[k] = w[k] - shared * earlier[k];
+            }
+            if (left > best) {
+                best = left;
+                best_axis = axis;
+                for (int32_t k = 0; k < 3; k++) best_w[k] = w[k];
+            }
+        }
+        if (node->rank == 0) largest = best;
+        if (best_axis < 0 || !(best > largest * RANK_TOLERANCE)) break;
+        used[best_axis] = 1;
+        for (int32_t k = 0; k < 3; k++) node->whitening[3 * node->rank + k] = best_w[k] / ath_sqrt(best);
+    }
+}
+
+void ath_plan_nodes(const ath_shape *shape, ath_node *nodes)
+{
+    for (int32_t n = 0; n < shape->node_count; n++) {
+        memset(nodes[n].whitening, 0, sizeof nodes[n].whitening);
+        whiten(shape, nodes + n);
+    }
+}

@@ -1,0 +1,347 @@
+/* What each stream of FORMAT.md holds, in which order. Compiled once for each direction: `encoding` is a constant, and
+ * a value handed to a coding function is ignored when decoding. Functions return 0 when what they decoded is not
+ * valid. */
+#ifndef ATH_STREAMS_H
+#define ATH_STREAMS_H
+
+#include "coefficient_model.h"
+#include "motion.h"
+
+#ifdef ATH_ENCODING
+enum { ENCODING = 1 };
+#else
+enum { ENCODING = 0 };
+#endif
+
+/* ---- hierarchy ---- */
+
+typedef struct {
+    number_model up, count, attach, lag, source;
+    ath_context flag[3][2], permuted;
+} hierarchy_model;
+
+static void hierarchy_model_init(hierarchy_model *model)
+{
+    number_model_init(&model->up);
+    number_model_init(&model->count);
+    number_model_init(&model->attach);
+    number_model_init(&model->lag);
+    number_model_init(&model->source);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 2; j++) context_init(&model->flag[i][j], 16384);
+    context_init(&model->permuted, 32768);
+}
+
+static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
+{
+    int32_t coded = 0;
+    for (int32_t i = 0; i < 3; i++)
+        coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
+    return coded;
+}
+
+/* How far up from branch b - 1 the parent of b lies: 0 = child of b - 1, its depth + 1 = a root. Returns the parent,
+ * or -2 when it lies beyond a root. */
+static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_branch *branches, int32_t b,
+                           int32_t *last_up)
+{
+    int32_t up = 0, parent = b - 1;
+    if (ENCODING) {
+        for (; parent != branches[b].parent && parent >= 0; parent = branches[parent].parent) up++;
+        parent = b - 1;
+    }
+    up = (int32_t)code_unsigned(coder, &model->up, (uint32_t)ath_min(*last_up, 1000) * 16, (uint32_t)up);
+    *last_up = up;
+    for (; up > 0 && parent >= 0; up--) parent = branches[parent].parent;
+    return up > 0 ? -2 : parent;
+}
+
+static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
+                       int32_t *last_up, int32_t *mean_count)
+{
+    ath_branch *branch = branches + b, *before = branches + b - 1;
+    branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
+    if (branch->parent < -1) return 0;
+    int32_t depth = branch->parent < 0 ? 0 : branches[branch->parent].depth + 1, class = ath_min(depth, 15);
+    branch->depth = depth;
+    uint32_t more = code_unsigned(coder, &model->count, (uint32_t)mean_count[class], (uint32_t)(branch->count - 1));
+    if (more >= (uint32_t)vertices_left) return 0;
+    branch->count = (int32_t)more + 1;
+    mean_count[class] += (ath_min((int32_t)more, 1 << 16) * 16 - mean_count[class]) / 4;
+    branch->flags = code_flags(coder, model, b == 0 ? 0 : before->flags, branch->flags);
+    branch->lag = code_signed(coder, &model->lag, 0, branch->lag - (b == 0 ? 1 : before->lag)) + (b == 0 ? 1 : before->lag);
+    if (branch->lag < 0 || branch->lag > 65535) return 0;
+    branch->first = b == 0 ? 0 : before->first + before->count;
+    return 1;
+}
+
+/* Attach points relative to that of the sibling before; `subtree` serves as memory of it while coding. */
+static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, uint32_t *mean)
+{
+    ath_branch *branch = branches + b, *parent = branches + branch->parent;
+    int32_t step = code_signed(coder, &model->attach, *mean, branch->attach - parent->first - parent->subtree);
+    int32_t place = parent->subtree + step;
+    if (step < -(1 << 28) || step > 1 << 28 || place < 0 || place >= parent->count) return 0;
+    branch->attach = parent->first + place;
+    parent->subtree = place;
+    *mean = *mean - (*mean + 3) / 4 + clipped(step) * 4;
+    return 1;
+}
+
+static int code_permutation(ath_coder *coder, hierarchy_model *model, int32_t count, int32_t *source)
+{
+    int32_t expected = 0, identity = 1;
+    if (ENCODING)
+        for (int32_t i = 0; i < count; i++) identity = identity && source[i] == i;
+    identity = !coder_bit(coder, &model->permuted, !identity);
+    for (int32_t i = 0; i < count; i++) {
+        int64_t value = identity ? i : (int64_t)expected + code_signed(coder, &model->source, 16, source[i] - expected);
+        if (value < 0 || value >= count) return 0;
+        source[i] = (int32_t)value;
+        expected = source[i] + 1;
+    }
+    return 1;
+}
+
+static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t branch_count, int32_t vertex_count,
+                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
+{
+    int32_t last_up = 0, left = vertex_count, mean_count[16];
+    uint32_t mean_attach = 64;
+    hierarchy_model_init(model);
+    for (int32_t i = 0; i < 16; i++) mean_count[i] = 128;
+    for (int32_t b = 0; b < branch_count; b++) {
+        if (!code_branch(coder, model, branches, b, left, &last_up, mean_count)) return 0;
+        left -= branches[b].count;
+        branches[b].subtree = 0;
+    }
+    if (left != 0) return 0;
+    for (int32_t b = 0; b < branch_count; b++) {
+        if (branches[b].parent < 0)
+            branches[b].attach = -1;
+        else if (!code_attach(coder, model, branches, b, &mean_attach))
+            return 0;
+    }
+    return code_permutation(coder, model, branch_count, branch_source)
+           && code_permutation(coder, model, vertex_count, vertex_source);
+}
+
+/* ---- rest pose ---- */
+
+typedef struct {
+    number_model inner, start;
+} rest_model;
+
+/* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
+static void predict_rest(const ath_branch *branch, const double *rest, int32_t i, double predicted[3])
+{
+    const double *stem = rest + 3 * (size_t)branch->first;
+    const double *before = i > 0 ? stem + 3 * (i - 1) : branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
+    const double *from = 0, *to = 0;
+    if (branch->lag > 0 && i >= branch->lag) {
+        to = stem + 3 * (i - branch->lag);
+        from = i > branch->lag ? stem + 3 * (i - branch->lag - 1)
+                               : branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        predicted[k] = before ? before[k] : 0.0;
+        if (from) predicted[k] = predicted[k] + (to[k] - from[k]);
+    }
+}
+
+static int32_t nearest_step(double value, double step)
+{
+    double units = value / step;
+    if (!(units > -1073741823.0)) return -1073741823;
+    if (!(units < 1073741823.0)) return 1073741823;
+    return units < 0.0 ? -(int32_t)(0.5 - units) : (int32_t)(units + 0.5);
+}
+
+static void code_rest(ath_coder *coder, rest_model *model, const ath_branch *branches, int32_t branch_count, double step,
+                      const double *source, double *rest)
+{
+    uint32_t mean[2][3] = {{64, 64, 64}, {64, 64, 64}};
+    number_model_init(&model->inner);
+    number_model_init(&model->start);
+    for (int32_t b = 0; b < branch_count; b++)
+        for (int32_t i = 0; i < branches[b].count; i++) {
+            double predicted[3], *out = rest + 3 * (size_t)(branches[b].first + i);
+            int32_t starting = i < 2;
+            predict_rest(branches + b, rest, i, predicted);
+            for (int32_t k = 0; k < 3; k++) {
+                uint32_t *history = &mean[starting][k];
+                uint32_t all = mean[starting][0] + mean[starting][1] + mean[starting][2];
+                int32_t given = ENCODING ? nearest_step(source[out - rest + k] - predicted[k], step) : 0;
+                int32_t steps = code_signed(coder, starting ? &model->start : &model->inner, (*history + all) / 4, given);
+                out[k] = predicted[k] + (double)steps * step;
+                *history = *history - (*history + 7) / 8 + clipped(steps) * 2;
+            }
+        }
+}
+
+/* ---- learned temporal basis ---- */
+
+static void code_temporal(ath_coder *coder, number_model *model, int32_t rank, int32_t frames, int32_t *basis)
+{
+    number_model_init(model);
+    for (int32_t r = 0; r < rank; r++) {
+        uint32_t mean = 1024;
+        int32_t before = 0, slope = 0;
+        for (int32_t t = 0; t < frames; t++) {
+            int32_t *value = basis + (size_t)r * (size_t)frames + t, predicted = before + slope;
+            int32_t rest = code_signed(coder, model, mean, *value - predicted);
+            *value = predicted + ath_max(ath_min(rest, 1 << 20), -(1 << 20));
+            *value = ath_max(ath_min(*value, 1 << 20), -(1 << 20));
+            slope = t > 0 ? (*value - before) : 0;
+            before = *value;
+            mean = mean - (mean + 3) / 4 + clipped(rest) * 4;
+        }
+    }
+}
+
+/* ---- stems ---- */
+
+static void code_piece(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
+                       int32_t p, int32_t level)
+{
+    const ath_piece *piece = shape->pieces + p;
+    int32_t from = 0, to = 0, above_count = 0;
+    if (level == (piece->low_level >= 0 ? piece->low_level : piece->level)) {
+        if (ath_has_shift(piece))
+            code_row(coder, model, motion->frames, SHIFT_SLOT, 0, 0, ENCODING, ath_shift_track(motion, p));
+        if (ath_omega_step(shape, piece, motion->streams + level) > 0.0)
+            code_row(coder, model, motion->frames, OMEGA_SLOT, 0, 0, ENCODING, ath_omega_track(motion, p));
+    }
+    if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
+    if (piece->level == level) {
+        from = piece->low_modes;
+        to = piece->rank;
+    }
+    const int32_t *above = 0;
+    for (int32_t m = from; m < to; m++) {
+        int32_t *row = ath_coefficients_of(motion, piece->first + m);
+        above_count = code_row(coder, model, motion->frames, m, above, above_count, ENCODING, row);
+        above = row;
+    }
+}
+
+static void code_stems(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
+                       int32_t level)
+{
+    coefficient_model_init(model);
+    for (int32_t p = 0; p < shape->piece_count; p++) code_piece(coder, model, shape, motion, p, level);
+}
+
+/* ---- maps of nodes ---- */
+
+typedef struct {
+    coefficient_model rows;
+    number_model step;
+} affine_model;
+
+static int code_affines(ath_coder *coder, affine_model *model, const ath_shape *shape, const ath_motion *motion,
+                        int32_t level)
+{
+    int32_t before = 0;
+    coefficient_model_init(&model->rows);
+    number_model_init(&model->step);
+    for (int32_t n = 0; n < shape->node_count; n++) {
+        const ath_node *node = shape->nodes + n;
+        if (!node->coded || node->level != level) continue;
+        int32_t change = code_signed(coder, &model->step, 32, motion->node_steps[n] - before), above_count = 0;
+        if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
+        motion->node_steps[n] = before = before + change;
+        const int32_t *above = 0;
+        for (int32_t r = 0; r < node->rank; r++) {
+            int32_t *row = ath_node_track(motion, n, r);
+            above_count = code_row(coder, &model->rows, motion->frames, r, above, above_count, ENCODING, row);
+            above = row;
+        }
+        if (shape->pieces[node->piece].parent < 0)
+            code_row(coder, &model->rows, motion->frames, SHIFT_SLOT, 0, 0, ENCODING, ath_node_track(motion, n, 3));
+    }
+    return 1;
+}
+
+/* ---- corrections ---- */
+
+enum { CORRECTION_BLOCK = 8 };
+
+typedef struct {
+    ath_context vertex[4], block[2][4], frame[3][3][2], zero[2][3], sign[3][3];
+    number_model size;
+    int32_t row[2][ATH_SEGMENT_FRAMES][3]; /* corrections of the vertex before and of this one */
+} correction_model;
+
+static void correction_model_init(correction_model *model)
+{
+    memset(model, 0, sizeof *model);
+    for (int32_t i = 0; i < 4; i++) context_init(&model->vertex[i], i == 0 ? 4000 : 32768);
+    for (int32_t i = 0; i < 2; i++)
+        for (int32_t j = 0; j < 4; j++) context_init(&model->block[i][j], 8000);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++)
+            for (int32_t k = 0; k < 2; k++) context_init(&model->frame[i][j][k], i || j ? 32768 : 6000);
+    for (int32_t i = 0; i < 2; i++)
+        for (int32_t j = 0; j < 3; j++) context_init(&model->zero[i][j], 32768);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++) context_init(&model->sign[i][j], 32768);
+    number_model_init(&model->size);
+}
+
+ATH_INLINE int is_correction(const int32_t q[3]) { return q[0] != 0 || q[1] != 0 || q[2] != 0; }
+
+static int any_correction(int32_t row[][3], int32_t from, int32_t to)
+{
+    for (int32_t t = from; t < to; t++)
+        if (is_correction(row[t])) return 1;
+    return 0;
+}
+
+/* A vector that is not all zero; `like` is a neighbour's correction, or zeros. */
+static void code_correction(ath_coder *coder, correction_model *model, const int32_t like[3], int32_t q[3])
+{
+    int any = 0;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        int32_t sign = like[axis] == 0 ? 0 : like[axis] < 0 ? 1 : 2;
+        int nonzero = axis == 2 && !any;
+        if (!nonzero) nonzero = coder_bit(coder, &model->zero[any][sign != 0 ? 1 : is_correction(like) ? 2 : 0], q[axis] != 0);
+        if (!nonzero) {
+            q[axis] = 0;
+            continue;
+        }
+        any = 1;
+        int negative = coder_bit(coder, &model->sign[axis][sign], q[axis] < 0);
+        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, clipped(like[axis]) * 16, magnitude_of(q[axis]) - 1) + 1;
+        q[axis] = negative ? -magnitude : magnitude;
+    }
+}
+
+/* The corrections of one vertex, in model->row[1]; those of the vertex before are in model->row[0]. */
+static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames)
+{
+    int32_t(*above)[3] = model->row[0], (*row)[3] = model->row[1];
+    int any = 0, block_before = 0;
+    for (int32_t from = 0; from < frames; from += CORRECTION_BLOCK) {
+        int32_t to = ath_min(from + CORRECTION_BLOCK, frames);
+        int beside = any_correction(above, from, to)
+                     + 2 * any_correction(above, ath_max(from - CORRECTION_BLOCK, 0), ath_min(to + CORRECTION_BLOCK, frames));
+        int block = to == frames && !any ? 1
+                    : coder_bit(coder, &model->block[block_before][beside], ENCODING && any_correction(row, from, to));
+        int found = 0;
+        block_before = block;
+        any |= block;
+        for (int32_t t = from; block && t < to; t++) {
+            int earlier = t == 0 ? 0 : is_correction(row[t - 1]) ? 2 : t > 1 && is_correction(row[t - 2]) ? 1 : 0;
+            int near = is_correction(above[t]) ? 2
+                       : (t > 0 && is_correction(above[t - 1])) || (t + 1 < frames && is_correction(above[t + 1])) ? 1 : 0;
+            int here = t == to - 1 && !found ? 1
+                       : coder_bit(coder, &model->frame[earlier][near][found], ENCODING && is_correction(row[t]));
+            if (!here) continue;
+            found = 1;
+            code_correction(coder, model, earlier == 2 ? row[t - 1] : above[t], row[t]);
+        }
+    }
+}
+
+#endif

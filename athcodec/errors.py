@@ -1,0 +1,70 @@
+"""Every error that athcodec raises on purpose, one class per cause.
+
+The codes are those of FORMAT.md, "Errors", and of core/ath.h; they never change once released. A message is one line:
+what is wrong, where, what was found and what was expected.
+"""
+
+from __future__ import annotations
+
+
+class AthError(Exception):
+    """Base of all errors raised by athcodec on purpose."""
+
+
+class ClipError(AthError, ValueError):
+    """A motion clip, or the source file it comes from, is not usable."""
+
+
+class BoundError(AthError, ValueError):
+    """An error bound or target size cannot be kept."""
+
+
+class FormatError(AthError):
+    """An .ath file cannot be decoded; `code` is its number in FORMAT.md."""
+
+    code = 1
+    name = "INVALID"
+
+
+class NotAnAthFile(FormatError):
+    code, name = 2, "NOT_AN_ATH_FILE"
+
+
+class UnsupportedVersion(FormatError):
+    code, name = 3, "UNSUPPORTED_VERSION"
+
+
+class Truncated(FormatError):
+    code, name = 4, "TRUNCATED"
+
+
+class BadChecksum(FormatError):
+    code, name = 5, "BAD_CHECKSUM"
+
+
+class BadHeader(FormatError):
+    code, name = 6, "BAD_HEADER"
+
+
+class BadChunkTable(FormatError):
+    code, name = 7, "BAD_CHUNK_TABLE"
+
+
+class UnknownChunk(FormatError):
+    code, name = 8, "UNKNOWN_CHUNK"
+
+
+class BadChunk(FormatError):
+    code, name = 9, "BAD_CHUNK"
+
+
+class LimitExceeded(FormatError):
+    code, name = 10, "LIMIT_EXCEEDED"
+
+
+class TrailingBytes(FormatError):
+    code, name = 11, "TRAILING_BYTES"
+
+
+class LevelUnavailable(AthError, LookupError):
+    """A level or frame was asked for that the file, or what is there of it, does not hold."""

@@ -1,0 +1,212 @@
+"""Writes the HDF5 schema of athcodec (see sources/hdf5.py), frame block by frame block.
+
+The file is written under another name in the same directory and takes its own name when it is complete, so a
+reader never sees half a clip and a failure leaves what was there before. It does not compute anything but
+branch_order.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
+from ..errors import ClipError
+from ..hierarchy import branch_orders
+
+CHUNK_BYTES = 1 << 20
+
+
+class Hdf5Writer:
+    """Writes one clip whose frames are added in order; use it in a `with` statement.
+
+    path           the file to write; an existing file is replaced when the new one is complete
+    time           (T,) seconds: says how many frames must be added
+    vertex_branch  (N,) and branch_parent (B,), as in MotionClip
+    rest           (N, 3), written in its own dtype
+    dtype          of the positions, float32 or float64
+    stem_index, edges, faces, attributes, metadata: as in MotionClip, or None
+    gzip           compress without loss: smaller and slower
+
+    Raises ClipError for arrays that make no clip and OSError where the file cannot be written; no file is
+    left then.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        *,
+        time: np.ndarray,
+        vertex_branch: np.ndarray,
+        branch_parent: np.ndarray,
+        rest: np.ndarray,
+        dtype: Any = np.float32,
+        stem_index: np.ndarray | None = None,
+        edges: np.ndarray | None = None,
+        faces: np.ndarray | None = None,
+        attributes: Mapping[str, np.ndarray] | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        gzip: bool = False,
+    ) -> None:
+        dtype, rest = np.dtype(dtype), np.asarray(rest)
+        check_float_dtype("positions", dtype)
+        check_float_dtype("rest", rest.dtype)
+        if rest.ndim != 2 or rest.shape[1] != 3:
+            raise ClipError(f"rest: got shape {rest.shape}, expected (vertices, 3)")
+        vertex_branch, branch_parent = check_branches(vertex_branch, branch_parent, len(rest))
+        time = check_time(time, len(time))
+        arrays = {
+            "time": time,
+            "rest": rest,
+            "vertex_branch": vertex_branch,
+            "branch_parent": branch_parent,
+            "branch_order": branch_orders(branch_parent),
+            "stem_index": stem_index,
+            "edges": edges,
+            "faces": faces,
+        }
+        self._frame_count, self._vertex_count = len(time), len(rest)
+        self._written, self._gzip = 0, gzip
+        self._path = os.path.realpath(path)
+        self._part = self._open()
+        try:
+            self._positions = self._create_positions(dtype)
+            self._write_arrays(arrays | _further(attributes))
+            self._write_metadata(metadata or {})
+        except BaseException:
+            self.abort()
+            raise
+
+    def __enter__(self) -> Hdf5Writer:
+        return self
+
+    def __exit__(self, exception_type: type[BaseException] | None, *details: object) -> None:
+        if exception_type is None:
+            self.close()
+        else:
+            self.abort()
+
+    def add(self, frames: np.ndarray) -> None:
+        """Append the (k, N, 3) `frames`; ClipError where their shape is another or there are too many."""
+        frames = np.asarray(frames)
+        if frames.ndim != 3 or frames.shape[1:] != (self._vertex_count, 3):
+            raise ClipError(f"frames: got shape {frames.shape}, expected (k, {self._vertex_count}, 3)")
+        stop = self._written + len(frames)
+        if stop > self._frame_count:
+            raise ClipError(f"frames: got {stop}, expected {self._frame_count}, one per time")
+        self._positions[self._written : stop] = frames
+        self._written = stop
+
+    def close(self) -> None:
+        """Complete the file and give it its name; ClipError where frames are missing. Does nothing once
+        done.
+        """
+        if self._part is None:
+            return
+        try:
+            if self._written < self._frame_count:
+                raise ClipError(f"frames: got {self._written}, expected {self._frame_count}, one per time")
+            self._file.close()
+            os.replace(self._part, self._path)
+            self._part = None
+        except BaseException:
+            self.abort()
+            raise
+
+    def abort(self) -> None:
+        """Give up: remove what has been written. Does nothing once closed."""
+        part, self._part = self._part, None
+        if part is None:
+            return
+        try:
+            self._file.close()
+        finally:
+            if os.path.exists(part):
+                os.remove(part)
+
+    def _open(self) -> str:
+        directory, name = os.path.split(self._path)
+        if not os.path.isdir(directory):
+            raise FileNotFoundError(f"{self._path}: the directory {directory} does not exist")
+        if os.path.isdir(self._path):
+            raise IsADirectoryError(f"{self._path}: is a directory, expected a file name")
+        part = os.path.join(directory, f".{name}.{secrets.token_hex(4)}.part")
+        self._file = h5py.File(part, "x")
+        return part
+
+    def _create_positions(self, dtype: np.dtype) -> h5py.Dataset:
+        shape = (self._frame_count, self._vertex_count, 3)
+        options = self._compression()
+        if options:
+            vertices = min(self._vertex_count, max(1, CHUNK_BYTES // (3 * dtype.itemsize)))
+            frames = min(self._frame_count, max(1, CHUNK_BYTES // (3 * dtype.itemsize * vertices)))
+            options["chunks"] = (frames, vertices, 3)
+        return self._file.create_dataset("positions", shape, dtype, **options)
+
+    def _write_arrays(self, arrays: Mapping[str, np.ndarray | None]) -> None:
+        for name, values in arrays.items():
+            if values is not None:
+                values = np.asarray(values)
+                options = self._compression() if values.ndim and values.size else {}
+                self._file.create_dataset(name, data=values, **options)
+
+    def _write_metadata(self, metadata: Mapping[str, Any]) -> None:
+        for name, value in metadata.items():
+            self._file.attrs[name] = _attribute(value)
+
+    def _compression(self) -> dict[str, Any]:
+        return {"compression": "gzip", "shuffle": True} if self._gzip else {}
+
+
+def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:
+    """Write `clip` to `path`, block by block; see Hdf5Writer.
+
+    `clip` is a MotionClip or anything with time, vertex_branch, branch_parent, rest, dtype and blocks() like
+    it; stem_index, edges, faces, attributes, metadata and rest_dtype are written where it has them.
+    """
+    optional = ("stem_index", "edges", "faces", "attributes", "metadata")
+    rest = np.asarray(clip.rest)
+    writer = Hdf5Writer(
+        path,
+        time=clip.time,
+        vertex_branch=clip.vertex_branch,
+        branch_parent=clip.branch_parent,
+        rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
+        dtype=clip.dtype,
+        gzip=gzip,
+        **{name: getattr(clip, name, None) for name in optional},
+    )
+    with writer:
+        for _, frames in clip.blocks():
+            writer.add(frames)
+
+
+def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:
+    taken = RESERVED_NAMES.intersection(attributes or {})
+    if taken:
+        raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    return dict(attributes or {})
+
+
+def _attribute(value: Any) -> Any:
+    """`value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
+    text.
+    """
+    if value is None:
+        return h5py.Empty("f4")
+    if not isinstance(value, (list, tuple)):
+        return json.dumps(value) if isinstance(value, dict) else value
+    if value and all(isinstance(item, str) for item in value):
+        return np.array(value, dtype=h5py.string_dtype())
+    try:
+        array = np.array(value)
+    except ValueError:
+        return json.dumps(value)
+    return array if array.dtype.kind in "biuf" else json.dumps(value)

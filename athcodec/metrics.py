@@ -1,0 +1,136 @@
+"""How far decoded motion is from its source: maximum, RMS, Karni-Gotsman and motion-normalised error.
+
+Streams over blocks of frames in float64, so clips larger than memory can be measured. The Karni-Gotsman error
+is that of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. It judges
+positions only: no normals, no perception.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+import numpy as np
+
+from .clip import MotionClip
+from .errors import ClipError
+
+_SLICE_VALUES = 1 << 20
+
+
+class ErrorMeter:
+    """Adds up the difference between reference and decoded positions, block by block.
+
+    `rest` (N, 3) is the rest pose that motion_normalised_error needs; without it that one is not available.
+    Lengths are in the unit of the positions; frames are counted in the order in which they are added. A
+    decoded NaN counts as infinitely far off.
+    """
+
+    def __init__(self, rest: np.ndarray | None = None) -> None:
+        self.max_error = 0.0
+        self.worst_frame = 0
+        self.worst_vertex = 0
+        self.frame_count = 0
+        self._rest = None if rest is None else np.asarray(rest, np.float64)
+        self._points = 0
+        self._error_square = self._spread_square = self._motion_square = 0.0
+        self._low = np.full(3, inf)
+        self._high = np.full(3, -inf)
+
+    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        """Add the next frames: two (k, N, 3) arrays of any float dtype; ValueError where their shapes
+        differ.
+        """
+        reference, decoded = np.asarray(reference), np.asarray(decoded)
+        if reference.shape != decoded.shape or reference.ndim != 3 or reference.shape[2] != 3:
+            shapes = f"{reference.shape} and {decoded.shape}"
+            raise ValueError(f"blocks: got shapes {shapes}, expected two equal ones (k, N, 3)")
+        length = max(1, _SLICE_VALUES // max(1, reference.shape[1] * 3))
+        for start in range(0, len(reference), length):
+            part = slice(start, start + length)
+            self._add(reference[part].astype(np.float64), decoded[part].astype(np.float64))
+
+    def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        square = ((reference - decoded) ** 2).sum(axis=2)
+        square[np.isnan(square)] = inf
+        frame, vertex = np.unravel_index(square.argmax(), square.shape)
+        if sqrt(square[frame, vertex]) > self.max_error:
+            self.max_error = sqrt(square[frame, vertex])
+            self.worst_frame = self.frame_count + int(frame)
+            self.worst_vertex = int(vertex)
+        self._error_square += float(square.sum())
+        self._spread_square += float(((reference - reference.mean(axis=1, keepdims=True)) ** 2).sum())
+        if self._rest is not None:
+            self._motion_square += float(((reference - self._rest) ** 2).sum())
+        self._low = np.minimum(self._low, reference.min(axis=(0, 1)))
+        self._high = np.maximum(self._high, reference.max(axis=(0, 1)))
+        self._points += square.size
+        self.frame_count += len(square)
+
+    @property
+    def rms_error(self) -> float:
+        """Square root of the mean over vertices and frames of the squared Euclidean distance; 0 before any
+        block.
+        """
+        return sqrt(self._error_square / self._points) if self._points else 0.0
+
+    @property
+    def kg_error(self) -> float:
+        """Karni-Gotsman error in per cent: 100 |X - X'| / |X - E(X)|, Frobenius norms, E(X) each frame's mean
+        vertex.
+
+        Where all vertices of every frame coincide: 0 without error, else infinite.
+        """
+        return 100.0 * _ratio(self._error_square, self._spread_square)
+
+    @property
+    def motion_normalised_error(self) -> float:
+        """RMS error over the RMS distance of the reference from the rest pose; ValueError where no rest was
+        given.
+
+        Where nothing moves: 0 without error, else infinite.
+        """
+        if self._rest is None:
+            raise ValueError("motion_normalised_error: got no rest pose, expected ErrorMeter(rest)")
+        return _ratio(self._error_square, self._motion_square)
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the reference's bounding box over all frames; 0 before any block."""
+        return float(np.linalg.norm(self._high - self._low)) if self._points else 0.0
+
+
+def compare_clips(reference: MotionClip, decoded: MotionClip) -> ErrorMeter:
+    """The filled meter of two clips of equally many frames and vertices, in the same vertex order; else
+    ClipError.
+    """
+    shapes = [(clip.frame_count, clip.vertex_count) for clip in (reference, decoded)]
+    if shapes[0] != shapes[1]:
+        raise ClipError(
+            f"decoded clip: got {shapes[1]} frames and vertices, expected {shapes[0]} as in the reference"
+        )
+    meter = ErrorMeter(reference.rest)
+    for start, frames in reference.blocks():
+        meter.add(frames, decoded.block(start, start + len(frames)))
+    return meter
+
+
+def bounding_box(clip: MotionClip) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates of any vertex in any frame, two (3,) float64 arrays; one pass over the
+    clip.
+    """
+    low, high = np.full(3, inf), np.full(3, -inf)
+    for _, frames in clip.blocks():
+        low = np.minimum(low, frames.min(axis=(0, 1)))
+        high = np.maximum(high, frames.max(axis=(0, 1)))
+    return low, high
+
+
+def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:
+    """Size in bits per vertex and frame."""
+    return 8.0 * byte_count / (frame_count * vertex_count)
+
+
+def _ratio(error_square: float, reference_square: float) -> float:
+    if error_square == 0.0:
+        return 0.0
+    return sqrt(error_square / reference_square) if reference_square > 0.0 else inf

@@ -1,0 +1,89 @@
+"""Steps from an error bound: what the encoder tries, and how real numbers become the integers that a file stores.
+
+The ratios were measured on finite-element trees (spec/rationale.md): the cheapest file quantises coarser than its bound
+and corrects the few vertices that end up beyond it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec.errors import BoundError
+
+DEAD_ZONE = 0.55
+NODE_QUALITIES = (0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # step of a node's map over its own RMS error
+NODE_SHARE, NODE_BYTES = 0.046, 950  # of the file that the maps may take, whichever is more
+TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
+REST_CAP = 1.1  # rest pose step over bound: its own error stays within the bound
+CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
+ROTATION_FACTORS = (0, 1, 2, 4, 8)
+TEMPORAL_BITS = 14
+
+
+def error_limit(bound: float, diagonal: float) -> float:
+    """What decoded positions are held to: the bound less a margin for how others measure."""
+    return bound - min(1e-6 * diagonal, 0.01 * bound)
+
+
+def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> None:
+    """Raises BoundError for a bound below the spacing of the source's own numbers.
+
+    low, high: (3,) bounding box over all frames; dtype: that of the source's positions.
+    """
+    largest = float(np.abs([low, high]).max())
+    spacing = float(np.spacing(np.asarray(largest, dtype)))
+    if not (np.isfinite(bound) and bound > 2 * spacing):
+        raise BoundError(f"max error: got {bound:.3g}; expected more than {2 * spacing:.3g}, twice the spacing of the "
+                         f"source's {np.dtype(dtype).name} coordinates up to {largest:.6g}")
+
+
+def single(value: float) -> float:
+    """The value as a file stores it (float32), never 0."""
+    return float(max(np.float32(value), np.finfo(np.float32).tiny))
+
+
+def first_step_ratio(relative_bound: float) -> float:
+    """Motion step over error bound to start a search from: 4 at loose bounds, 2 at tight ones."""
+    return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [2.0, 2.6, 4.0]))
+
+
+def rest_step_ratio(relative_bound: float) -> float:
+    """Rest pose step over error bound."""
+    return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
+
+
+def learn_temporal_basis(rows: np.ndarray, tolerance: float) -> np.ndarray | None:
+    """Orthonormal rows over time that hold `rows` but for a rest below `tolerance` (mean square per row entry).
+
+    rows: (K, T) tracks in units of their steps. Returns stored integers (rank, T) int32 of TEMPORAL_BITS, or None
+    where no basis smaller than the DCT's would do.
+    """
+    frames = rows.shape[1]
+    rows = rows[(rows**2).sum(axis=1) > DEAD_ZONE**2]  # others quantise to nothing
+    if len(rows) <= 1:
+        return None
+    values, vectors = np.linalg.eigh(rows.T @ rows)
+    rest = np.cumsum(np.maximum(values, 0.0))  # ascending: what is lost by leaving out the first i + 1
+    rank = frames - int(np.searchsorted(rest, tolerance * rows.size, side="right"))
+    if not 1 <= rank <= frames // 2:
+        return None
+    basis = np.ascontiguousarray(vectors[:, ::-1][:, :rank].T)
+    return np.rint(basis * 2.0 ** (TEMPORAL_BITS - 1)).astype(np.int32)
+
+
+def temporal_basis(steps: np.ndarray, bits: int = TEMPORAL_BITS) -> np.ndarray:
+    """The rows that stored integers mean, float64."""
+    return steps.astype(np.float64) * 2.0 ** -(bits - 1)
+
+
+def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float, candidates=(0, 1)) -> int:
+    """The predictor of a stem's rest pose that leaves the least to code: see FORMAT.md, Lag. stem: (n, 3)."""
+    chain = stem if attach is None else np.vstack([attach, stem])
+
+    def cost(lag: int) -> float:
+        residual = np.diff(chain, axis=0)
+        if lag:
+            residual[lag:] = residual[lag:] - residual[:-lag]
+        return float(np.log2(1 + np.abs(residual) / step).sum())
+
+    return min(candidates, key=cost)

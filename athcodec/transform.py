@@ -1,0 +1,213 @@
+"""The motion model, forward and back: the plan of a plant (pieces, nodes, bases) and the motion of one segment.
+
+Follows FORMAT.md, "Plan" and "Reconstruction"; the arithmetic itself runs in the C core. `Plan` is what all segments
+share. `SegmentMotion` owns the integers of one segment and turns positions into them (`analyse`) or them into positions
+(`pose`). Arrays over a segment are vertex-major, (vertices, 3, frames), in file order.
+"""
+
+from __future__ import annotations
+
+from ctypes import addressof
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from athcodec import _native
+from athcodec._native import BRANCH, NODE, PIECE, Motion, Shape, Stream, address, lib
+
+MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128
+SEGMENT_BYTES = 256 << 20
+
+
+def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT) -> list[tuple[int, int]]:
+    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 256 MiB."""
+    limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
+    count = -(-frame_count // limit)
+    return [(frame_count * i // count, frame_count * (i + 1) // count) for i in range(count)]
+
+
+def cosine_basis(frames: int) -> np.ndarray:
+    """Rows of the orthonormal DCT-II, (frames, frames) float64, bit for bit those of the decoder."""
+    basis = np.empty((frames, frames))
+    lib.ath_cosine_basis(frames, basis.ctypes.data)
+    return basis
+
+
+class Plan:
+    """Pieces, nodes and bases of a plant, from its branches and decoded rest pose.
+
+    branches: (B,) of _native.BRANCH in file order. rest: (N, 3) float64, less the origin.
+    """
+
+    def __init__(self, branches: np.ndarray, vertex_count: int):
+        self.branches = branches
+        self.vertex_count = vertex_count
+        piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
+        if piece_count <= 0:
+            raise ValueError("branches do not form a hierarchy in file order")
+        node_count = lib.ath_count_nodes(address(branches, BRANCH, 1), len(branches))
+        self.pieces = np.zeros(piece_count, PIECE)
+        self.nodes = np.zeros(node_count, NODE)
+        self.shape = Shape(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
+                           node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
+                           nodes=self.nodes.ctypes.data)
+        piece_of_vertex = np.empty(vertex_count, np.int32)
+        lib.ath_plan(self.shape, self.pieces.ctypes.data, self.nodes.ctypes.data, piece_of_vertex.ctypes.data)
+        self.rest = self.bases = None
+
+    @property
+    def height(self) -> int:
+        """Depth of the deepest node; levels run from 0 to height + 1."""
+        return self.shape.height
+
+    @property
+    def level_count(self) -> int:
+        return self.height + 2
+
+    def set_rest(self, rest: np.ndarray) -> None:
+        """Builds the bases on a decoded rest pose, (N, 3) float64."""
+        vertices, pieces = self.vertex_count, len(self.pieces)
+        self.rest = np.ascontiguousarray(rest, np.float64)
+        gaps = np.empty(vertices, np.uint8)
+        table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
+        at = address(self.rest, np.float64, 3 * vertices)
+        size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
+        self.bases = np.empty(size)
+        lib.ath_basis_fill(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, self.bases.ctypes.data)
+        self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
+        lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
+
+    def has_stems(self, level: int) -> bool:
+        """Whether the level has a coefficient stream."""
+        return bool(((self.pieces["level"] == level) | (self.pieces["low_level"] == level)).any())
+
+    def has_affines(self, level: int) -> bool:
+        """Whether nodes of the level have maps of their own."""
+        return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
+
+    def affine_levels(self, level: int) -> list[int]:
+        """Levels whose maps are shown at `level`: its own, and those of leaves above that are still whole."""
+        shown = (self.nodes["coded"] == 1) & (self.nodes["level"] <= level) & (self.nodes["last"] >= level)
+        return sorted(set(self.nodes["level"][shown].tolist()))
+
+    def shown_nodes(self, level: int) -> np.ndarray:
+        """Indices of the nodes that move as one at `level`."""
+        return np.flatnonzero((self.nodes["level"] <= level) & (self.nodes["last"] >= level))
+
+    def exact_branches(self, level: int) -> np.ndarray:
+        """Branches whose stems are exact at `level`."""
+        return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
+
+
+@dataclass
+class LevelStream:
+    """How one level's integers are read: step in scene units, rotation step factor (0: no rotations), time basis."""
+
+    step: float
+    omega: float = 0.0
+    temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
+    temporal_steps: np.ndarray | None = field(default=None, repr=False)  # the same as stored integers
+
+
+class SegmentMotion:
+    """The quantised motion of one segment."""
+
+    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream]):
+        if not 1 <= frames <= MAX_SEGMENT or len(streams) != plan.level_count:
+            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {MAX_SEGMENT} frames, "
+                             f"{plan.level_count} streams")
+        self.plan, self.frames, self.streams = plan, frames, streams
+        shape = plan.shape
+        self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
+        self.tracks = np.zeros((shape.piece_count, 2, 3, frames), np.int32)
+        self.node_tracks = np.zeros((shape.node_count, 4, 3, frames), np.int32)
+        self.node_steps = np.zeros(shape.node_count, np.int32)
+        self._carriers = np.empty((max(shape.carrier_vertices, 1), 3, frames))
+        self._carrier_frames = np.empty((max(shape.carrier_pieces, 1), 12, frames))
+        self._cosines = cosine_basis(frames)
+        self._work = np.empty(lib.ath_motion_work(frames))
+        self._bind()
+
+    def _bind(self) -> None:
+        self._c_streams = (Stream * len(self.streams))()
+        self._temporal = []  # keeps what the C structs point to
+        for c_stream, stream in zip(self._c_streams, self.streams):
+            temporal = self._cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
+            self._temporal.append(temporal)
+            c_stream.step, c_stream.omega = stream.step, stream.omega
+            c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
+        self.motion = Motion(
+            frames=self.frames, streams=addressof(self._c_streams), cosines=self._cosines.ctypes.data,
+            coefficients=self.coefficients.ctypes.data, tracks=self.tracks.ctypes.data,
+            node_tracks=self.node_tracks.ctypes.data, node_steps=self.node_steps.ctypes.data,
+            carriers=self._carriers.ctypes.data, carrier_frames=self._carrier_frames.ctypes.data,
+            work=self._work.ctypes.data)
+
+    def restream(self, streams: list[LevelStream]) -> None:
+        """Clears the integers and sets how the next ones are to be read."""
+        self.streams = streams
+        for array in (self.coefficients, self.tracks, self.node_tracks, self.node_steps):
+            array.fill(0)
+        self._bind()
+
+    def analyse(self, source: np.ndarray, dead_zone: float) -> None:
+        """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
+        lib.ath_analyse(self.plan.shape, self.motion, self._source(source), dead_zone)
+
+    def analyse_nodes(self, source: np.ndarray, quality: float, dead_zone: float) -> None:
+        """Fills the maps of the nodes, after `analyse` or `pose`; `quality`: a map's step over its own RMS error."""
+        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source), quality, dead_zone)
+
+    def clear_nodes(self) -> None:
+        """Forgets the maps of the nodes."""
+        self.node_tracks.fill(0)
+        self.node_steps.fill(0)
+
+    def _source(self, source: np.ndarray) -> int:
+        return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
+
+    def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
+        """Positions at `level`, corrections not included: (N, 3, frames) float32 or float64, origin added."""
+        positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
+        lib.ath_pose(self.plan.shape, self.motion, level, address(origin, np.float64, 3),
+                     positions.dtype == np.float64, positions.ctypes.data)
+        return positions
+
+    def node_matrices(self, level: int, origin: np.ndarray) -> np.ndarray:
+        """Maps of the nodes shown at `level` from absolute rest to absolute positions, (frames, nodes, 3, 4) float64.
+
+        Needs the carriers of a `pose` at that level or deeper.
+        """
+        matrices = np.empty((max(len(self.plan.nodes), 1), 3, 4, self.frames))
+        lib.ath_node_matrices(self.plan.shape, self.motion, level, address(origin, np.float64, 3),
+                              matrices.ctypes.data)
+        return matrices[self.plan.shown_nodes(level)].transpose(3, 0, 1, 2)
+
+
+def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Source positions, (T, N, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin."""
+    frames, vertices, _ = block.shape
+    block = np.ascontiguousarray(block)
+    out = np.empty((vertices, 3, frames))
+    lib.ath_gather(vertices, frames, address(vertex_source, np.int32, vertices), block.dtype == np.float64,
+                   block.ctypes.data, address(origin, np.float64, 3), out.ctypes.data)
+    return out
+
+
+def scatter(positions: np.ndarray, vertex_source: np.ndarray, start: int, stop: int) -> np.ndarray:
+    """Frames start..stop-1 of (N, 3, T) positions as (stop - start, N, 3) in the source's order."""
+    vertices, _, frames = positions.shape
+    out = np.empty((stop - start, vertices, 3), positions.dtype)
+    lib.ath_scatter(vertices, frames, address(vertex_source, np.int32, vertices), positions.dtype == np.float64,
+                    address(positions, positions.dtype, 0), start, stop, out.ctypes.data)
+    return out
+
+
+def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray) -> tuple[float, float]:
+    """Largest distance, and sum of squared distances, of decoded positions from the source."""
+    vertices, _, frames = positions.shape
+    result = np.empty(2)
+    lib.ath_error(vertices, frames, positions.dtype == np.float64, address(positions, positions.dtype, 0),
+                  address(source, np.float64, positions.size), address(origin, np.float64, 3),
+                  result[:1].ctypes.data, result[1:].ctypes.data)
+    return float(result[0]), float(result[1])

@@ -1,0 +1,32 @@
+"""A shorter .ath file from a longer one, without decoding: the deeper levels are left out, the header says so."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from athcodec import container as ct
+from athcodec.errors import LevelUnavailable, Truncated
+from athcodec.files import new_file
+
+
+def truncate(source, target, depth: int) -> int:
+    """Writes the levels 0 to `depth` of the .ath file `source` to `target`, a complete file of its own.
+
+    Static data is kept; the new file promises the error of `depth`. Returns its size in bytes. Raises
+    LevelUnavailable, a FormatError, or OSError.
+    """
+    with open(os.fspath(source), "rb") as file:
+        container = ct.Container(file)
+        if not 0 <= depth < container.header.level_count:
+            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {container.header.level_count - 1}")
+        front, chunks = ct.truncated_front(container, depth)
+        absent = [chunk for chunk in chunks if not container.is_available(chunk)]
+        if absent:
+            raise Truncated(f"{absent[0]}: got a file of {container.available_length} bytes; expected at least "
+                            f"{absent[0].offset + absent[0].length}")
+        with new_file(Path(target)) as out:
+            out.write(front)
+            for chunk in chunks:
+                out.write(container.payload(chunk))
+            return out.tell()

@@ -1,0 +1,81 @@
+"""Lengths and file sizes as people write them: "1mm", "0.5 cm", "2e-3", "50kB", "1.5MiB". Based on the exact
+definitions of the inch (25.4 mm) and the foot (12 inches), and on IEC 80000-13 for sizes. It parses and
+converts; what a length is used for, and whether it can be kept, is decided elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from .errors import BoundError
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
+BYTES = {
+    "": 1, "B": 1,
+    "kB": 1000, "KB": 1000, "MB": 1000**2, "GB": 1000**3,
+    "KiB": 1024, "MiB": 1024**2, "GiB": 1024**3,
+}
+
+_LONG_NAMES = {
+    "metre": "m", "meter": "m", "centimetre": "cm", "centimeter": "cm", "millimetre": "mm", "millimeter": "mm",
+    "kilometre": "km", "kilometer": "km", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft",
+}
+_QUANTITY = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)\s*")
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length >= 0: `value` times `unit`, one of METRES; unit "" means scene units."""
+
+    value: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.value:g}{self.unit}"
+
+    def in_scene_units(self, scene_unit: object) -> float:
+        """The length in `scene_unit`, a clip's metadata["unit"] or None where it has none.
+
+        A length without a unit is taken as it is. Raises BoundError where it has one and the scene's is
+        missing or not known here.
+        """
+        if not self.unit:
+            return self.value
+        if scene_unit in (None, ""):
+            raise BoundError(f"length: got {self} for a clip without a unit, expected a number in scene units")
+        metres = METRES.get(unit_symbol(scene_unit))
+        if metres is None:
+            raise BoundError(
+                f"length: got {self} for a clip in {str(scene_unit)!r}, expected a clip in one of "
+                f"{', '.join(METRES)}, or a number in scene units"
+            )
+        # The quotient first: it is exactly 1 for the scene's own unit.
+        return self.value * (METRES[self.unit] / metres)
+
+
+def parse_length(text: str) -> Length:
+    """`text` as a number with or without a unit of METRES; BoundError where it is none."""
+    match = _QUANTITY.fullmatch(text)
+    if not match or match[2] not in ("", *METRES) or float(match[1]) == float("inf"):
+        raise BoundError(
+            f"length: got {text!r}, expected a number in scene units or one followed by {', '.join(METRES)}"
+        )
+    return Length(float(match[1]), match[2])
+
+
+def parse_size(text: str) -> int:
+    """`text` as whole bytes >= 1: a number, or one followed by a unit of BYTES; BoundError where it is
+    none.
+    """
+    match = _QUANTITY.fullmatch(text)
+    size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0
+    if not 1 <= size < 2**63:
+        raise BoundError(f"size: got {text!r}, expected at least one byte, such as 50000, 50kB, 1.5MB or 48KiB")
+    return int(size)
+
+
+def unit_symbol(unit: object) -> str:
+    """The symbol in METRES of a unit that metadata names in full ("Meters"), or what was given."""
+    name = str(unit).strip()
+    return _LONG_NAMES.get(name.lower().removesuffix("s"), name if name in METRES else name.lower())
