@@ -34,22 +34,23 @@ import athcodec
 from .ath import Thresholds
 from .clip import MotionClip
 from .decoder import Decoder, Depth
+from .encoder import DEFAULT_REL_ERROR, EFFORTS
 from .errors import AthError, ClipError, LevelUnavailable
 from .exporters import Hdf5Writer
 from .metrics import ErrorMeter, compare_clips
 from .transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
-from .units import Length, parse_length, parse_size
+from .units import METRES, Length, parse_length, parse_size
 
-DEFAULT_REL_ERROR = 1e-4
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""
 
 ROUNDING = 1e-6
-"""How far, relatively, two ways to add up the same error may differ."""
+"""How far, relatively, the encoder's figure of an error and that of ErrorMeter may differ."""
 
 TRACEBACK = "show the traceback of an error"
 WRITTEN = "file to write; replaced when the new one is complete"
 LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
+MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
@@ -159,8 +160,9 @@ def _demo(args: argparse.Namespace) -> int:
         Path(folder).mkdir(parents=True, exist_ok=True)
         source = athcodec.sample_path()
         encoded = Path(folder, f"{source.stem}.ath")
-        with athcodec.read_hdf5(source) as clip, _progress() as report:
-            athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
+        with athcodec.read_hdf5(source) as clip:
+            with _progress() as report:
+                athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
             with _open(encoded, strict=True) as decoder:
                 meters = [_decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
                 _print_demo(_facts(encoded, decoder), meters)
@@ -388,8 +390,8 @@ def _print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
         relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
         cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
     print(
-        f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, decoded every "
-        "depth and measured it against the source:"
+        f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
+        "decoded every depth and measured it against the source:"
     )
     _print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
     print(_size(facts))
@@ -398,20 +400,19 @@ def _print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
 def _print_verdict(result: dict[str, Any]) -> None:
     levels = result.get("depths", [])
     if levels:
-        names = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
-        columns = ["depth", *(_head(name, result["unit"]) for name in ("promised", "max", "RMS"))]
-        rows = [
-            [f"{level['depth']}", *(f"{level[name]:.4g}" for name in names), "yes" if level["kept"] else "NO"]
-            for level in levels
-        ]
-        _print_table([*columns, "KG (%)", "RMS/motion", "kept"], rows)
+        lengths = [_head(name, result["unit"]) for name in ("promised", "max", "RMS")]
+        rows = []
+        for level in levels:
+            measures = [f"{level[name]:.4g}" for name in MEASURES]
+            rows.append([f"{level['depth']}", *measures, "yes" if level["kept"] else "NO"])
+        _print_table(["depth", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
     if result["ok"]:
         more = f"; every depth is as close to {result['against']} as the file says" if levels else ""
         print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
 
 
 def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
     for index, name in enumerate(columns):
         table.add_column(Text(name), justify="right" if index else "left", no_wrap=True)
     for row in rows:
@@ -442,8 +443,8 @@ def _head(name: str, unit: Any) -> str:
 
 def _size(facts: dict[str, Any]) -> str:
     return (
-        f"{facts['bytes']:,} bytes, 1 : {facts['ratio']:.1f} of the {facts['raw_bytes']:,} bytes of the positions "
-        "as float32."
+        f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: "
+        f"{facts['ratio']:.1f} to 1."
     )
 
 
@@ -454,7 +455,7 @@ def _say(kind: str, message: str) -> None:
 def _one_line(error: Exception) -> str:
     """What went wrong, where, got, expected. An error that nobody foresaw is named by its class."""
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{os.fsdecode(error.filename)}: {error.strerror}"
+        return f"{error.filename}: {error.strerror}"
     text = " ".join(str(error).split())
     foreseen = isinstance(error, (AthError, OSError))
     return text if foreseen and text else f"{type(error).__name__}: {text} (--debug shows where)"
@@ -474,6 +475,9 @@ def _progress() -> Iterator[Report | None]:
         task = bar.add_task("", total=1.0)
 
         def report(stage: str, fraction: float) -> None:
+            # The search for a target size runs the other stages again and again: its own count is shown.
+            if bar.tasks[task].description == "size" and stage != "size":
+                return
             # Each stage counts from 0, at its own pace: the time left is that of the stage.
             if stage != bar.tasks[task].description or fraction < bar.tasks[task].completed:
                 bar.reset(task, total=1.0, description=stage)
@@ -503,8 +507,8 @@ def _parser() -> argparse.ArgumentParser:
     shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
     parser = argparse.ArgumentParser(
         prog="athcodec",
-        description="A codec for plant motion: levels of detail over the branch hierarchy, within an error bound.",
-        epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 an error or a failed check, 2 usage.",
+        description="A codec for plant motion: levels of detail over its branches, within an error bound.",
+        epilog="athcodec VERB --help explains a verb. Exit codes: 0 done, 1 error or failed check, 2 usage.",
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"athcodec {athcodec.__version__}")
@@ -531,18 +535,18 @@ def _parser() -> argparse.ArgumentParser:
         "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
     ))
     _truncate_arguments(verb("truncate", _truncate, "leave out the levels beyond a depth, without decoding"))
-    _demo_arguments(verb("demo", _demo, "encode the sample that comes with it, decode and measure every depth"))
+    _demo_arguments(verb("demo", _demo, "encode the included sample, decode and measure every depth"))
     return parser
 
 
 def _encode_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN.h5", help="HDF5: positions, time, rest, vertex_branch, branch_parent")
+    verb.add_argument("input", metavar="IN.h5", help="positions, time, rest, vertex_branch, branch_parent")
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
         "--max-error", metavar="LENGTH", type=_argument(_positive_length),
-        help="largest distance of any vertex in any frame from the source: in scene units, or 1mm, 0.5cm, 2in "
-        "(m, cm, mm, km, in, ft) where the clip says its unit",
+        help="largest distance of any vertex in any frame from the source: in scene units, or 1mm, 0.5cm, "
+        f"2in ({', '.join(METRES)}) where the clip says its unit",
     )
     bound.add_argument(
         "--rel-error", metavar="FRACTION", type=_argument(_fraction),
@@ -551,17 +555,17 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     )
     bound.add_argument(
         "--target-size", metavar="SIZE", type=_argument(parse_size),
-        help="the smallest error whose file is not larger: bytes, 50kB, 1.5MB (1 kB = 1,000 bytes), 48KiB, 2MiB",
+        help="the smallest error whose file is not larger: bytes, 50kB, 1.5MB (1 kB = 1,000 bytes), 48KiB",
     )
     verb.add_argument(
         "--segment-frames", metavar="FRAMES", type=_argument(_segment_frames),
-        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}): shorter ones "
-        "seek faster and make larger files",
+        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}); what is "
+        "decoded at once, so shorter ones seek faster and make larger files",
     )
     verb.add_argument(
         "--tam", metavar="EPS,ETA,XI,LAMBDA", type=_argument(_tam),
-        help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI lengths, "
-        "ETA frames, LAMBDA vertices (default: where the error bound allows it)",
+        help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI "
+        "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument(
@@ -569,8 +573,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",
     )
     verb.add_argument(
-        "--effort", choices=("fast", "default", "best"), default="default",
-        help="how long to look for a smaller file",
+        "--effort", choices=EFFORTS, default="default",
+        help="how long to look for a smaller file (default: default)",
     )
     verb.add_argument(
         "--rest", choices=("auto", "first", "mean"), default="auto",
@@ -591,7 +595,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--frames", metavar="A:B", type=_argument(_frame_bounds), default=(None, None),
         help="frames A to B - 1, counted from 0; A: to the end, :B from the start (default: all)",
     )
-    verb.add_argument("--gzip", action="store_true", help="compress the HDF5 file without loss: smaller and slower")
+    verb.add_argument("--gzip", action="store_true", help="compress the HDF5 file: smaller, slower, no loss")
     verb.add_argument(
         "--allow-partial", action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",

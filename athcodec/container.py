@@ -17,7 +17,7 @@ import numpy as np
 import zstandard
 
 from athcodec._native import crc32c
-from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, LimitExceeded, NotAnAthFile,
+from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, LimitExceeded, NotAnAthFile,
                              TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
@@ -474,6 +474,7 @@ def parse_corrections(data: bytes, where: str) -> tuple[float, bytes]:
 # ---- static data --------------------------------------------------------------------------------------------------
 
 _ZSTD_WINDOW = 8 << 20
+ITEM_BYTES = 1 << 20
 
 
 def _compress(array: np.ndarray) -> bytes:
@@ -506,21 +507,31 @@ def _type_of(dtype: np.dtype) -> object:
 
 
 def _dtype_from(description: object, what: str) -> np.dtype:
-    def tuples(item):
-        return [tuple(tuples(x) if isinstance(x, list) else x for x in entry) for entry in item]
+    def fields(entries):  # what JSON made lists of, as NumPy has it: (name, type) or (name, type, shape)
+        return [(tuple(name) if isinstance(name, list) else name, fields(kind) if isinstance(kind, list) else kind,
+                 *map(tuple, shape)) for name, kind, *shape in entries]
 
     try:
-        dtype = np.lib.format.descr_to_dtype(tuples(description) if isinstance(description, list) else description)
-    except (TypeError, ValueError, IndexError, KeyError):
+        dtype = np.lib.format.descr_to_dtype(fields(description) if isinstance(description, list) else description)
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError, RecursionError, SyntaxError):
         dtype = None
-    if dtype is None or dtype.hasobject or dtype.itemsize == 0 or dtype.itemsize > 1 << 20:
+    if dtype is None or dtype.hasobject or not 0 < dtype.itemsize <= ITEM_BYTES:
         raise BadChunk(f"{what}: got type {description!r}; expected plain numbers, bytes or records")
     return dtype
 
 
 def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> bytes:
-    """A named static array, any plain dtype and shape; None stores only the notes."""
-    head: dict[str, object] = dict(notes)
+    """A named static array, any plain dtype and shape; None stores only the notes.
+
+    Raises ClipError for what no reader would accept.
+    """
+    limits, head = Limits(), dict(notes)
+    if len(name.encode(errors="replace")) > limits.string_bytes:
+        raise ClipError(f"attributes: got a name of {len(name)} characters; expected at most {limits.string_bytes} bytes")
+    if array is not None and not 0 < array.dtype.itemsize <= ITEM_BYTES:
+        raise ClipError(f"array {name!r}: got items of {array.dtype.itemsize} bytes; expected 1 to {ITEM_BYTES}")
+    if array is not None and array.nbytes > limits.decoded_chunk_bytes:
+        raise ClipError(f"array {name!r}: got {array.nbytes} bytes; expected at most {limits.decoded_chunk_bytes}")
     if name:
         head["name"] = name
     if array is not None:
@@ -540,6 +551,8 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarra
     if not isinstance(shape, list) or len(shape) > 32 or not all(isinstance(n, int) and 0 <= n < 1 << 40 for n in shape):
         raise BadChunk(f"{what}: got shape {shape!r}; expected a list of sizes")
     if math.prod(shape) == 0:
+        if math.prod(n or 1 for n in shape) * dtype.itemsize > limits.decoded_chunk_bytes:
+            raise LimitExceeded(f"{what}: got shape {shape!r}; the limit is {limits.decoded_chunk_bytes} bytes")
         return head, np.zeros(shape, dtype)
     return head, _decompress(data[_ARRAY.size + length:], dtype, tuple(shape), what, limits)
 
@@ -548,14 +561,21 @@ def array_name(data: bytes, what: str, limits: Limits) -> str:
     """The name of a static array without its data."""
     (length,) = _head(_ARRAY, data, what)
     name = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what).get("name")
-    if not isinstance(name, str) or not name or len(name.encode()) > limits.string_bytes:
-        raise BadChunk(f"{what}: got name {name!r}; expected 1 to {limits.string_bytes} bytes of text")
+    if not isinstance(name, str) or not name:
+        raise BadChunk(f"{what}: got name {name!r}; expected text")
+    if len(name.encode(errors="replace")) > limits.string_bytes:
+        raise LimitExceeded(f"{what}: got a name of {len(name)} characters; the limit is {limits.string_bytes} bytes")
     return name
 
 
 def pack_metadata(metadata: dict) -> bytes:
-    """JSON, zstd-compressed where that is shorter."""
-    text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False).encode()
+    """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
+    try:
+        text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False).encode()
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ClipError(f"metadata: {error}; expected text, numbers, booleans and lists of them") from None
+    if len(text) > Limits.metadata_bytes:
+        raise ClipError(f"metadata: got {len(text)} bytes; expected at most {Limits.metadata_bytes}")
     packed = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
     return b"\1" + packed if len(packed) < len(text) else b"\0" + text
 

@@ -19,12 +19,14 @@ from athcodec import container as ct
 from athcodec import entropy
 from athcodec._native import WHOLE
 from athcodec.ath import stem_maps
+from athcodec.clip import check_stem_index
 from athcodec.container import Container, Limits
 from athcodec.errors import (BadChecksum, BadChunk, BadHeader, ClipError, LevelUnavailable, LimitExceeded,
                              Truncated)
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.transform import LevelStream, Plan, SegmentMotion, scatter
 
+INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 TABLE_KEYS = ("epsilon", "eta", "xi", "lam")
 
 
@@ -284,7 +286,8 @@ class Decoder:
     @property
     def stem_index(self) -> np.ndarray | None:
         """Place of each vertex on its stem where the source's numbering does not say it, else None."""
-        return self._source_branches[2]
+        vertex_branch, _, places = self._source_branches
+        return check_stem_index(places, vertex_branch)
 
     def _static(self, kind: int) -> tuple[dict, np.ndarray | None] | None:
         chunk = self.container.find(kind)
@@ -304,10 +307,9 @@ class Decoder:
             raise BadChunk(f"{name}: got {array.dtype} {array.shape}; expected rows of vertex numbers")
         return array
 
-    @staticmethod
-    def _derived_dtype(head: dict) -> np.dtype:
-        if head.get("derived") not in ("<i4", ">i4", "<i8", ">i8", "<u4", ">u4", "<u8", ">u8", "<i2", "<u2"):
-            raise BadChunk(f"EDGES: got {head!r}; expected an array or the type of derived edges")
+    def _derived_dtype(self, head: dict) -> np.dtype:
+        if head.get("derived") not in INTEGER_TYPES or np.iinfo(head["derived"]).max < self.vertex_count - 1:
+            raise BadChunk(f"EDGES: got {head!r}; expected an array or a type that holds derived edges")
         return np.dtype(head["derived"])
 
     @cached_property
@@ -339,6 +341,9 @@ class Decoder:
             if array is None or name in result:
                 raise BadChunk(f"{chunk}: got attribute {name!r} twice or without data")
             result[name] = array
+            total = sum(array.nbytes for array in result.values())
+            if total > self.limits.memory_bytes:
+                raise LimitExceeded(f"{chunk}: got {total} bytes of attributes; the limit is {self.limits.memory_bytes}")
         return result
 
     # ---- motion ----

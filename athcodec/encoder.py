@@ -106,7 +106,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     if target_size is not None:
         bound = _bound_for_size(job, target_size)
     else:
-        bound = max_error if max_error is not None else (rel_error or DEFAULT_REL_ERROR) * seen.diagonal
+        bound = max_error if max_error is not None else _relative_bound(rel_error or DEFAULT_REL_ERROR, job)
     with new_file(Path(path)) as out, tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         result = job.encode(bound, ct.ChunkStore(spool))
         chunks = result.store.write(out, result.header, result.errors)
@@ -128,6 +128,13 @@ def _check_options(max_error, rel_error, target_size, segment_frames, attributes
         raise ValueError(f"attributes: got {attributes!r}; expected 'all' or 'none'")
     if effort not in EFFORTS:
         raise ValueError(f"effort: got {effort!r}; expected one of {', '.join(EFFORTS)}")
+
+
+def _relative_bound(fraction: float, job: _Job) -> float:
+    """A fraction of the diagonal; where nothing has any extent, the least that the source's numbers allow."""
+    if job.seen.diagonal > 0:
+        return fraction * job.seen.diagonal
+    return 2 * qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
 
 
 def _survey_options(tam: Thresholds | None) -> dict:
@@ -159,10 +166,12 @@ class _Job:
     report: Progress
     rest: np.ndarray = field(init=False)  # (N, 3) float64, file order, less the origin
     origin: np.ndarray = field(init=False)
+    wide: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
 
     def __post_init__(self) -> None:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
+        self.wide = ~_thin_branches(self)
         self.segments = split_segments(self.clip.frame_count, self.clip.vertex_count, self.segment_frames)
 
     def source(self, segment: int) -> np.ndarray:
@@ -208,6 +217,8 @@ class _Job:
         return ct.pack_array(self.clip.edges)
 
     def _add_static(self, store: ct.ChunkStore) -> None:
+        if self.keep_static and len(self.clip.attributes) > ct.Limits.attributes:
+            raise ClipError(f"attributes: got {len(self.clip.attributes)}; expected at most {ct.Limits.attributes}")
         if self.keep_static:
             for name, array in self.clip.attributes.items():
                 store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
@@ -268,7 +279,7 @@ class _Shape:
 def _lags(job: _Job, settings: Settings) -> np.ndarray:
     hierarchy = job.hierarchy
     lags = np.ones(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(settings.sheet):
+    for b in np.flatnonzero(job.wide):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         candidates = range(min(int(count), 40))
@@ -418,14 +429,13 @@ class _Search:
         relative = bound / job.seen.diagonal if job.seen.diagonal > 0 else 1e-4
         step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
         self.levels = ath.height + 2
-        self.thin = _thin_branches(job)
         self.sample = job.source(len(job.segments) // 2)
-        self.start = Settings(bound, limit, qz.single(step), qz.single(rest_step), ~self.thin,
+        self.start = Settings(bound, limit, qz.single(step), qz.single(rest_step), job.wide,
                               _loose_branches(job, self.sample), (0,) * self.levels, (False,) * self.levels)
 
     def best(self) -> Settings:
         report = self.job.report
-        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_steps]
+        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_steps]
         if self.job.effort == "fast":
             steps = [self._with_rotations]
         elif self.job.effort == "best":
@@ -440,7 +450,10 @@ class _Search:
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, bytes per level in the sample) at these settings."""
         shape = _Shape(self.job, self.ath, settings)
-        coded = _code_stems(shape, settings, self.sample)
+        try:
+            coded = _code_stems(shape, settings, self.sample)
+        except BoundError:
+            return math.inf, np.full(self.levels, math.inf)
         levels = np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level] = len(data)
@@ -462,13 +475,14 @@ class _Search:
             return list(pool.map(self.cost, candidates))
 
     def _with_basis(self, settings: Settings) -> Settings:
-        branches = len(self.thin)
-        none, every = np.zeros(branches, bool), np.ones(branches, bool)
-        candidates = [settings]
-        candidates += [replace(settings, sheet=sheet) for sheet in (none, every) if (sheet != settings.sheet).any()]
-        candidates += [replace(c, omega=(2,) * self.levels) for c in list(candidates)]
+        """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
+        sheets = [self.job.wide, np.zeros_like(self.job.wide), np.ones_like(self.job.wide)]
+        if not self.job.wide.any() or self.job.wide.all():
+            sheets = sheets[1:]
+        omegas = {settings.omega, (2,) * self.levels} if not any(settings.omega) else {settings.omega}
+        candidates = [replace(settings, sheet=sheet, omega=omega) for sheet in sheets for omega in sorted(omegas)]
         costs = [cost for cost, _ in self._costs(candidates)]
-        return replace(candidates[int(np.argmin(costs))], omega=(0,) * self.levels)
+        return replace(candidates[int(np.argmin(costs))], omega=settings.omega)
 
     def _with_rotations(self, settings: Settings) -> Settings:
         factors = (0, 2) if self.job.effort == "fast" else qz.ROTATION_FACTORS
@@ -499,7 +513,7 @@ class _Search:
         costs = costs_at((-1, 0, 1))
         while True:
             best = min(costs, key=costs.get)
-            wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 6]
+            wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
             if not wanted:
                 return moved(best)
             costs |= costs_at(wanted)

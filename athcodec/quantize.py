@@ -25,16 +25,18 @@ def error_limit(bound: float, diagonal: float) -> float:
     return bound - min(1e-6 * diagonal, 0.01 * bound)
 
 
-def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> None:
-    """Raises BoundError for a bound below the spacing of the source's own numbers.
+def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
+    """Twice the spacing of the source's own numbers; low, high: (3,) bounding box, dtype: of its positions."""
+    largest = np.asarray(np.abs([low, high]).max(), dtype)
+    return 2 * float(np.spacing(largest))
 
-    low, high: (3,) bounding box over all frames; dtype: that of the source's positions.
-    """
-    largest = float(np.abs([low, high]).max())
-    spacing = float(np.spacing(np.asarray(largest, dtype)))
-    if not (np.isfinite(bound) and bound > 2 * spacing):
-        raise BoundError(f"max error: got {bound:.3g}; expected more than {2 * spacing:.3g}, twice the spacing of the "
-                         f"source's {np.dtype(dtype).name} coordinates up to {largest:.6g}")
+
+def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> None:
+    """Raises BoundError for a bound that is not above least_bound."""
+    least = least_bound(low, high, dtype)
+    if not (np.isfinite(bound) and bound > least):
+        raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, twice the spacing of the "
+                         f"source's {np.dtype(dtype).name} coordinates")
 
 
 def single(value: float) -> float:

@@ -18,8 +18,9 @@ BYTES = {
 }
 
 _LONG_NAMES = {
-    "metre": "m", "meter": "m", "centimetre": "cm", "centimeter": "cm", "millimetre": "mm", "millimeter": "mm",
-    "kilometre": "km", "kilometer": "km", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft",
+    "metre": "m", "meter": "m", "centimetre": "cm", "centimeter": "cm",
+    "millimetre": "mm", "millimeter": "mm", "kilometre": "km", "kilometer": "km",
+    "inch": "in", "inche": "in", "foot": "ft", "feet": "ft",
 }
 _QUANTITY = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)\s*")
 
@@ -43,12 +44,12 @@ class Length:
         if not self.unit:
             return self.value
         if scene_unit in (None, ""):
-            raise BoundError(f"length: got {self} for a clip without a unit, expected a number in scene units")
+            raise BoundError(f"length: got {self} for a clip without a unit, expected a plain number")
         metres = METRES.get(unit_symbol(scene_unit))
         if metres is None:
             raise BoundError(
                 f"length: got {self} for a clip in {str(scene_unit)!r}, expected a clip in one of "
-                f"{', '.join(METRES)}, or a number in scene units"
+                f"{', '.join(METRES)}, or a plain number"
             )
         # The quotient first: it is exactly 1 for the scene's own unit.
         return self.value * (METRES[self.unit] / metres)
@@ -71,7 +72,7 @@ def parse_size(text: str) -> int:
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0
     if not 1 <= size < 2**63:
-        raise BoundError(f"size: got {text!r}, expected at least one byte, such as 50000, 50kB, 1.5MB or 48KiB")
+        raise BoundError(f"size: got {text!r}, expected bytes, at least one: 50000, 50kB, 1.5MB or 48KiB")
     return int(size)
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import athcodec
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
+from plants import awkward, plant
 
 
 @pytest.fixture
@@ -39,3 +41,61 @@ def forked():
 @pytest.fixture
 def forked_clip(forked):
     return MotionClip(**forked)
+
+
+@pytest.fixture(scope="session")
+def scratch(tmp_path_factory):
+    """A folder for files that tests overwrite at will."""
+    return tmp_path_factory.mktemp("scratch")
+
+
+@pytest.fixture(scope="session")
+def sample_positions():
+    """(120, N, 3) float32, the motion of the sample."""
+    with read_hdf5(sample_path()) as clip:
+        return clip.block(0, clip.frame_count)
+
+
+@pytest.fixture(scope="session")
+def sample_ath(tmp_path_factory):
+    """The sample at the default bound in three segments, coded once for all tests."""
+    path = tmp_path_factory.mktemp("sample") / "sample.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, path, segment_frames=40, effort="fast")
+    return path
+
+
+@pytest.fixture(scope="session")
+def bushy_clip():
+    """A random plant of 25 branches on two roots, numbered at random, that sways for 50 frames."""
+    return awkward(seed=5, branches=25, longest=9, frames=50, roots=2, shape="stem", motion="sway", shuffled=True)
+
+
+@pytest.fixture(scope="session")
+def bushy_ath(bushy_clip, tmp_path_factory):
+    """The bushy clip in four segments."""
+    path = tmp_path_factory.mktemp("bushy") / "bushy.ath"
+    athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, effort="fast")
+    return path
+
+
+@pytest.fixture(scope="session")
+def full_clip():
+    """A small clip that needs every kind of chunk: 20 frames of five branches with all sorts of static data."""
+    clip = plant(seed=11, branches=5, longest=4, frames=20, rough=0.02)
+    count = clip.vertex_count
+    clip.faces = np.array([[0, 1, 2], [2, 1, 3]], np.uint16)
+    clip.edges = np.array([[0, 1], [count - 1, 0]], np.int64)
+    clip.attributes = {"radius": np.linspace(1, 2, count, dtype=np.float32), "species": np.array([b"oak", b"elm"])}
+    clip.metadata = {"unit": "m", "up_axis": "y", "note": "wind from the west, wind from the west, wind from the west"}
+    clip.time = clip.time + np.linspace(0, 1, 20) ** 3 * 0.01
+    clip.check()
+    return clip
+
+
+@pytest.fixture(scope="session")
+def full_ath(full_clip, tmp_path_factory):
+    """The full clip in two segments."""
+    path = tmp_path_factory.mktemp("full") / "full.ath"
+    athcodec.encode(full_clip, path, rel_error=1e-3, segment_frames=16, effort="fast")
+    return path

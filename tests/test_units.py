@@ -45,7 +45,9 @@ def test_a_unit_needs_a_clip_that_says_its_own(scene_unit, message):
         parse_length("1mm").in_scene_units(scene_unit)
 
 
-@pytest.mark.parametrize("text", ["", "mm", "1e", "-1mm", "1 mm 2", "1yd", "1MM", "nan", "inf", "1e999", "1,5mm"])
+@pytest.mark.parametrize(
+    "text", ["", "mm", "1e", "-1mm", "1 mm 2", "1yd", "1MM", "nan", "inf", "1e999", "1,5mm"]
+)
 def test_what_is_no_length_is_refused_as_it_was_written(text):
     with pytest.raises(BoundError, match=r"length: got '" + text):
         parse_length(text)

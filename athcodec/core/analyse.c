@@ -6,23 +6,22 @@ enum { KABSCH_ITERATIONS = 40 };
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
-/* Uniform quantiser with a dead zone: zero below dead_zone * step, rounding biased towards zero by as much. */
-static int32_t quantise(double value, double step, double dead_zone)
+/* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
+static int32_t quantise(double value, double dead_zone)
 {
-    double units = absolute(value) / step + (1.0 - dead_zone);
-    int32_t magnitude = units < 1.0 ? 0 : units > 1073741823.0 ? 1073741823 : (int32_t)units;
+    double units = absolute(value) + (1.0 - dead_zone);
+    int32_t magnitude = units >= 1.0 ? units > 1073741823.0 ? 1073741823 : (int32_t)units : 0;
     return value < 0.0 ? -magnitude : magnitude;
 }
 
-/* Transforms one axis over time and quantises it. A row whose length is below the dead zone has no coefficient
- * beyond it, so the transform is left out. */
-ATH_HOT static void forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
-                                     const double *row, int32_t *quantised)
+/* Transforms one axis over time into units of `step`. A row whose length is below the dead zone has no coefficient
+ * beyond it, so the transform is left out; returns 0 then. */
+ATH_HOT static int forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
+                                    const double *row, double *units)
 {
-    double length2 = 0.0;
+    double length2 = 0.0, inverse = 1.0 / step;
     for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
-    memset(quantised, 0, (size_t)T * sizeof *quantised);
-    if (!(length2 > dead_zone * step * dead_zone * step * 0.9)) return;
+    if (!(length2 > dead_zone * step * dead_zone * step * 0.9)) return 0;
     for (int32_t k = 0; k < stream->temporal_rank; k++) {
         const double *wave = stream->temporal + (size_t)k * (size_t)T;
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0, sum3 = 0.0;
@@ -34,17 +33,47 @@ ATH_HOT static void forward_temporal(const ath_stream *stream, int32_t T, double
             sum3 += wave[t + 3] * row[t + 3];
         }
         for (; t < T; t++) sum0 += wave[t] * row[t];
-        quantised[k] = quantise((sum0 + sum1) + (sum2 + sum3), step, dead_zone);
+        units[k] = ((sum0 + sum1) + (sum2 + sum3)) * inverse;
     }
+    return 1;
 }
 
+/* How many integers near (axis, k) are not zero. */
+static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank, int32_t axis, int32_t k)
+{
+    int32_t count = 0;
+    for (int32_t a = 0; a < 3; a++)
+        for (int32_t j = ath_max(k - 2, 0); j <= ath_min(k + 2, rank - 1); j++)
+            count += quantised[a * T + j] != 0 && (a != axis || j != k);
+    return count;
+}
+
+/* A lone 1 costs many bits and removes little error: it must be larger than one in company. */
+static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], int32_t *quantised)
+{
+    static const double least[2] = {1.1, 0.9};
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = rank - 1; k >= 0; k--) {
+            int32_t *q = quantised + axis * T + k;
+            if (*q != 1 && *q != -1) continue;
+            int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
+            if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
+        }
+}
+
+/* Quantises a track of three axes and replaces it by what the decoder will have. */
 static void code_track(const ath_stream *stream, int32_t T, double step, double dead_zone, double *track,
                        int32_t *quantised)
 {
-    for (int32_t axis = 0; axis < 3; axis++) {
-        forward_temporal(stream, T, step, dead_zone, track + axis * T, quantised + axis * T);
+    double units[3][ATH_SEGMENT_FRAMES];
+    memset(quantised, 0, 3 * (size_t)T * sizeof *quantised);
+    for (int32_t axis = 0; axis < 3; axis++)
+        if (forward_temporal(stream, T, step, dead_zone, track + axis * T, units[axis]))
+            for (int32_t k = 0; k < stream->temporal_rank; k++)
+                quantised[axis * T + k] = quantise(units[axis][k], dead_zone);
+    drop_lone_ones(T, stream->temporal_rank, units, quantised);
+    for (int32_t axis = 0; axis < 3; axis++)
         ath_inverse_temporal(stream, T, step, quantised + axis * T, track + axis * T);
-    }
 }
 
 /* out = R^T (x - c) */
@@ -180,7 +209,7 @@ static void analyse_piece(const ath_shape *shape, const ath_motion *motion, int3
     project(shape, T, piece, local, scratch->rows);
     for (int32_t m = 0; m < piece->rank; m++) {
         const ath_stream *stream = m < piece->low_modes ? base : motion->streams + piece->level;
-        code_track(stream, T, stream->step, dead_zone, scratch->rows + (size_t)m * 3 * (size_t)T,
+        code_track(stream, T, ath_mode_step(motion, piece, m), dead_zone, scratch->rows + (size_t)m * 3 * (size_t)T,
                    ath_coefficients_of(motion, piece->first + m));
     }
     ath_place(shape, motion, piece, scratch);

@@ -196,7 +196,7 @@ static void piece_gaps(const ath_piece *piece, const double *rest, uint8_t *gaps
     }
     for (int32_t i = 0; i < piece->count; i++) {
         double quarters = total > 0.0 ? 4.0 * length[i] * (double)piece->count / total + 0.5 : 4.0;
-        gaps[i] = (uint8_t)(quarters < 1.0 ? 1 : quarters >= 64.0 ? 64 : (int32_t)quarters);
+        gaps[i] = (uint8_t)(quarters >= 64.0 ? 64 : quarters >= 1.0 ? (int32_t)quarters : 1);
     }
 }
 

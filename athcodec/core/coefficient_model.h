@@ -110,9 +110,10 @@ static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t fram
         }
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t *own = row + axis * frames;
-            uint32_t near = 2 * magnitude_at(own, frames, k - 1) + magnitude_at(own, frames, k - 2);
+            uint32_t near = 2 * magnitude_at(own, frames, k - 1) + magnitude_at(own, frames, k - 2)
+                            + magnitude_at(own, frames, k - 3);
             uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
-            own[k] = code_signed(coder, &model->number, (near * 10 + before * 3 + over + around * 6) / 16, own[k]);
+            own[k] = code_signed(coder, &model->number, (near * 16 + before * 2 + over + around * 8) / 16, own[k]);
             beside += clipped(own[k]);
         }
     }

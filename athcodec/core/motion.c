@@ -46,6 +46,11 @@ ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const doubl
         double ux = r0 * tangent[0] + r1 * tangent[1] + r2 * tangent[2];
         double uy = r3 * tangent[0] + r4 * tangent[1] + r5 * tangent[2];
         double uz = r6 * tangent[0] + r7 * tangent[1] + r8 * tangent[2];
+        double u2 = ux * ux + uy * uy + uz * uz; /* 1 but for rounding, which must not grow along a chain */
+        double straighten = 1.0 / ath_sqrt(u2 > 1e-200 ? u2 : 1.0);
+        ux = ux * straighten;
+        uy = uy * straighten;
+        uz = uz * straighten;
         double vx = to[t] - from[t], vy = to[T + t] - from[T + t], vz = to[2 * T + t] - from[2 * T + t];
         double v2 = vx * vx + vy * vy + vz * vz;
         double inverse = 1.0 / ath_sqrt(v2 > 1e-200 ? v2 : 1.0);
@@ -302,7 +307,7 @@ void ath_reconstruct_modes(const ath_shape *shape, const ath_motion *motion, int
     const ath_piece *piece = shape->pieces + p;
     for (int32_t m = 0; m < piece->rank; m++) {
         const ath_stream *stream = m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->level;
-        inverse_track(stream, motion->frames, stream->step, ath_coefficients_of(motion, piece->first + m),
+        inverse_track(stream, motion->frames, ath_mode_step(motion, piece, m), ath_coefficients_of(motion, piece->first + m),
                       scratch->rows + (size_t)m * 3 * (size_t)motion->frames);
     }
 }
@@ -399,7 +404,8 @@ static void map_of_modes(const ath_shape *shape, const ath_motion *motion, const
     for (int32_t m = 0; m < ath_min(piece->low_modes, piece->rank); m++) {
         double g[3];
         affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
-        inverse_track(base, motion->frames, base->step, ath_coefficients_of(motion, piece->first + m), scratch->track);
+        inverse_track(base, motion->frames, ath_mode_step(motion, piece, m),
+                      ath_coefficients_of(motion, piece->first + m), scratch->track);
         add_outer(motion->frames, scratch->track, g, E);
     }
 }

@@ -49,6 +49,15 @@ ATH_INLINE const ath_stream *ath_base_stream(const ath_motion *motion, const ath
     return motion->streams + (piece->low_level >= 0 ? piece->low_level : piece->level);
 }
 
+/* Modes of a cantilever are quantised finer the more of the motion they carry: what the first ones get wrong, the
+ * pieces that hang on this one would have to code again. */
+ATH_INLINE double ath_mode_step(const ath_motion *motion, const ath_piece *piece, int32_t m)
+{
+    static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
+    double step = m < piece->low_modes ? ath_base_stream(motion, piece)->step : motion->streams[piece->level].step;
+    return piece->flags & ATH_SHEET ? step : step * (m < 4 ? weight[m] : 1.125);
+}
+
 ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
 
 ATH_INLINE int32_t *ath_omega_track(const ath_motion *motion, int32_t p)

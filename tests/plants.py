@@ -1,0 +1,182 @@
+"""Motion clips made for tests: plants with nasty hierarchies, shapes and motions, as plain arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec import MotionClip
+from athcodec.clip import source_stem_index
+
+
+def random_hierarchy(rng: np.random.Generator, branches: int, longest: int, roots: int = 1):
+    """(vertex_branch, branch_parent) of a random plant, stems of 1 to `longest` vertices."""
+    parent = np.array([-1 if b < roots else rng.integers(0, b) for b in range(branches)], np.int32)
+    counts = rng.integers(1, longest + 1, branches)
+    return np.repeat(np.arange(branches, dtype=np.int32), counts), parent
+
+
+def chain(branches: int, longest: int):
+    """Every branch hangs on the one before."""
+    return (np.repeat(np.arange(branches, dtype=np.int32), longest),
+            np.arange(-1, branches - 1, dtype=np.int32))
+
+
+def grow(rng: np.random.Generator, vertex_branch: np.ndarray, branch_parent: np.ndarray, wild: float = 0.3):
+    """A rest pose: stems of unit steps that bend at random and start near a vertex of their parent; (N, 3)."""
+    rest = np.zeros((len(vertex_branch), 3))
+    for branch, parent in enumerate(branch_parent):
+        mine = np.flatnonzero(vertex_branch == branch)
+        start = rest[rng.choice(np.flatnonzero(vertex_branch == parent))] if parent >= 0 else rng.normal(size=3) * branch
+        heading = rng.normal(size=3)
+        for vertex in mine:
+            heading += wild * rng.normal(size=3)
+            start = start + heading / np.linalg.norm(heading)
+            rest[vertex] = start
+    return rest
+
+
+def sway(rng: np.random.Generator, rest: np.ndarray, frames: int, amount: float = 0.2, rough: float = 0.01):
+    """Smooth swaying that grows with height, and some noise; (frames, N, 3)."""
+    t = np.linspace(0, 2 * np.pi, frames)[:, None, None]
+    size = np.ptp(rest, axis=0).max() + 1e-9
+    phase = rng.uniform(0, 6, 3)
+    lift = np.linalg.norm(rest - rest[0], axis=1)[None, :, None] / size
+    motion = amount * size * lift**2 * np.sin(t * np.array([1.0, 2.0, 3.0]) + phase + 2 * lift)
+    return rest + motion + rough * rng.normal(size=(frames, len(rest), 3))
+
+
+def plant(seed: int = 0, branches: int = 12, longest: int = 9, frames: int = 30, roots: int = 1, dtype=np.float32,
+          scale: float = 1.0, offset: float = 0.0, **motion) -> MotionClip:
+    """A random plant that sways."""
+    rng = np.random.default_rng(seed)
+    vertex_branch, branch_parent = random_hierarchy(rng, branches, longest, roots)
+    rest = grow(rng, vertex_branch, branch_parent)
+    positions = sway(rng, rest, frames, **motion)
+    return clip_of(positions * scale + offset, rest * scale + offset, vertex_branch, branch_parent, dtype)
+
+
+def clip_of(positions, rest, vertex_branch, branch_parent, dtype=np.float32, **more) -> MotionClip:
+    """Plain arrays as a clip at 30 frames a second."""
+    return MotionClip(positions=np.asarray(positions, dtype), rest=np.asarray(rest, float),
+                      time=np.arange(len(positions)) / 30, vertex_branch=vertex_branch, branch_parent=branch_parent,
+                      **more)
+
+
+def tube(rings: int, around: int, frames: int, seed: int = 0) -> MotionClip:
+    """A bark mesh: rings of vertices about a bending centre line, one stem."""
+    rng = np.random.default_rng(seed)
+    z = np.linspace(0, 10, rings)
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    offset = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1) * 0.3
+    rest = (np.stack([0 * z, 0 * z, z], 1)[:, None] + offset).reshape(-1, 3)
+    bend = 0.03 * np.sin(np.linspace(0, 6, frames) + rng.uniform(0, 6))[:, None]
+    turn = bend * z[None] * 2
+    line = np.stack([bend * z**2, 0 * turn, z + 0 * turn], -1)
+    cos, sin = np.cos(turn)[..., None], np.sin(turn)[..., None]
+    x, y, w = offset[:, 0], offset[:, 1], offset[:, 2]
+    turned = np.stack([cos * x + sin * w, y + 0 * cos, -sin * x + cos * w], -1)
+    positions = (line[:, :, None] + turned).reshape(frames, -1, 3)
+    return clip_of(positions, rest, np.zeros(len(rest), np.int32), np.array([-1], np.int32))
+
+
+SHAPES = ("stem", "point", "straight", "flat", "stuttering", "coincident")
+MOTIONS = ("static", "sway", "noise", "teleport", "mirror", "flatten", "drift", "spin")
+
+
+def awkward(seed: int, branches: int = 6, longest: int = 7, frames: int = 20, roots: int = 1, shape: str | None = None,
+            motion: str | None = None, on_first_vertex: bool = False, shuffled: bool = False, scale: float = 1.0,
+            offset: float = 0.0, dtype=np.float32, **more) -> MotionClip:
+    """A plant of degenerate stems in degenerate motion; a `shape` or `motion` of None is drawn anew for each branch or
+    clip. offset: distance from the origin in plant sizes. shuffled: vertices and branches numbered at random, with a
+    stem index that tells their order.
+    """
+    rng = np.random.default_rng(seed)
+    vertex_branch, branch_parent = random_hierarchy(rng, branches, longest, roots)
+    rest = np.zeros((len(vertex_branch), 3))
+    for branch, parent in enumerate(branch_parent):
+        mine = np.flatnonzero(vertex_branch == branch)
+        base = np.flatnonzero(vertex_branch == parent)
+        start = rest[base[0] if on_first_vertex else rng.choice(base)] if parent >= 0 else rng.normal(size=3) * branch
+        rest[mine] = start + _stem(rng, len(mine), shape or rng.choice(SHAPES))
+    positions = _moved(rng, rest, vertex_branch, branch_parent, frames, motion or rng.choice(MOTIONS))
+    rest, positions = (rest + 7 * offset) * scale, (positions + 7 * offset) * scale
+    if not shuffled:
+        return clip_of(positions, rest, vertex_branch, branch_parent, dtype, **more)
+    return _renumbered(rng, positions, rest, vertex_branch, branch_parent, dtype, more)
+
+
+def _stem(rng: np.random.Generator, count: int, shape: str) -> np.ndarray:
+    """(count, 3) from a base at the origin."""
+    steps = rng.normal(size=(count, 3)) + rng.normal(size=3)
+    if shape == "straight":
+        steps = np.abs(rng.normal(size=(count, 1))) * rng.normal(size=3)
+    elif shape == "flat":
+        steps = steps @ np.diag([1.0, 0.0, 1.0])
+    elif shape == "stuttering":
+        steps[rng.random(count) < 0.5] = 0.0
+    elif shape == "coincident":
+        steps[:] = 0.0
+    elif shape == "point":
+        steps[1:] = 0.0
+    return np.cumsum(steps, axis=0) * 0.3
+
+
+def _subtree(branch_parent: np.ndarray, root: int) -> np.ndarray:
+    """(B,) bool: the branches of a subtree, where parents have smaller numbers."""
+    inside = np.arange(len(branch_parent)) == root
+    for branch, parent in enumerate(branch_parent):
+        inside[branch] |= parent >= 0 and inside[parent]
+    return inside
+
+
+def _moved(rng, rest, vertex_branch, branch_parent, frames: int, motion: str) -> np.ndarray:
+    still = np.repeat(rest[None], frames, axis=0)
+    if motion == "static":
+        return still
+    if motion == "noise":
+        return still + 0.3 * rng.normal(size=still.shape)
+    moving = sway(rng, rest, frames, rough=1e-3)
+    some = _subtree(branch_parent, int(rng.integers(len(branch_parent))))[vertex_branch]
+    centre, later = rest[some].mean(axis=0), slice(frames // 2, None)
+    if motion == "teleport":
+        late = moving[later]
+        late[:, some] += 100 * rng.normal(size=3)
+    elif motion in ("mirror", "flatten"):
+        factor = np.array([-1.0, 1, 1]) if motion == "mirror" else np.array([1.0, 0, 1])
+        late = moving[later]
+        late[:, some] = (late[:, some] - centre) * factor + centre
+    elif motion == "drift":
+        moving += np.linspace(0, 1, frames)[:, None, None] * rng.normal(size=3) * 20
+    elif motion == "spin":
+        angle = np.linspace(0, 9, frames)
+        cos, sin, zero = np.cos(angle), np.sin(angle), 0 * angle
+        turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]]).transpose(2, 0, 1)
+        moving = moving @ turn
+    return moving
+
+
+def _renumbered(rng, positions, rest, vertex_branch, branch_parent, dtype, more) -> MotionClip:
+    vertex, branch = rng.permutation(len(rest)), rng.permutation(len(branch_parent))
+    places = source_stem_index(vertex_branch)
+    new_branch = np.argsort(branch)
+    parent = branch_parent[branch]
+    return clip_of(positions[:, vertex], rest[vertex], new_branch[vertex_branch[vertex]],
+                   np.where(parent < 0, -1, new_branch[parent]), dtype, stem_index=places[vertex], **more)
+
+
+def chain_plant(branches: int, longest: int, frames: int = 12, seed: int = 0) -> MotionClip:
+    """A chain of branches, each on the one before."""
+    rng = np.random.default_rng(seed)
+    labels, parents = chain(branches, longest)
+    rest = np.cumsum(rng.normal(size=(len(labels), 3)) * 0.1 + [0.0, 0.0, 0.3], axis=0)
+    return clip_of(sway(rng, rest, frames, rough=1e-3), rest, labels, parents)
+
+
+def bush(branches: int, longest: int = 3, frames: int = 12, seed: int = 0) -> MotionClip:
+    """Many branches on one stem."""
+    rng = np.random.default_rng(seed)
+    counts = np.append(30, rng.integers(1, longest + 1, branches - 1))
+    labels = np.repeat(np.arange(branches), counts)
+    parents = np.append(-1, np.zeros(branches - 1, int))
+    rest = grow(rng, labels, parents)
+    return clip_of(sway(rng, rest, frames, rough=1e-3), rest, labels, parents)

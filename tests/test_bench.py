@@ -1,0 +1,63 @@
+"""What `python -m bench` prints can be relied on: a size is printed for a file whose bound was seen to hold."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+pytestmark = pytest.mark.skipif(not (ROOT / "bench").is_dir(), reason="a source distribution comes without bench")
+
+
+def run_bench(tmp_path, *words):
+    """(printed text, contents of the JSON file) of one run on the sample."""
+    file = tmp_path / "result.json"
+    done = subprocess.run([sys.executable, "-m", "bench", *words, "--json", str(file)], cwd=ROOT, text=True,
+                          capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, json.loads(file.read_text())
+
+
+def tables_of(result):
+    return [table["rows"] for table in result["tables"]]
+
+
+def cells_of(text, title):
+    """Cells by column of the first row of a printed table."""
+    lines = text[text.index(f"### {title}"):].splitlines()
+    header, row = ([cell.strip() for cell in lines[i].strip("|").split("|")] for i in (2, 4))
+    return dict(zip(header, row, strict=True))
+
+
+def test_sizes_come_with_a_bound_that_was_measured_and_kept(tmp_path):
+    text, result = run_bench(tmp_path, "sizes", "--rel-error", "1e-3", "--effort", "fast")
+    [size], [chunks], [choices] = tables_of(result)
+    assert 0 < size["max/bound"] <= 1 and size["kept"] and result["broken"] == []
+    assert cells_of(text, "Sizes")["kept"] == "yes"
+    assert cells_of(text, "Sizes")["bytes"] == f"{size['bytes']:,}"
+    kinds = {name: value for name, value in chunks.items() if name.isupper()}
+    assert sum(kinds.values()) == size["bytes"]
+    assert chunks["AFFINES %"] == pytest.approx(100 * chunks["AFFINES"] / size["bytes"])
+    assert {"rotations", "learned"} <= choices.keys()
+
+
+def test_levels_end_within_the_bound_and_stay_closed_where_the_papers_gape(tmp_path):
+    text, result = run_bench(tmp_path, "levels", "--rel-error", "1e-3")
+    levels, gaps = tables_of(result)
+    assert levels[-1]["max"] <= 1e-3 and result["broken"] == []
+    assert [row["level"] for row in levels] == list(range(len(levels)))
+    assert cells_of(text, "Levels")["nodes"] == "1"
+    gaping = [row for row in gaps if row["joints"]]
+    assert gaping and all(row["max"] < 1e-6 < 1e-3 < row["paper max"] for row in gaping)
+
+
+def test_figures_come_with_command_versions_and_machine(tmp_path):
+    _, result = run_bench(tmp_path, "sizes", "--rel-error", "1e-2", "--effort", "fast")
+    assert result["command"].startswith("python -m bench sizes --rel-error 1e-2")
+    assert {"python", "numpy", "athcodec"} <= result["versions"].keys()
+    assert {"cpu", "cores"} <= result["machine"].keys()

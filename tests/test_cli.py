@@ -1,0 +1,410 @@
+"""What a user of the command line relies on: exit codes, one-line errors, whole files, true figures."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import cli
+from athcodec.metrics import compare_clips
+from athcodec.sources import read_hdf5, sample_path
+
+README = Path(__file__).resolve().parent.parent / "README.md"
+SAMPLE = str(sample_path())
+
+
+def run(*args) -> int:
+    return cli.main([str(arg) for arg in args])
+
+
+def spawn(*args, **options) -> subprocess.Popen:
+    command = [sys.executable, "-m", "athcodec", *map(str, args)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, **(pipes | options))
+
+
+@pytest.fixture(scope="module")
+def encoded(tmp_path_factory):
+    """The sample in four segments, within 1 mm."""
+    path = tmp_path_factory.mktemp("cli") / "tree.ath"
+    assert run("encode", SAMPLE, path, "--max-error", "1mm", "--segment-frames", 32, "--effort", "fast") == 0
+    return path
+
+
+@pytest.fixture
+def facts(encoded, capsys):
+    capsys.readouterr()
+    assert run("info", encoded, "--json") == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def cut(encoded: Path, path: Path, size: int) -> Path:
+    path.write_bytes(encoded.read_bytes()[:size])
+    return path
+
+
+def with_flipped_byte(encoded: Path, path: Path, at: int) -> Path:
+    data = bytearray(encoded.read_bytes())
+    data[at] ^= 0x10
+    path.write_bytes(data)
+    return path
+
+
+# ---- figures ----
+
+
+def test_what_was_encoded_within_1_mm_decodes_within_1_mm(encoded, tmp_path, capsys):
+    assert run("decode", encoded, tmp_path / "back.h5") == 0
+    with read_hdf5(SAMPLE) as source, read_hdf5(tmp_path / "back.h5") as back:
+        assert 0 < compare_clips(source, back).max_error <= 0.001
+        assert np.array_equal(source.time, back.time)
+        for name in ("vertex_branch", "branch_parent", "edges"):
+            assert np.array_equal(getattr(source, name), getattr(back, name))
+        assert source.metadata == back.metadata
+        assert source.attributes.keys() == back.attributes.keys()
+        assert np.array_equal(source.attributes["radius"], back.attributes["radius"])
+    assert capsys.readouterr().err == ""
+
+
+def test_info_says_as_json_what_programs_need(facts, encoded):
+    assert (facts["vertices"], facts["frames"], facts["segments"]) == (1001, 120, 4)
+    assert facts["fps"] == pytest.approx(30) and facts["nodes"] == 99
+    assert facts["bytes"] == encoded.stat().st_size and facts["complete"] is True
+    assert facts["max_error_bound"] == 0.001
+    assert [level["depth"] for level in facts["depths"]] == [0, 1, 2, 3]
+    for level in facts["depths"]:
+        assert {"depth", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
+    assert facts["depths"][-1]["max_error"] <= 0.001
+
+
+def test_the_shares_of_the_levels_are_those_of_the_files_bytes(facts, encoded):
+    sizes = [level["bytes"] for level in facts["depths"]]
+    assert [level["added_bytes"] for level in facts["depths"]][1:] == np.diff(sizes).tolist()
+    assert all(level["share"] == level["added_bytes"] / facts["bytes"] for level in facts["depths"])
+    assert facts["ratio"] == 1001 * 120 * 12 / facts["bytes"]
+
+
+def test_encode_reports_what_info_reports(tmp_path, capsys):
+    options = ["--effort", "fast", "--rel-error", "1e-3"]
+    assert run("encode", SAMPLE, tmp_path / "a.ath", *options, "--json") == 0
+    of_encode = capsys.readouterr()
+    assert run("info", tmp_path / "a.ath", "--json") == 0
+    assert json.loads(of_encode.out) == json.loads(capsys.readouterr().out)
+    assert of_encode.err == ""
+
+
+def test_info_prints_the_papers_table_and_one_row_per_level(encoded, facts, capsys):
+    assert run("info", encoded) == 0
+    out = capsys.readouterr().out
+    assert "ATH: depth 3, 99 nodes, " in out and "lambda 0" in out
+    for level in facts["depths"]:
+        cells = (level["depth"], level["nodes"], f"{level['added_bytes']:,}", f"{level['share']:.1%}")
+        assert re.search(r"^ *" + r" +".join(map(re.escape, map(str, cells))), out, re.MULTILINE)
+
+
+def test_a_file_is_not_larger_than_its_target_size(tmp_path, capsys):
+    assert run("encode", SAMPLE, tmp_path / "a.ath", "--target-size", "9kB", "--effort", "fast") == 0
+    assert 8_500 < (tmp_path / "a.ath").stat().st_size <= 9_000
+
+
+def test_without_attributes_only_the_unit_is_kept(tmp_path):
+    assert run("encode", SAMPLE, tmp_path / "a.ath", "--attributes", "none", "--effort", "fast",
+               "--rel-error", "1e-2") == 0
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert decoder.metadata == {"unit": "m", "up_axis": "y"}
+        assert decoder.edges is None and decoder.attributes == {}
+
+
+def test_an_exact_rest_pose_is_that_of_the_source_or_the_mean(tmp_path):
+    with read_hdf5(SAMPLE, rest="mean") as clip:
+        mean = clip.rest
+    options = ["--exact-rest", "--effort", "fast", "--rel-error", "1e-2"]
+    assert run("encode", SAMPLE, tmp_path / "a.ath", *options) == 0
+    assert run("encode", SAMPLE, tmp_path / "b.ath", *options, "--rest", "mean") == 0
+    with h5py.File(SAMPLE) as source, athcodec.open(tmp_path / "a.ath") as decoder:
+        assert np.array_equal(decoder.rest, source["rest"][()])
+    with athcodec.open(tmp_path / "b.ath") as decoder:
+        assert np.array_equal(decoder.rest, mean)
+
+
+def test_thresholds_of_the_paper_are_taken_in_the_units_given(tmp_path, capsys):
+    tam = ["--tam", "5cm,15,0.057,6"]
+    assert run("encode", SAMPLE, tmp_path / "a.ath", *tam, "--effort", "fast", "--rel-error", "1e-2") == 0
+    assert "epsilon 0.05, eta 15, xi 0.057, lambda 6" in capsys.readouterr().out
+
+
+def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path):
+    assert run("decode", encoded, tmp_path / "a.h5", "--depth", 1, "--frames", "20:70", "--gzip") == 0
+    with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as part:
+        assert np.array_equal(part.block(0, 50), decoder.positions(depth=1)[20:70])
+        assert np.array_equal(part.time, decoder.time[20:70])
+
+
+def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, capsys):
+    shorter = tmp_path / "a.ath"
+    assert run("truncate", encoded, shorter, "--depth", 1) == 0
+    assert shorter.stat().st_size < encoded.stat().st_size
+    assert run("verify", shorter, "--against", SAMPLE) == 0
+    with athcodec.open(encoded) as whole, athcodec.open(shorter, strict=True) as decoder:
+        assert decoder.level_count == 2
+        assert np.array_equal(decoder.positions(30), whole.positions(30, depth=1))
+
+
+def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_where_told(tmp_path, capsys):
+    assert run("demo", "--keep", tmp_path / "new") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    rows = [line.split() for line in out.splitlines() if re.match(r"\d ", line)]
+    assert [row[0] for row in rows] == ["0", "1", "2", "3"]
+    assert float(rows[-1][6]) <= 1e-4 < float(rows[0][6])
+    names = sorted(path.name for path in (tmp_path / "new").iterdir())
+    assert names == ["tree_1k_120f.ath", *(f"tree_1k_120f_level_{level}.h5" for level in range(4))]
+
+
+# ---- damaged files ----
+
+
+def test_a_cut_off_file_decodes_to_its_deepest_level_with_one_warning(encoded, facts, tmp_path, capsys):
+    part = cut(encoded, tmp_path / "cut.ath", facts["depths"][1]["bytes"] + 3000)
+    assert run("decode", part, tmp_path / "a.h5") == 0
+    warning = r"athcodec: warning: .*cut\.ath: decoded to level 1; cut off .* missing .*level 3.*\n"
+    assert re.fullmatch(warning, capsys.readouterr().err)
+    with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as clip:
+        assert np.array_equal(clip.block(0, 120), decoder.positions(depth=1))
+
+
+def test_every_cut_behind_level_0_decodes(encoded, facts, tmp_path, capsys):
+    first = facts["depths"][0]["bytes"]
+    for size in np.linspace(first, facts["bytes"] - 1, 12).astype(int):
+        part = cut(encoded, tmp_path / "cut.ath", size)
+        assert run("decode", part, tmp_path / "a.h5", "--frames", ":1") == 0
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_info_of_a_cut_off_file_says_what_is_missing(encoded, facts, tmp_path, capsys):
+    part = cut(encoded, tmp_path / "cut.ath", facts["depths"][2]["bytes"])
+    assert run("info", part, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["complete"] is False and "level 3" in found["missing"]
+    assert [level["available"] for level in found["depths"]] == [True, True, True, False]
+
+
+def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
+    assert run("verify", encoded) == 0
+    assert run("verify", encoded, "--against", SAMPLE) == 0
+    capsys.readouterr()
+    assert run("verify", encoded, "--against", SAMPLE, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is True and all(level["kept"] for level in found["depths"])
+    with athcodec.open(encoded) as decoder, read_hdf5(SAMPLE) as clip:
+        distance = np.linalg.norm(decoder.positions(depth=2) - clip.block(0, 120).astype(float), axis=2)
+    assert found["depths"][2]["max_error"] == pytest.approx(distance.max())
+    assert found["depths"][2]["rms_error"] == pytest.approx(np.sqrt((distance**2).mean()))
+
+
+@pytest.mark.parametrize("place", [0.0, 0.01, 0.1, 0.5, 0.9, 0.9999])
+def test_verify_fails_on_a_flipped_byte(encoded, facts, tmp_path, capsys, place):
+    damaged = with_flipped_byte(encoded, tmp_path / "bad.ath", int(place * facts["bytes"]))
+    assert run("verify", damaged) == 1
+    assert re.fullmatch(r"athcodec: error: .*bad\.ath: .*\n", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("missing", [1, 1000, 20_000])
+def test_verify_fails_on_a_file_that_is_cut_off(encoded, facts, tmp_path, capsys, missing):
+    part = cut(encoded, tmp_path / "cut.ath", facts["bytes"] - missing)
+    assert run("verify", part, "--json") == 1
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["ok"] is False and found["error"] in err
+
+
+def test_verify_fails_where_the_source_is_further_off_than_promised(encoded, tmp_path, capsys):
+    moved = tmp_path / "moved.h5"
+    shutil.copy(SAMPLE, moved)
+    with h5py.File(moved, "a") as file:
+        file["positions"][60, 500] += 0.002
+    assert run("verify", encoded, "--against", moved) == 1
+    out, err = capsys.readouterr()
+    assert "NO" in out and "expected at most" in err
+
+
+def test_a_damaged_level_is_an_error_unless_less_is_allowed(encoded, facts, tmp_path, capsys):
+    damaged = with_flipped_byte(encoded, tmp_path / "bad.ath", facts["depths"][2]["bytes"] - 10)
+    assert run("decode", damaged, tmp_path / "a.h5") == 1
+    assert not (tmp_path / "a.h5").exists() and "checksum" in capsys.readouterr().err
+    assert run("decode", damaged, tmp_path / "a.h5", "--allow-partial") == 0
+    assert "decoded to level 1; damaged from level 2" in capsys.readouterr().err
+
+
+# ---- errors ----
+
+USAGE = {
+    "no verb": "",
+    "unknown verb": "compress a.h5 b.ath",
+    "no output": "encode a.h5",
+    "two bounds": "encode a.h5 b.ath --max-error 1mm --rel-error 1e-4",
+    "no length": "encode a.h5 b.ath --max-error 1yd",
+    "length 0": "encode a.h5 b.ath --max-error 0mm",
+    "no fraction": "encode a.h5 b.ath --rel-error 2",
+    "no size": "encode a.h5 b.ath --target-size 5parsec",
+    "segment too long": "encode a.h5 b.ath --segment-frames 300",
+    "three thresholds": "encode a.h5 b.ath --tam 1,2,3",
+    "negative threshold": "encode a.h5 b.ath --tam 1,-2,3,4",
+    "no range": "decode a.ath b.h5 --frames 5",
+    "negative level": "decode a.ath b.h5 --depth -1",
+    "no level": "truncate a.ath b.ath",
+}
+
+
+@pytest.mark.parametrize("line", USAGE.values(), ids=USAGE)
+def test_wrong_usage_exits_with_2_and_says_how(line, capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(*line.split())
+    assert caught.value.code == 2
+    assert "usage: athcodec" in capsys.readouterr().err
+
+
+FAILURES = {
+    "missing source": ("encode nowhere.h5 OUT", "nowhere.h5: No such file"),
+    "missing file": ("decode nowhere.ath OUT", "nowhere.ath: No such file"),
+    "nothing to look at": ("info nowhere.ath", "nowhere.ath: No such file"),
+    "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
+    "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
+    "nothing to truncate": ("truncate nowhere.ath OUT --depth 0", "nowhere.ath: No such file"),
+    "no HDF5": ("encode FILE OUT", "FILE: .*expected an HDF5 file"),
+    "no .ath": ("info SOURCE", "SOURCE: .*expected"),
+    "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
+    "a folder": ("decode FILE .", "got a directory, expected a file name"),
+    "onto itself": ("truncate FILE FILE --depth 0", "FILE: is the input"),
+    "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
+    "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
+    "beyond the levels": ("decode FILE OUT --depth 4", "FILE: .*got 4.*0 to 3"),
+    "truncate beyond the levels": ("truncate FILE OUT --depth 4", "FILE: .*got 4.*0 to 3"),
+    "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
+    "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),
+}
+
+
+@pytest.mark.parametrize("line, message", FAILURES.values(), ids=FAILURES)
+def test_a_failure_is_one_line_and_leaves_no_file(encoded, tmp_path, capsys, monkeypatch, line, message):
+    monkeypatch.chdir(tmp_path)
+    before = encoded.read_bytes()
+    words = {"FILE": str(encoded), "SOURCE": SAMPLE, "OUT": "out"}
+    assert run(*(words.get(word, word) for word in line.split())) == 1
+    err = capsys.readouterr().err
+    for word, path in words.items():
+        message = message.replace(word, re.escape(path))
+    assert re.fullmatch(f"athcodec: error: .*{message}.*\n", err)
+    assert list(tmp_path.iterdir()) == [] and encoded.read_bytes() == before
+
+
+def test_a_unit_without_one_in_the_clip_is_an_error(tmp_path, capsys):
+    source = tmp_path / "plain.h5"
+    shutil.copy(SAMPLE, source)
+    with h5py.File(source, "a") as file:
+        del file.attrs["unit"]
+    assert run("encode", source, tmp_path / "a.ath", "--max-error", "1mm") == 1
+    assert "got 1mm for a clip without a unit" in capsys.readouterr().err
+    assert run("encode", source, tmp_path / "a.ath", "--max-error", "0.1", "--effort", "fast") == 0
+
+
+def test_a_failure_on_the_way_leaves_the_older_file_alone(tmp_path, capsys):
+    source, out = tmp_path / "bad.h5", tmp_path / "a.ath"
+    shutil.copy(SAMPLE, source)
+    out.write_bytes(b"older")
+    with h5py.File(source, "a") as file:
+        file["positions"][119, 7, 1] = np.nan
+    assert run("encode", source, out) == 1
+    assert re.search(r"bad\.h5: positions: frame 119, vertex 7 is \(", capsys.readouterr().err)
+    assert out.read_bytes() == b"older" and set(tmp_path.iterdir()) == {source, out}
+
+
+@pytest.mark.parametrize("line", ["--debug info none.ath", "info --debug none.ath", "info none.ath --debug"])
+def test_debug_shows_the_traceback_before_or_behind_the_verb(line, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(*line.split()) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("Traceback")
+    assert err.endswith("\nathcodec: error: none.ath: No such file or directory\n")
+
+
+def test_an_error_that_nobody_foresaw_is_one_line_too(encoded, monkeypatch, capsys):
+    monkeypatch.setattr(athcodec, "open", lambda *args, **options: 1 / 0)
+    assert run("info", encoded) == 1
+    message = "ZeroDivisionError: division by zero (--debug shows where)"
+    assert capsys.readouterr().err == f"athcodec: error: {message}\n"
+
+
+# ---- the process ----
+
+
+def test_the_module_runs_as_the_command(encoded, tmp_path):
+    process = spawn("info", encoded, "--json", cwd=tmp_path)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0 and err == "" and json.loads(out)["vertices"] == 1001
+
+
+def test_the_version_is_the_packages(capsys):
+    with pytest.raises(SystemExit) as caught:
+        run("--version")
+    assert caught.value.code == 0 and capsys.readouterr().out == f"athcodec {athcodec.__version__}\n"
+
+
+def test_a_reader_that_leaves_early_is_no_error(encoded, tmp_path):
+    process = spawn("info", encoded, cwd=tmp_path)
+    process.stdout.close()
+    assert process.wait(timeout=60) == 141
+    assert process.stderr.read() == ""
+    process.stderr.close()
+
+
+@pytest.mark.parametrize("kind, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys, kind, code):
+    def interrupt(stage, fraction):
+        if stage == "motion":
+            signal.raise_signal(kind)
+
+    monkeypatch.setattr(cli, "_progress", lambda: cli.nullcontext(interrupt))
+    try:
+        result = run("encode", SAMPLE, tmp_path / "a.ath", "--effort", "fast")
+    except SystemExit as told:
+        result = told.code
+    assert result == code and list(tmp_path.iterdir()) == [] and capsys.readouterr().err == ""
+
+
+def test_an_interrupted_decode_leaves_nothing_behind(encoded, tmp_path, monkeypatch):
+    def interrupt(stage, fraction):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_progress", lambda: cli.nullcontext(interrupt))
+    assert run("decode", encoded, tmp_path / "a.h5") == 130
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- the README ----
+
+
+def test_the_examples_of_the_readme_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(SAMPLE, "tree.h5")
+    text = README.read_text("utf-8")
+    (shell,) = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    (python,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    for line in shell.splitlines():
+        program, *args = shlex.split(line, comments=True)
+        assert program == "athcodec" and run(*args) == 0
+    names = {}
+    exec(compile(python, "README.md", "exec"), names)
+    assert names["frame"].shape == (1001, 3) and names["block"].shape == (48, 1001, 3)
+    assert names["maps"].shape[1:] == (3, 4)
