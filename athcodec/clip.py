@@ -61,6 +61,7 @@ class MotionClip:
     stem_index: np.ndarray | None = None
     resource: Any = None
     rest_dtype: np.dtype = field(init=False)
+    _checked_rest: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         if not (hasattr(self.positions, "shape") and hasattr(self.positions, "dtype")):
@@ -176,7 +177,7 @@ class MotionClip:
         if self.rest is None:
             pose = self.block(0, 1)[0] if self.rest_pose == "first" else self._mean_pose()
             self.rest_dtype = pose.dtype
-            self.rest = pose.astype(np.float64)
+            self.rest = self._checked_rest = pose.astype(np.float64)
             return
         rest = np.asarray(self.rest)
         if rest.shape != (self.vertex_count, 3):
@@ -185,8 +186,9 @@ class MotionClip:
         bad = np.flatnonzero(~np.isfinite(rest).all(axis=1))
         if bad.size:
             raise ClipError(f"rest: vertex {bad[0]} is {_point(rest[bad[0]])}, expected finite numbers")
-        self.rest_dtype = rest.dtype.newbyteorder("=")
-        self.rest = rest.astype(np.float64)
+        if self.rest is not self._checked_rest:
+            self.rest_dtype = rest.dtype.newbyteorder("=")
+        self.rest = self._checked_rest = rest.astype(np.float64)
 
     def _mean_pose(self) -> np.ndarray:
         total = np.zeros((self.vertex_count, 3))

@@ -404,12 +404,13 @@ def pack_time(time: np.ndarray) -> bytes:
     index, first = np.arange(len(time)), float(time[0])
     if len(time) > 1:
         steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
-        for step in steps:
-            if (first + index * step == time).all():
-                return _TIME_UNIFORM.pack(0, first, step)
-        for rate in {round(1 / step * 1000) / 1000 for step in steps if step > 0} - {0.0}:
-            if (first + index / rate == time).all():
-                return _TIME_UNIFORM.pack(1, first, rate)
+        with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
+            for step in steps:
+                if (first + index * step == time).all():
+                    return _TIME_UNIFORM.pack(0, first, step)
+            for rate in {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}:
+                if (first + index / rate == time).all():
+                    return _TIME_UNIFORM.pack(1, first, rate)
     return _TIME.pack(2) + _compress(np.asarray(time, "<f8"))
 
 
@@ -421,7 +422,8 @@ def parse_time(data: bytes, frame_count: int, limits: Limits) -> np.ndarray:
         _, first, step = _TIME_UNIFORM.unpack(data)
         _positive(step, "TIME step")
         index = np.arange(frame_count)
-        time = first + index * step if method == 0 else first + index / step
+        with np.errstate(over="ignore", invalid="ignore"):
+            time = first + index * step if method == 0 else first + index / step
     else:
         raise BadChunk(f"TIME: got method {method}, {len(data)} bytes; expected 0 to 2")
     if not np.isfinite(time).all() or (np.diff(time) <= 0).any():

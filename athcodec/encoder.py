@@ -79,6 +79,7 @@ class Settings:
     rest_step: float
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
+    lags: np.ndarray  # (B,) int32, file order
     omega: tuple[int, ...]
     learned: tuple[bool, ...]
     node_quality: float = qz.NODE_QUALITIES[0]
@@ -258,7 +259,7 @@ class _Shape:
         branches["attach"] = hierarchy.attach
         branches["flags"] = (SHEET * settings.sheet + WHOLE * ath.whole_branches()
                              + LOOSE * settings.loose)
-        branches["lag"] = _lags(job, settings)
+        branches["lag"] = settings.lags
         self.hierarchy_stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.plan = Plan(branches, hierarchy.vertex_count)
         self.rest_chunk = self._code_rest(job, branches, settings)
@@ -276,15 +277,14 @@ class _Shape:
         return head
 
 
-def _lags(job: _Job, settings: Settings) -> np.ndarray:
+def _lags(job: _Job, step: float) -> np.ndarray:
+    """Predictors of the rest pose, (B,): linear along beams, by trial elsewhere."""
     hierarchy = job.hierarchy
     lags = np.ones(hierarchy.branch_count, np.int32)
     for b in np.flatnonzero(job.wide):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
-        candidates = range(min(int(count), 40))
-        lags[b] = qz.rest_lag(job.rest[first: first + count], job.rest[attach] if attach >= 0 else None,
-                              settings.rest_step, candidates)
+        lags[b] = qz.rest_lag(job.rest[first: first + count], job.rest[attach] if attach >= 0 else None, step)
     return lags
 
 
@@ -431,7 +431,7 @@ class _Search:
         self.levels = ath.height + 2
         self.sample = job.source(len(job.segments) // 2)
         self.start = Settings(bound, limit, qz.single(step), qz.single(rest_step), job.wide,
-                              _loose_branches(job, self.sample), (0,) * self.levels, (False,) * self.levels)
+                              _loose_branches(job, self.sample), _lags(job, rest_step), (0,) * self.levels, (False,) * self.levels)
 
     def best(self) -> Settings:
         report = self.job.report
@@ -543,7 +543,7 @@ def _thin_branches(job: _Job) -> np.ndarray:
     steps[1:] = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     steps[first] = 0.0
     way = np.add.reduceat(steps, first)
-    return way <= 1.6 * _stem_sizes(job)
+    return way <= 1.3 * _stem_sizes(job)
 
 
 def _bound_for_size(job: _Job, target: int) -> float:

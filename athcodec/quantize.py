@@ -78,14 +78,18 @@ def temporal_basis(steps: np.ndarray, bits: int = TEMPORAL_BITS) -> np.ndarray:
     return steps.astype(np.float64) * 2.0 ** -(bits - 1)
 
 
-def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float, candidates=(0, 1)) -> int:
+LONGEST_LAG = 40
+
+
+def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
     """The predictor of a stem's rest pose that leaves the least to code: see FORMAT.md, Lag. stem: (n, 3)."""
     chain = stem if attach is None else np.vstack([attach, stem])
+    steps = np.diff(chain[:1000], axis=0)  # a sample does for long stems
 
     def cost(lag: int) -> float:
-        residual = np.diff(chain, axis=0)
+        residual = steps.copy()
         if lag:
-            residual[lag:] = residual[lag:] - residual[:-lag]
+            residual[lag:] -= steps[:-lag]
         return float(np.log2(1 + np.abs(residual) / step).sum())
 
-    return min(candidates, key=cost)
+    return min(range(min(len(steps), LONGEST_LAG)), key=cost, default=0)

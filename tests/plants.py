@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import settings
+from hypothesis import strategies as st
 
 from athcodec import MotionClip
 from athcodec.clip import source_stem_index
@@ -81,6 +83,9 @@ def tube(rings: int, around: int, frames: int, seed: int = 0) -> MotionClip:
 
 SHAPES = ("stem", "point", "straight", "flat", "stuttering", "coincident")
 MOTIONS = ("static", "sway", "noise", "teleport", "mirror", "flatten", "drift", "spin")
+
+STEADY = settings(derandomize=True, deadline=None, database=None)
+"""Hypothesis with the same examples in every run."""
 
 
 def awkward(seed: int, branches: int = 6, longest: int = 7, frames: int = 20, roots: int = 1, shape: str | None = None,
@@ -180,3 +185,17 @@ def bush(branches: int, longest: int = 3, frames: int = 12, seed: int = 0) -> Mo
     parents = np.append(-1, np.zeros(branches - 1, int))
     rest = grow(rng, labels, parents)
     return clip_of(sway(rng, rest, frames, rough=1e-3), rest, labels, parents)
+
+
+@st.composite
+def awkward_plants(draw, **fixed):
+    """`awkward` with everything drawn but what is `fixed`."""
+    branches = draw(st.integers(1, 10))
+    drawn = dict(
+        seed=draw(st.integers(0, 10**6)), branches=branches, roots=draw(st.integers(1, min(3, branches))),
+        longest=draw(st.sampled_from([1, 2, 3, 7, 70])), frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 33])),
+        shape=draw(st.sampled_from([None, *SHAPES])), motion=draw(st.sampled_from(MOTIONS)),
+        on_first_vertex=draw(st.booleans()), shuffled=draw(st.booleans()),
+        scale=draw(st.sampled_from([1e-6, 1.0, 1e6])), offset=draw(st.sampled_from([0.0, 1e3])),
+        dtype=draw(st.sampled_from([np.float32, np.float64])))
+    return awkward(**drawn | fixed)

@@ -2,7 +2,7 @@
  * decoder will have of its parent. Encoder only. */
 #include "motion.h"
 
-enum { KABSCH_ITERATIONS = 40 };
+enum { ROTATION_STEPS = 5 };
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -88,44 +88,32 @@ ATH_HOT static void into_rest_space(int32_t T, const ath_frames *at, const doubl
     }
 }
 
-static void rotate_by_quaternion(const double q[4], const double v[3], double out[3])
+/* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
+static void to_quaternion(const double R[9], double q[4])
 {
-    double tx = 2.0 * (q[2] * v[2] - q[3] * v[1]), ty = 2.0 * (q[3] * v[0] - q[1] * v[2]);
-    double tz = 2.0 * (q[1] * v[1] - q[2] * v[0]);
-    out[0] = v[0] + q[0] * tx + (q[2] * tz - q[3] * ty);
-    out[1] = v[1] + q[0] * ty + (q[3] * tx - q[1] * tz);
-    out[2] = v[2] + q[0] * tz + (q[1] * ty - q[2] * tx);
-}
-
-/* Turns the unit quaternion towards the rotation nearest to H (column k is what rest axis k became). */
-static void kabsch(const double H[9], double size2, double q[4])
-{
-    for (int32_t iteration = 0; iteration < KABSCH_ITERATIONS; iteration++) {
-        double w[3] = {0}, trace = 0.0;
-        for (int32_t k = 0; k < 3; k++) {
-            double axis[3] = {k == 0, k == 1, k == 2}, r[3], hx = H[k], hy = H[3 + k], hz = H[6 + k];
-            rotate_by_quaternion(q, axis, r);
-            w[0] += r[1] * hz - r[2] * hy;
-            w[1] += r[2] * hx - r[0] * hz;
-            w[2] += r[0] * hy - r[1] * hx;
-            trace += r[0] * hx + r[1] * hy + r[2] * hz;
-        }
-        double scale = 0.5 / (absolute(trace) + 1e-12 * size2);
-        double x = w[0] * scale, y = w[1] * scale, z = w[2] * scale;
-        double p[4] = {q[0] - x * q[1] - y * q[2] - z * q[3], q[1] + x * q[0] + y * q[3] - z * q[2],
-                       q[2] + y * q[0] + z * q[1] - x * q[3], q[3] + z * q[0] + x * q[2] - y * q[1]};
-        double unit = 1.0 / ath_sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
-        for (int32_t i = 0; i < 4; i++) q[i] = p[i] * unit;
-        if (x * x + y * y + z * z < 1e-28) break;
+    double size[4] = {1.0 + R[0] + R[4] + R[8], 1.0 + R[0] - R[4] - R[8], 1.0 - R[0] + R[4] - R[8],
+                      1.0 - R[0] - R[4] + R[8]};
+    double symmetric[6] = {R[7] - R[5], R[2] - R[6], R[3] - R[1], R[1] + R[3], R[2] + R[6], R[5] + R[7]};
+    static const int8_t row[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
+    int32_t largest = 0;
+    double p[4], length2 = 0.0, towards = 0.0;
+    for (int32_t i = 1; i < 4; i++)
+        if (size[i] > size[largest]) largest = i;
+    for (int32_t i = 0; i < 4; i++) {
+        p[i] = i == largest ? size[i] : symmetric[row[largest][i]];
+        length2 += p[i] * p[i];
+        towards += p[i] * q[i];
     }
+    double scale = (towards < 0.0 ? -1.0 : 1.0) / ath_sqrt(length2);
+    for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
 }
 
-/* The piece's own rotation against its predicted one, as omega over time, unwrapped: scratch->rows holds the vertices
- * relative to the attach point in the predicted frame. */
+/* The piece's own rotation against its predicted one, as omega over time, unwrapped. `local`: its vertices relative to
+ * the attach point, in the predicted frame. */
 static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local, double *omega)
 {
     const double *a = ath_rest_attach(shape, piece);
-    double q[4] = {1.0, 0.0, 0.0, 0.0};
+    double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     for (int32_t t = 0; t < T; t++) {
         double H[9] = {0}, size2 = 0.0;
         for (int32_t i = 0; i < piece->count; i++) {
@@ -136,14 +124,12 @@ static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece,
                 for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
             }
         }
-        for (int32_t k = 0; k < 3; k++) H[4 * k] += 1e-7 * size2;
-        if (size2 > 0.0) kabsch(H, size2, q);
-        double w = q[0];
-        if (w < -0.9) { /* beyond about 310 degrees: wind back */
+        for (int32_t k = 0; k < 9; k++) H[k] += 1e-6 * size2 * R[k];
+        for (int32_t step = 0; size2 > 0.0 && step < ROTATION_STEPS; step++) ath_turn_towards(H, size2, R);
+        to_quaternion(R, q);
+        if (q[0] < -0.9) /* beyond about 310 degrees: wind back */
             for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
-            w = q[0];
-        }
-        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = 4.0 * q[k + 1] / (1.0 + w);
+        for (int32_t k = 0; k < 3; k++) omega[k * T + t] = 4.0 * q[k + 1] / (1.0 + q[0]);
     }
 }
 

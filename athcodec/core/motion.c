@@ -2,7 +2,7 @@
  * what hangs on a piece is placed from that piece's decoded vertices, in doubles, in the order written here. */
 #include "motion.h"
 
-enum { POLAR_ITERATIONS = 8 };
+enum { POLAR_ITERATIONS = 4 };
 
 size_t ath_motion_work(int32_t frames)
 {
@@ -209,28 +209,43 @@ void ath_place(const ath_shape *shape, const ath_motion *motion, const ath_piece
     }
 }
 
-/* One step of the iteration R <- exp(omega) R, omega = sum_k R_k x H_k / (sum_k R_k . H_k + eps), towards the rotation
- * nearest to H (columns k); it needs no inverse, so flat, straight and mirrored H are harmless. */
-static void polar_step(const double H[9], double R[9], double eps)
+/* One Newton step from R towards the rotation nearest to H (column k: what rest axis k became): with C = H R', the
+ * turn omega solves (trace(C) - sym(C)) omega = axial(C). Where that matrix is not safely positive (mirrored H), a
+ * step down the gradient serves. `size2` is the scale of H. */
+void ath_turn_towards(const double H[9], double size2, double R[9])
 {
-    double w[3] = {0.0, 0.0, 0.0}, trace = 0.0;
-    for (int32_t k = 0; k < 3; k++) {
-        double rx = R[k], ry = R[3 + k], rz = R[6 + k], hx = H[k], hy = H[3 + k], hz = H[6 + k];
-        w[0] = w[0] + (ry * hz - rz * hy);
-        w[1] = w[1] + (rz * hx - rx * hz);
-        w[2] = w[2] + (rx * hy - ry * hx);
-        trace = trace + (rx * hx + ry * hy + rz * hz);
+    double C[9];
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++)
+            C[3 * i + j] = H[3 * i] * R[3 * j] + H[3 * i + 1] * R[3 * j + 1] + H[3 * i + 2] * R[3 * j + 2];
+    double wx = C[7] - C[5], wy = C[2] - C[6], wz = C[3] - C[1];
+    double a = C[4] + C[8], b = C[0] + C[8], c = C[0] + C[4];
+    double d = -0.5 * (C[1] + C[3]), e = -0.5 * (C[2] + C[6]), f = -0.5 * (C[5] + C[7]);
+    double ab = a * b - d * d, least = 1e-9 * size2;
+    double xx = b * c - f * f, xy = e * f - d * c, xz = d * f - e * b;
+    double determinant = a * xx + d * xy + e * xz;
+    double x, y, z;
+    if (a > least && ab > least * least && determinant > least * least * least) {
+        double scale = 0.25 / determinant;
+        double yy = a * c - e * e, yz = d * e - a * f;
+        x = (xx * wx + xy * wy + xz * wz) * scale;
+        y = (xy * wx + yy * wy + yz * wz) * scale;
+        z = (xz * wx + yz * wy + ab * wz) * scale;
+    } else {
+        double trace = C[0] + C[4] + C[8];
+        double scale = 0.25 / ((trace < 0.0 ? -trace : trace) + least);
+        x = wx * scale;
+        y = wy * scale;
+        z = wz * scale;
     }
-    double scale = 0.25 / ((trace < 0.0 ? -trace : trace) + eps);
-    double x = w[0] * scale, y = w[1] * scale, z = w[2] * scale;
     double n2 = x * x + y * y + z * z, unit = 1.0 / (1.0 + n2);
-    double qw = (1.0 - n2) * unit;
+    double w = (1.0 - n2) * unit;
     x = 2.0 * x * unit;
     y = 2.0 * y * unit;
     z = 2.0 * z * unit;
-    double q[9] = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - qw * z), 2.0 * (x * z + qw * y),
-                   2.0 * (x * y + qw * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - qw * x),
-                   2.0 * (x * z - qw * y), 2.0 * (y * z + qw * x), 1.0 - 2.0 * (x * x + y * y)};
+    double q[9] = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+                   2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+                   2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)};
     for (int32_t k = 0; k < 3; k++) {
         double r0 = R[k], r1 = R[3 + k], r2 = R[6 + k];
         for (int32_t i = 0; i < 3; i++) R[3 * i + k] = q[3 * i] * r0 + q[3 * i + 1] * r1 + q[3 * i + 2] * r2;
@@ -259,7 +274,7 @@ static void turn_with_sheet(const ath_shape *shape, int32_t T, const ath_piece *
             H[k] = H[k] + 0.01 * size2 * R[k];
         }
         if (size2 > 0.0)
-            for (int32_t step = 0; step < POLAR_ITERATIONS; step++) polar_step(H, R, 1e-9 * size2);
+            for (int32_t step = 0; step < POLAR_ITERATIONS; step++) ath_turn_towards(H, size2, R);
         for (int32_t k = 0; k < 9; k++) rotation[k * T + t] = R[k];
     }
 }

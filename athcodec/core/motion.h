@@ -22,6 +22,7 @@ void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piec
 void ath_inverse_temporal(const ath_stream *stream, int32_t frames, double step, const int32_t *quantised, double *row);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
+void ath_turn_towards(const double H[9], double size2, double R[9]);
 void ath_place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch);
 void ath_carry(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch);
 double ath_omega_step(const ath_shape *shape, const ath_piece *piece, const ath_stream *stream);

@@ -17,7 +17,7 @@ enum { ENCODING = 0 };
 
 typedef struct {
     number_model up, count, attach, lag, source;
-    ath_context flag[3][2], permuted;
+    ath_context flag[3][2], permuted[2];
 } hierarchy_model;
 
 static void hierarchy_model_init(hierarchy_model *model)
@@ -29,7 +29,7 @@ static void hierarchy_model_init(hierarchy_model *model)
     number_model_init(&model->source);
     for (int32_t i = 0; i < 3; i++)
         for (int32_t j = 0; j < 2; j++) context_init(&model->flag[i][j], 16384);
-    context_init(&model->permuted, 32768);
+    for (int32_t i = 0; i < 2; i++) context_init(&model->permuted[i], 32768);
 }
 
 static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
@@ -88,18 +88,57 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     return 1;
 }
 
-static int code_permutation(ath_coder *coder, hierarchy_model *model, int32_t count, int32_t *source)
+/* Source numbers in file order. `expected` is that of entry i: one more than the entry before, or where a run starts,
+ * what is stored as its start. */
+static int code_number_of(ath_coder *coder, hierarchy_model *model, int regular, int32_t expected, int32_t count,
+                          int32_t *source)
 {
-    int32_t expected = 0, identity = 1;
+    int64_t value = regular ? expected : (int64_t)expected + code_signed(coder, &model->source, 16, *source - expected);
+    if (value < 0 || value >= count) return 0;
+    *source = (int32_t)value;
+    return 1;
+}
+
+static int code_branch_numbers(ath_coder *coder, hierarchy_model *model, int32_t count, int32_t *source)
+{
+    int regular = 1;
     if (ENCODING)
-        for (int32_t i = 0; i < count; i++) identity = identity && source[i] == i;
-    identity = !coder_bit(coder, &model->permuted, !identity);
-    for (int32_t i = 0; i < count; i++) {
-        int64_t value = identity ? i : (int64_t)expected + code_signed(coder, &model->source, 16, source[i] - expected);
-        if (value < 0 || value >= count) return 0;
-        source[i] = (int32_t)value;
-        expected = source[i] + 1;
+        for (int32_t b = 0; b < count; b++) regular = regular && source[b] == b;
+    regular = !coder_bit(coder, &model->permuted[0], !regular);
+    for (int32_t b = 0; b < count; b++)
+        if (!code_number_of(coder, model, regular, b == 0 ? 0 : source[b - 1] + 1, count, source + b)) return 0;
+    return 1;
+}
+
+/* Where each stem starts in a source that is sorted by branch; `subtree` of the branches serves as memory. */
+static void expect_starts(ath_branch *branches, int32_t branch_count, const int32_t *branch_source)
+{
+    int32_t start = 0;
+    for (int32_t b = 0; b < branch_count; b++) branches[b].subtree = 0;
+    for (int32_t b = 0; b < branch_count; b++) branches[branch_source[b]].subtree = branches[b].count;
+    for (int32_t b = 0; b < branch_count; b++) {
+        int32_t count = branches[b].subtree;
+        branches[b].subtree = start;
+        start += count;
     }
+}
+
+static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t branch_count,
+                               int32_t vertex_count, const int32_t *branch_source, int32_t *source)
+{
+    int regular = 1;
+    expect_starts(branches, branch_count, branch_source);
+    if (ENCODING)
+        for (int32_t b = 0; b < branch_count; b++)
+            for (int32_t i = 0; i < branches[b].count; i++)
+                regular = regular && source[branches[b].first + i] == branches[branch_source[b]].subtree + i;
+    regular = !coder_bit(coder, &model->permuted[1], !regular);
+    for (int32_t b = 0; b < branch_count; b++)
+        for (int32_t i = 0; i < branches[b].count; i++) {
+            int32_t *entry = source + branches[b].first + i;
+            int32_t expected = i == 0 ? branches[branch_source[b]].subtree : entry[-1] + 1;
+            if (!code_number_of(coder, model, regular, expected, vertex_count, entry)) return 0;
+        }
     return 1;
 }
 
@@ -122,8 +161,8 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
         else if (!code_attach(coder, model, branches, b, &mean_attach))
             return 0;
     }
-    return code_permutation(coder, model, branch_count, branch_source)
-           && code_permutation(coder, model, vertex_count, vertex_source);
+    return code_branch_numbers(coder, model, branch_count, branch_source)
+           && code_vertex_numbers(coder, model, branches, branch_count, vertex_count, branch_source, vertex_source);
 }
 
 /* ---- rest pose ---- */

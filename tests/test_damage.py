@@ -1,0 +1,647 @@
+"""Damaged and hostile files: an error of errors.py or a played level, never a crash, a hang or a flood of memory.
+
+Damage by accident is met by the checksums. Malice repairs them: `Parts` takes a file to pieces and puts it together
+again with whatever a test has changed, checksums included.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import time
+import tracemalloc
+from dataclasses import dataclass, replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+import zstandard
+
+import athcodec
+from athcodec import container as ct
+from athcodec import errors
+from athcodec._native import crc32c
+from athcodec.container import Limits
+from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, FormatError, LevelUnavailable,
+                             LimitExceeded, NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
+
+REFUSED = (FormatError, LevelUnavailable)
+HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count segment_count "
+                 "level_count full_level_count clip_count flags max_error reserved").split()
+
+
+@dataclass
+class Parts:
+    """An .ath file in pieces."""
+
+    header: ct.Header
+    errors: np.ndarray
+    chunks: list[tuple[ct.Chunk, bytes]]
+
+    @classmethod
+    def of(cls, data: bytes) -> Parts:
+        container = ct.Container(BytesIO(data), strict=True)
+        return cls(container.header, container.errors, [(c, container.payload(c)) for c in container.chunks])
+
+    def file(self) -> bytes:
+        """The bytes of a file whose table and checksums fit its chunks."""
+        chunks = [ct.Chunk(c.kind, c.level, c.segment, len(data), crc32c(data), 0, c.clip) for c, data in self.chunks]
+        return ct.pack_front(replace(self.header), chunks, self.errors) + b"".join(data for _, data in self.chunks)
+
+    def index(self, kind: int, level: int | None = None, segment: int = 0) -> int:
+        return next(i for i, (c, _) in enumerate(self.chunks)
+                    if c.kind == kind and (level is None or (c.level, c.segment) == (level, segment)))
+
+    def payload(self, kind: int, level: int | None = None) -> bytes:
+        return self.chunks[self.index(kind, level)][1]
+
+    def with_payload(self, kind: int, data: bytes, level: int | None = None) -> bytes:
+        """The file with another content of one chunk."""
+        i = self.index(kind, level)
+        chunks = list(self.chunks)
+        chunks[i] = chunks[i][0], data
+        return Parts(self.header, self.errors, chunks).file()
+
+    def with_chunks(self, chunks: list) -> bytes:
+        return Parts(self.header, self.errors, chunks).file()
+
+
+def with_header(data: bytes, **fields) -> bytes:
+    """The file with other values in its header and a checksum that fits."""
+    values = dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data))) | fields
+    table = data[ct._HEADER.size: Parts.of(data).chunks[0][0].offset]
+    blank = ct._HEADER.pack(*(values | {"checksum": 0}).values())
+    values["checksum"] = crc32c(blank + table)
+    return ct._HEADER.pack(*values.values()) + data[ct._HEADER.size:]
+
+
+@pytest.fixture(scope="module")
+def data(full_ath) -> bytes:
+    return full_ath.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def parts(data) -> Parts:
+    return Parts.of(data)
+
+
+@pytest.fixture(scope="module")
+def played(data) -> list[np.ndarray]:
+    """Positions of every level."""
+    decoder = athcodec.open(BytesIO(data))
+    return [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+
+
+def opened(data: bytes, **options) -> athcodec.Decoder:
+    return athcodec.open(BytesIO(data), **options)
+
+
+def check(data: bytes, **options) -> None:
+    opened(data, **options).check()
+
+
+def use(data: bytes) -> bool:
+    """Asks for everything that a file may hold. Whether it answered; raises what is neither answer nor refusal."""
+    asks = [lambda d: d.check(), lambda d: d.affines(0), lambda d: d.residual(0, 0), lambda d: d.info(),
+            lambda d: d.rest, lambda d: d.vertex_branch, lambda d: d.stem_index]
+    asks += [lambda d, depth=depth: d.positions(depth=depth) for depth in range(3)]
+    asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
+    with np.errstate(all="ignore"):
+        try:
+            decoder = opened(data)
+        except REFUSED as error:
+            assert "\n" not in str(error)
+            return False
+        answered = True
+        for ask in asks:
+            try:
+                ask(decoder)
+            except REFUSED as error:
+                assert "\n" not in str(error)
+                answered = False
+            except np.linalg.LinAlgError:
+                pytest.fail("linear algebra on hostile numbers reached the caller")
+    return answered
+
+
+def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, data):
+    assert parts.file() == data and with_header(data) == data
+    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES), "the file has every kind of chunk"
+    assert use(data)
+
+
+# ---- accidents ----
+
+
+def flipped(data: bytes, place: int, bit: int = 1) -> bytes:
+    return data[:place] + bytes([data[place] ^ bit]) + data[place + 1:]
+
+
+def test_a_flipped_bit_anywhere_is_found(data):
+    rng = np.random.default_rng(0)
+    tables = Parts.of(data).chunks[0][0].offset
+    for place in [*range(0, tables, 3), *range(tables, len(data), 2)]:
+        with pytest.raises(FormatError) as caught:
+            check(flipped(data, place, 1 << rng.integers(8)))
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_every_single_flipped_bit_is_found(data):
+    for place in range(len(data)):
+        for bit in range(8):
+            with pytest.raises(FormatError):
+                check(flipped(data, place, 1 << bit))
+
+
+def test_levels_before_a_damaged_chunk_still_play(parts, data, played):
+    seen = 0
+    for chunk, payload in parts.chunks:
+        if not chunk.is_motion:
+            continue
+        broken = flipped(data, chunk.offset + len(payload) // 2)
+        with pytest.raises(BadChecksum, match=f"level {chunk.level}, segment {chunk.segment}"):
+            check(broken)
+        decoder = opened(broken, allow_partial=True)
+        assert f"damaged from level {chunk.level}" in decoder.missing
+        assert [d.available for d in decoder.depths] == [d < chunk.level for d in range(len(played))]
+        for depth in range(chunk.level):
+            assert np.array_equal(decoder.positions(depth=depth), played[depth])
+        if chunk.level > 0:
+            assert decoder.deepest == chunk.level - 1
+            assert np.array_equal(decoder.positions(), played[chunk.level - 1])
+        else:
+            with pytest.raises(FormatError):
+                decoder.positions()
+        seen += 1
+    assert seen > 8
+
+
+def test_damage_in_the_prelude_is_refused_even_when_partial_files_are_allowed(parts, data):
+    for chunk, _ in parts.chunks:
+        if chunk.kind in (ct.HIERARCHY, ct.REST, ct.TIME):
+            with pytest.raises(BadChecksum, match=ct.KIND_NAMES[chunk.kind]):
+                opened(flipped(data, chunk.offset + 3), allow_partial=True)
+
+
+def test_damaged_static_data_do_not_keep_the_motion_from_playing(parts, data, played):
+    for kind, ask in ((ct.FACES, "faces"), (ct.EDGES, "edges"), (ct.METADATA, "metadata"), (ct.ATTRIBUTE, "attributes")):
+        decoder = opened(flipped(data, parts.chunks[parts.index(kind)][0].offset + 3))
+        assert np.array_equal(decoder.positions(), played[-1])
+        with pytest.raises(BadChecksum, match=ct.KIND_NAMES[kind]):
+            getattr(decoder, ask)
+
+
+def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
+    with pytest.raises(TrailingBytes, match=f"got {len(data) + 1} bytes; expected {len(data)}"):
+        opened(data + b"\0", strict=True)
+    assert np.array_equal(opened(data + b"\0").positions(), played[-1])
+
+
+# ---- hostile headers and tables ----
+
+
+@pytest.mark.parametrize("field, value, error", [
+    ("major", 1, UnsupportedVersion), ("major", 65535, UnsupportedVersion),
+    ("file_length", 0, BadChunkTable), ("file_length", 1, BadChunkTable), ("file_length", 2**64 - 1, BadChunkTable),
+    ("chunk_count", 0, BadHeader), ("chunk_count", 1, FormatError), ("chunk_count", 2**32 - 1, LimitExceeded),
+    ("vertex_count", 0, BadHeader), ("vertex_count", 1, BadHeader), ("vertex_count", 2**32 - 1, LimitExceeded),
+    ("branch_count", 0, BadHeader), ("branch_count", 1, FormatError), ("branch_count", 2**32 - 1, LimitExceeded),
+    ("frame_count", 0, BadHeader), ("frame_count", 1, BadHeader), ("frame_count", 2**32 - 1, LimitExceeded),
+    ("segment_count", 0, BadHeader), ("segment_count", 1, FormatError), ("segment_count", 2**32 - 1, LimitExceeded),
+    ("level_count", 0, BadHeader), ("level_count", 1, FormatError), ("level_count", 255, BadHeader),
+    ("full_level_count", 0, BadHeader), ("full_level_count", 1, BadHeader), ("full_level_count", 255, BadHeader),
+    ("full_level_count", 32, BadHeader),
+    ("clip_count", 0, BadHeader), ("clip_count", 2, BadHeader), ("clip_count", 255, BadHeader),
+    ("flags", 2, BadHeader), ("flags", 255, BadHeader),
+    ("max_error", float("nan"), BadHeader), ("max_error", float("inf"), BadHeader), ("max_error", -1.0, BadHeader),
+    ("reserved", 1, BadHeader), ("reserved", 2**64 - 1, BadHeader),
+    ("magic", b"\x89ATH\n\x1a\n\n", NotAnAthFile), ("magic", bytes(8), NotAnAthFile),
+])
+def test_a_header_field_out_of_range_is_refused(field, value, error, data):
+    with pytest.raises(error) as caught:
+        check(with_header(data, **{field: value}))
+    assert "\n" not in str(caught.value) and "expected" in str(caught.value) or "limit" in str(caught.value)
+
+
+@pytest.mark.parametrize("field", ["vertex_count", "branch_count", "frame_count", "segment_count", "level_count",
+                                   "full_level_count", "chunk_count", "flags"])
+def test_header_counts_that_are_off_by_a_little_are_refused_or_play(field, data):
+    """Frame_Count 20 may become 21 without a contradiction; what comes out then is not the plant, but it comes out."""
+    value = dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data)))[field]
+    for other in {max(value + d, 0) for d in (-7, -2, -1, 1, 2, 100)}:
+        use(with_header(data, **{field: other & (255 if "level" in field or field == "flags" else 2**32 - 1)}))
+
+
+def test_a_later_minor_version_with_optional_chunks_only_still_plays(data, played):
+    assert np.array_equal(opened(with_header(data, minor=65535), strict=True).positions(), played[-1])
+
+
+def test_counts_that_need_too_much_memory_are_refused_before_anything_is_allocated(data):
+    tracemalloc.start()
+    try:
+        for fields in ({"vertex_count": 1 << 26}, {"vertex_count": 1 << 26, "branch_count": 1 << 20},
+                       {"frame_count": 1 << 20, "segment_count": 1 << 20}, {"chunk_count": 1 << 20}):
+            with pytest.raises(FormatError):
+                check(with_header(data, **fields))
+        assert tracemalloc.get_traced_memory()[1] < 40 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def unknown(kind: int, data: bytes = b"from the future") -> tuple[ct.Chunk, bytes]:
+    return ct.Chunk(kind, ct.NO_LEVEL, 0, len(data), 0), data
+
+
+@pytest.mark.parametrize("kind, at", [(0x8000 | 9, "prelude"), (0x8000 | 100, "end")])
+def test_an_unknown_optional_chunk_is_skipped(kind, at, parts, played):
+    place = parts.index(ct.AFFINES) if at == "prelude" else len(parts.chunks)
+    longer = parts.with_chunks(parts.chunks[:place] + [unknown(kind)] + parts.chunks[place:])
+    decoder = opened(longer, strict=True)
+    decoder.check()
+    assert np.array_equal(decoder.positions(), played[-1]) and set(decoder.attributes) == {"radius", "species"}
+
+
+def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp_path):
+    place = parts.index(ct.AFFINES)
+    (tmp_path / "new.ath").write_bytes(
+        parts.with_chunks(parts.chunks[:place] + [unknown(0x8009)] + parts.chunks[place:] + [unknown(0x8064)]))
+    athcodec.truncate(tmp_path / "new.ath", tmp_path / "cut.ath", 1)
+    with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
+        decoder.check()
+        assert np.array_equal(decoder.positions(), played[1])
+
+
+@pytest.mark.parametrize("kind", [7, 15, 40, 0x7FFF])
+def test_an_unknown_required_chunk_is_refused_by_its_number(kind, parts):
+    chunks = sorted([*parts.chunks, unknown(kind)], key=lambda entry: ct._order(entry[0]))
+    with pytest.raises(UnknownChunk, match=f"{kind:#06x}"):
+        opened(parts.with_chunks(chunks))
+
+
+def test_chunks_out_of_order_or_twice_are_refused(parts):
+    for i in range(len(parts.chunks) - 1):
+        chunks = list(parts.chunks)
+        chunks[i], chunks[i + 1] = chunks[i + 1], chunks[i]
+        if chunks[i][0].kind == chunks[i + 1][0].kind == ct.ATTRIBUTE:
+            continue
+        with pytest.raises(BadChunkTable, match="in file order, each once"):
+            opened(parts.with_chunks(chunks))
+        if parts.chunks[i][0].kind != ct.ATTRIBUTE:
+            with pytest.raises(BadChunkTable, match="each once"):
+                opened(parts.with_chunks(parts.chunks[: i + 1] + parts.chunks[i:]))
+
+
+@pytest.mark.parametrize("change", [{"clip": 1}, {"level": 4}, {"segment": 2}, {"level": 255}])
+def test_a_chunk_of_a_clip_level_or_segment_that_does_not_exist_is_refused(change, parts):
+    last = parts.index(ct.CORRECTIONS, 3, 1)
+    chunks = list(parts.chunks)
+    chunks[last] = replace(chunks[last][0], **change), chunks[last][1]
+    with pytest.raises(BadChunkTable):
+        opened(parts.with_chunks(chunks))
+
+
+def test_a_static_chunk_with_a_level_is_refused(parts):
+    chunks = list(parts.chunks)
+    chunks[0] = replace(chunks[0][0], level=0), chunks[0][1]
+    with pytest.raises(BadChunkTable):
+        opened(parts.with_chunks(chunks))
+
+
+def test_a_chunk_that_must_be_there_is_missed_by_name(parts, played):
+    for i, (chunk, _) in enumerate(parts.chunks):
+        shorter = parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])
+        if chunk.kind & ct.OPTIONAL or chunk.kind == ct.CORRECTIONS:
+            assert opened(shorter, strict=True).positions().shape == played[-1].shape
+        else:
+            with pytest.raises(BadChunkTable, match=f"got no {ct.KIND_NAMES[chunk.kind]}"):
+                check(shorter)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
+def test_announced_errors_must_be_lengths(value, parts, data):
+    errors_at = parts.chunks[0][0].offset - 8
+    broken = data[:errors_at] + struct.pack("<f", value) + data[errors_at + 4:]
+    front = bytearray(broken[: errors_at + 8])
+    front[12:16] = bytes(4)
+    front[12:16] = struct.pack("<I", crc32c(bytes(front)))
+    with pytest.raises(BadChunkTable, match="error table"):
+        opened(bytes(front) + broken[errors_at + 8:])
+
+
+# ---- hostile chunks ----
+
+KINDS = {name: kind for kind, name in ct.KIND_NAMES.items()}
+
+
+def mutations(rng: np.random.Generator, payload: bytes):
+    """One of several ways to spoil a chunk."""
+    way = rng.integers(5)
+    if way == 0:
+        return bytes(rng.integers(0, 256, rng.integers(0, 200), np.uint8))
+    if way == 1:
+        return payload[: rng.integers(len(payload))]
+    if way == 2:
+        return payload + bytes(rng.integers(0, 256, rng.integers(1, 9), np.uint8))
+    changed = bytearray(payload)
+    for place in rng.integers(len(payload), size=rng.integers(1, 4)):
+        changed[place] = rng.integers(256) if way == 3 else (0, 1, 0x7F, 0x80, 0xFF)[rng.integers(5)]
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_spoilt_chunk_with_a_good_checksum_is_refused_or_plays(name, parts):
+    rng = np.random.default_rng(KINDS[name])
+    slowest = 0.0
+    for _ in range(60):
+        places = [i for i, (c, _) in enumerate(parts.chunks) if c.kind == KINDS[name]]
+        i = int(rng.choice(places))
+        chunks = list(parts.chunks)
+        chunks[i] = chunks[i][0], mutations(rng, chunks[i][1])
+        start = time.perf_counter()
+        use(parts.with_chunks(chunks))
+        slowest = max(slowest, time.perf_counter() - start)
+    assert slowest < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KINDS)
+def test_many_spoilt_chunks_are_refused_or_play(name, parts):
+    rng = np.random.default_rng(100 + KINDS[name])
+    for _ in range(3000):
+        chunks = list(parts.chunks)
+        for i in [i for i, (c, _) in enumerate(parts.chunks) if c.kind == KINDS[name]]:
+            if rng.random() < 0.5:
+                chunks[i] = chunks[i][0], mutations(rng, chunks[i][1])
+        use(parts.with_chunks(chunks))
+
+
+def floats(*values: float) -> bytes:
+    return struct.pack(f"<{len(values)}f", *values)
+
+
+def doubles(*values: float) -> bytes:
+    return struct.pack(f"<{len(values)}d", *values)
+
+
+def zstd(data: bytes, **options) -> bytes:
+    return zstandard.ZstdCompressor(**options).compress(data)
+
+
+def array_chunk(head: object, body: bytes = b"") -> bytes:
+    text = head if isinstance(head, bytes) else json.dumps(head).encode()
+    return struct.pack("<H", len(text)) + text + body
+
+
+def attribute(body: bytes = b"", name: object = "a", **head: object) -> bytes:
+    return array_chunk({"name": name} | {"dtype": "<f4", "shape": [4]} | head, body)
+
+
+NESTED = "[" * 900 + "]" * 900
+
+
+@pytest.mark.parametrize("kind, spoil, error", [
+    (ct.HIERARCHY, lambda p: floats(np.nan) + p[4:], BadChunk),
+    (ct.HIERARCHY, lambda p: p[:4] + floats(-1) + p[8:], BadChunk),
+    (ct.HIERARCHY, lambda p: p[:15], BadChunk),
+    (ct.HIERARCHY, lambda p: p[:16], BadChunk),
+    (ct.HIERARCHY, lambda p: p + b"\x01", BadChunk),
+    (ct.HIERARCHY, lambda p: p + b"\x00", BadChunk),
+    (ct.REST, lambda p: b"\x02" + p[1:], BadChunk),
+    (ct.REST, lambda p: p[:1] + b"\x02" + p[2:], BadChunk),
+    (ct.REST, lambda p: p[:2] + b"\x01" + p[3:], BadChunk),
+    (ct.REST, lambda p: p[:4] + doubles(np.nan) + p[12:], BadChunk),
+    (ct.REST, lambda p: p[:28] + doubles(0.0) + p[36:], BadChunk),
+    (ct.REST, lambda p: p[:28] + doubles(-1.0) + p[36:], BadChunk),
+    (ct.REST, lambda p: p[:28] + doubles(1e308) + p[36:], BadChunk),
+    (ct.REST, lambda p: b"\x01" + p[1:36] + zstd(bytes(4)), BadChunk),
+    (ct.REST, lambda p: b"\x01" + p[1:36] + zstd(b"\xff" * 144), BadChunk),
+    (ct.REST, lambda p: p[:30], BadChunk),
+    (ct.REST, lambda p: p + b"\x07", BadChunk),
+    (ct.TIME, lambda p: b"", BadChunk),
+    (ct.TIME, lambda p: b"\x03" + p[1:], BadChunk),
+    (ct.TIME, lambda p: b"\x00" + doubles(0, 0), BadChunk),
+    (ct.TIME, lambda p: b"\x00" + doubles(0, np.nan), BadChunk),
+    (ct.TIME, lambda p: b"\x00" + doubles(1e30, 1.0), BadChunk),
+    (ct.TIME, lambda p: b"\x01" + doubles(0, 1e-320), BadChunk),
+    (ct.TIME, lambda p: b"\x00" + doubles(0, 1) + b"\x00", BadChunk),
+    (ct.TIME, lambda p: b"\x02" + zstd(doubles(*range(19), np.inf)), BadChunk),
+    (ct.TIME, lambda p: b"\x02" + zstd(bytes(160)), BadChunk),
+    (ct.TIME, lambda p: b"\x02" + zstd(doubles(*range(21))), BadChunk),
+    (ct.STEMS, lambda p: floats(0.0) + p[4:], BadChunk),
+    (ct.STEMS, lambda p: floats(np.inf) + p[4:], BadChunk),
+    (ct.STEMS, lambda p: p[:4] + b"\x05" + p[5:], BadChunk),
+    (ct.STEMS, lambda p: p[:5] + b"\x07\x01\x00" + p[8:], BadChunk),
+    (ct.STEMS, lambda p: p[:5] + b"\x0e\x00\x00" + p[8:], BadChunk),
+    (ct.STEMS, lambda p: p[:5] + b"\x0e\x0b\x00" + p[8:], BadChunk),
+    (ct.STEMS, lambda p: p[:5] + b"\x0e\x01\x00\xff\xff\xff\xff" + p[8:], BadChunk),
+    (ct.STEMS, lambda p: p[:5] + b"\x00\x01\x00" + p[8:], BadChunk),
+    (ct.STEMS, lambda p: p[:7], BadChunk),
+    (ct.STEMS, lambda p: p + b"\x01", BadChunk),
+    (ct.AFFINES, lambda p: p + b"\x01", BadChunk),
+    (ct.AFFINES, lambda p: b"\xff" * 50, BadChunk),
+    (ct.CORRECTIONS, lambda p: floats(np.nan) + p[4:], BadChunk),
+    (ct.CORRECTIONS, lambda p: p[:3], BadChunk),
+    (ct.CORRECTIONS, lambda p: p + b"\x01", BadChunk),
+    (ct.METADATA, lambda p: b"", BadChunk),
+    (ct.METADATA, lambda p: b"\x02{}", BadChunk),
+    (ct.METADATA, lambda p: b"\x00[1]", BadChunk),
+    (ct.METADATA, lambda p: b"\x00{", BadChunk),
+    (ct.METADATA, lambda p: b'\x00{"a": "\xff"}', BadChunk),
+    (ct.METADATA, lambda p: b'\x00{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}", BadChunk),
+    (ct.METADATA, lambda p: b'\x00{"a":' + b"9" * 5000 + b"}", BadChunk),
+    (ct.METADATA, lambda p: b"\x00{" + b" " * (1 << 20) + b"}", LimitExceeded),
+    (ct.METADATA, lambda p: b"\x01" + zstd(b"{" + b" " * (1 << 20) + b"}"), LimitExceeded),
+    (ct.METADATA, lambda p: b"\x01no zstd frame", FormatError),
+    (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 3]}, zstd(bytes(11) + b"\x7f")), BadChunk),
+    (ct.FACES, lambda p: array_chunk({"dtype": "<f4", "shape": [1, 3]}, zstd(bytes(12))), BadChunk),
+    (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [3]}, zstd(bytes(12))), BadChunk),
+    (ct.EDGES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 2]}, zstd(b"\xff" * 8)), BadChunk),
+    (ct.EDGES, lambda p: array_chunk({"derived": "<f8"}), BadChunk),
+    (ct.EDGES, lambda p: array_chunk({"derived": ["<i4"]}), BadChunk),
+    (ct.EDGES, lambda p: array_chunk({}), BadChunk),
+    (ct.ATTRIBUTE, lambda p: b"\x00", BadChunk),
+    (ct.ATTRIBUTE, lambda p: array_chunk(b"[]"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: struct.pack("<H", 60000) + p[2:], BadChunk),
+    (ct.ATTRIBUTE, lambda p: array_chunk({"name": "a"}), BadChunk),
+    (ct.ATTRIBUTE, lambda p: array_chunk({"dtype": "<f4", "shape": [4]}, zstd(bytes(16))), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=5), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=""), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="species"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="n" * 5000), LimitExceeded),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(32)), dtype="|O"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype="no type"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype="(2,3"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=None), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=7), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype={"a": "b"}), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a"]]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [1 << 40, 1 << 40]]]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [-1]]]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4"], ["a", "<f4"]]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: array_chunk(b'{"name":"a","shape":[1],"dtype":' + NESTED.encode() + b"}"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: array_chunk(
+        b'{"name":"a","shape":[1],"dtype":' + b'[["a",' * 450 + b'"<f4"' + b"]]" * 450 + b"}"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype="|V0"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(dtype="|V2000000"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=4), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=[-4]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=[2.0]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=[1] * 33), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=[1 << 39, 1 << 39]), LimitExceeded),
+    (ct.ATTRIBUTE, lambda p: attribute(shape=[0, 1 << 39, 1 << 39]), LimitExceeded),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)) + b"\0"), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(8)) + zstd(bytes(8))), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16))[:-1]), BadChunk),
+    (ct.ATTRIBUTE, lambda p: attribute(), BadChunk),
+])
+def test_content_that_breaks_a_rule_is_refused(kind, spoil, error, parts):
+    level = {ct.STEMS: 3, ct.AFFINES: 1, ct.CORRECTIONS: 3}.get(kind)
+    with np.errstate(all="ignore"), pytest.raises(error) as caught:
+        check(parts.with_payload(kind, spoil(parts.payload(kind, level)), level))
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("step", [1e-38, 1e38])
+def test_steps_at_the_ends_of_their_range_play(step, parts):
+    """They give positions that are no plant, but numbers or infinities, in time."""
+    for kind, level in ((ct.STEMS, 3), (ct.CORRECTIONS, 3)):
+        use(parts.with_payload(kind, floats(step) + parts.payload(kind, level)[4:], level))
+    use(parts.with_payload(ct.REST, parts.payload(ct.REST)[:28] + doubles(step) + parts.payload(ct.REST)[36:]))
+
+
+@pytest.mark.parametrize("size", [0, 1, 64, 4096])
+@pytest.mark.parametrize("byte", [b"\x00", b"\xff", b"\x55"])
+@pytest.mark.parametrize("name", ["HIERARCHY", "REST", "STEMS", "AFFINES", "CORRECTIONS"])
+def test_streams_of_one_byte_over_and_over_end(name, byte, size, parts):
+    head = {"HIERARCHY": 16, "REST": 36, "STEMS": 8, "AFFINES": 0, "CORRECTIONS": 4}[name]
+    level = {"STEMS": 3, "AFFINES": 1, "CORRECTIONS": 3}.get(name)
+    payload = parts.payload(KINDS[name], level)[:head] + byte * size
+    start = time.perf_counter()
+    use(parts.with_payload(KINDS[name], payload, level))
+    assert time.perf_counter() - start < 2.0
+
+
+# ---- zstd ----
+
+
+def exact(data: bytes, expected: int, **limits) -> bytes:
+    return ct.zstd_decompress_exact(data, expected, "test", Limits(**limits))
+
+
+def test_a_frame_of_the_expected_size_is_decompressed():
+    assert exact(zstd(b"plant" * 100), 500) == b"plant" * 100
+
+
+@pytest.mark.parametrize("data, expected", [
+    (zstd(bytes(100)), 99), (zstd(bytes(100)), 101), (zstd(bytes(100)), 0), (zstd(b""), 0), (b"", 100),
+    (zstd(bytes(100)) + b"\0", 100), (zstd(bytes(100)) + zstd(bytes(100)), 100), (zstd(bytes(100))[:-1], 100),
+    (zstd(bytes(100), write_content_size=False), 100), (b"\x28\xb5\x2f\xfd", 100), (b"no frame", 100),
+], ids=["shorter", "longer", "nothing expected", "empty frame", "no bytes", "a byte behind", "two frames", "cut off",
+        "size not given", "magic alone", "no frame"])
+def test_any_other_zstd_frame_is_refused(data, expected):
+    with pytest.raises(BadChunk):
+        exact(data, expected)
+
+
+def test_the_frame_that_zstd_answers_with_a_memory_error_is_refused():
+    frame = bytes.fromhex("28b52ffde06c06060663636363")
+    claimed = zstandard.frame_content_size(frame)
+    with pytest.raises(LimitExceeded):
+        exact(frame, claimed)
+    with pytest.raises(BadChunk):
+        exact(frame, claimed, decoded_chunk_bytes=1 << 63)
+    with pytest.raises(BadChunk):
+        exact(frame, 100)
+
+
+def test_a_frame_that_lies_about_its_size_is_refused():
+    honest = zstd(bytes(100_000))
+    size_at = honest.index(struct.pack("<I", 100_000))
+    liar = honest[:size_at] + struct.pack("<I", 90_000) + honest[size_at + 4:]
+    assert zstandard.frame_content_size(liar) == 90_000
+    with pytest.raises(BadChunk):
+        exact(liar, 90_000)
+
+
+def test_a_window_above_8_mib_is_refused():
+    wide = zstandard.ZstdCompressionParameters(window_log=25, write_content_size=1, write_checksum=0)
+    stream = zstandard.ZstdCompressor(compression_params=wide).compressobj(size=9 << 20)
+    frame = stream.compress(np.random.default_rng(0).bytes(9 << 20)) + stream.flush()
+    if zstandard.get_frame_parameters(frame).window_size > 8 << 20:
+        with pytest.raises(BadChunk):
+            exact(frame, 9 << 20)
+    else:
+        pytest.fail("the frame has no large window: this test tests nothing")
+
+
+# ---- limits ----
+
+
+@pytest.mark.parametrize("limits", [
+    {"chunks": 5}, {"table_bytes": 100}, {"vertices": 11}, {"branches": 4}, {"frames": 19}, {"chunk_bytes": 30},
+    {"memory_bytes": 10_000}, {"metadata_bytes": 50}, {"attributes": 1}, {"string_bytes": 5},
+    {"decoded_chunk_bytes": 20},
+], ids=lambda limits: next(iter(limits)))
+def test_a_file_beyond_a_limit_is_refused_by_that_limit(limits, data):
+    (number,) = limits.values()
+    with pytest.raises(LimitExceeded, match=f"limit is {number}") as caught:
+        check(data, limits=Limits(**limits))
+    assert "\n" not in str(caught.value)
+
+
+def test_limits_that_just_hold_the_file_accept_it(data, parts):
+    check(data, limits=Limits(chunks=len(parts.chunks), vertices=12, branches=5, frames=20, attributes=2, string_bytes=7,
+                              chunk_bytes=max(len(p) for _, p in parts.chunks), decoded_chunk_bytes=160))
+
+
+def test_small_chunks_that_unpack_to_much_are_refused_before_they_are_unpacked(parts):
+    bomb = attribute(zstd(bytes(200 << 20)), shape=[50 << 20])
+    assert len(bomb) < 50_000
+    file = parts.with_payload(ct.ATTRIBUTE, bomb)
+    tracemalloc.start()
+    try:
+        with pytest.raises(LimitExceeded):
+            check(file, limits=Limits(decoded_chunk_bytes=100 << 20))
+        assert tracemalloc.get_traced_memory()[1] < 10 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_many_attributes_together_keep_to_the_memory_limit(parts):
+    chunks = [entry for entry in parts.chunks if entry[0].kind != ct.ATTRIBUTE]
+    chunks += [unknown(ct.ATTRIBUTE, attribute(zstd(bytes(1 << 20)), name=f"a{i}", shape=[1 << 18])) for i in range(9)]
+    file = parts.with_chunks(chunks)
+    assert len(opened(file).attributes) == 9
+    with pytest.raises(LimitExceeded, match="attributes"):
+        _ = opened(file, limits=Limits(memory_bytes=8 << 20)).attributes
+
+
+# ---- errors ----
+
+
+@pytest.mark.parametrize("error, make", [
+    (NotAnAthFile, lambda d, p: b"PK\x03\x04 something else entirely" * 4),
+    (UnsupportedVersion, lambda d, p: with_header(d, major=9)),
+    (Truncated, lambda d, p: d[:-1]),
+    (BadChecksum, lambda d, p: flipped(d, len(d) - 1)),
+    (BadHeader, lambda d, p: with_header(d, clip_count=2)),
+    (BadChunkTable, lambda d, p: p.with_chunks(p.chunks[1:])),
+    (UnknownChunk, lambda d, p: p.with_chunks([*p.chunks, unknown(99)])),
+    (BadChunk, lambda d, p: p.with_payload(ct.TIME, b"\x09")),
+    (LimitExceeded, lambda d, p: with_header(d, frame_count=2**31)),
+    (TrailingBytes, lambda d, p: d + b"more"),
+], ids=lambda value: getattr(value, "name", ""))
+def test_every_error_of_the_format_can_happen_and_says_it_in_one_line(error, make, data, parts):
+    with pytest.raises(FormatError) as caught:
+        check(make(data, parts), strict=True)
+    assert caught.type is error
+    message = str(caught.value)
+    assert "\n" not in message and 20 < len(message) < 300 and ("expected" in message or "limit" in message
+                                                               or "does not know" in message)
+
+
+def test_the_codes_of_the_errors_are_those_of_the_format():
+    classes = [c for c in vars(errors).values() if isinstance(c, type) and issubclass(c, FormatError)]
+    assert sorted(c.code for c in classes) == list(range(1, 12))
+    assert len({c.name for c in classes}) == 11

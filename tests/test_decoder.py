@@ -1,0 +1,374 @@
+"""What a decoder gives: levels with the errors it announces, maps that hang together, and no more reading than needed."""
+
+from __future__ import annotations
+
+import json
+from io import BytesIO
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import athcodec
+from athcodec import Thresholds
+from athcodec._native import LOOSE
+from athcodec import container as ct
+from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
+from plants import STEADY, awkward_plants, chain_plant, plant, tube
+
+
+@pytest.fixture(scope="module")
+def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, tmp_path_factory):
+    """{name: (file, source positions)} of several segments and depths."""
+    folder = tmp_path_factory.mktemp("plants")
+    made = {"sample": (sample_ath, sample_positions), "bushy": (bushy_ath, bushy_clip.positions)}
+    for name, clip, more in (
+        ("chain", chain_plant(12, 5, frames=40), {"tam": Thresholds(0, 0, 0, 0)}),
+        ("tube", tube(60, 12, 40), {}),
+        ("half accepted", plant(seed=12, branches=40, frames=40, rough=0.0), {"tam": Thresholds(0.25, 0, 0.8, 0)}),
+    ):
+        path = folder / f"{name}.ath"
+        athcodec.encode(clip, path, rel_error=1e-4, segment_frames=16, effort="fast", **more)
+        made[name] = path, clip.positions
+    return made
+
+
+NAMES = ["sample", "bushy", "chain", "tube", "half accepted"]
+
+
+@pytest.fixture(params=NAMES)
+def played(request, plants):
+    """(decoder, source positions)"""
+    path, source = plants[request.param]
+    with athcodec.open(path, strict=True) as decoder:
+        yield decoder, source.astype(np.float64)
+
+
+def size_of(source: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(source.reshape(-1, 3), axis=0)))
+
+
+def base_pose(decoder) -> np.ndarray:
+    """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
+    return decoder.plan.rest + decoder.origin
+
+
+def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return points @ np.swapaxes(matrices[..., :3], -1, -2) + matrices[..., None, :, 3]
+
+
+def shown_frames(decoder) -> list[int]:
+    """A frame or two of each segment."""
+    return sorted({frame for start, stop in decoder.segments for frame in (start, stop - 1)})[:5]
+
+
+# ---- levels ----
+
+
+def test_the_errors_in_the_table_are_those_of_stopping_there(played):
+    decoder, source = played
+    assert len(decoder.segments) > 1 and len(decoder.depths) == decoder.level_count
+    rounding = 1e-6 * size_of(source)
+    for level in decoder.depths:
+        distance = np.linalg.norm(decoder.positions(depth=level.depth) - source, axis=2)
+        assert distance.max() <= level.max_error, "an announced error is never too small"
+        assert distance.max() >= level.max_error * (1 - 1e-6) - rounding
+        assert np.sqrt((distance**2).mean()) == pytest.approx(level.rms_error, rel=1e-5, abs=rounding)
+
+
+def test_the_table_holds_the_errors_of_each_segment(played):
+    decoder, source = played
+    for segment, (start, stop) in enumerate(decoder.segments):
+        for depth in range(decoder.level_count):
+            distance = np.linalg.norm(decoder.positions(slice(start, stop), depth) - source[start:stop], axis=2)
+            largest, rms = decoder.container.errors[depth, segment]
+            assert distance.max() <= largest and np.sqrt((distance**2).mean()) == pytest.approx(rms, rel=1e-4, abs=1e-6)
+
+
+def test_the_deepest_level_keeps_the_promise_of_the_file(played):
+    decoder, source = played
+    assert decoder.depths[-1].max_error <= decoder.max_error_bound * (1 + 1e-6)
+    assert np.linalg.norm(decoder.positions() - source, axis=2).max() <= decoder.max_error_bound
+
+
+@pytest.mark.parametrize("name", ["sample", "bushy", "half accepted"])
+def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name, plants):
+    with athcodec.open(plants[name][0]) as decoder:
+        levels = decoder.depths
+    assert len(levels) >= 3
+    for coarse, fine in zip(levels, levels[1:]):
+        assert fine.bytes > coarse.bytes and fine.nodes >= coarse.nodes
+        assert fine.rms_error < coarse.rms_error
+    assert levels[0].rms_error > 10 * levels[-1].rms_error
+
+
+@pytest.mark.parametrize("name", ["sample", "chain", "tube"])
+def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants):
+    path, source = plants[name]
+    with athcodec.open(path) as decoder:
+        pose = base_pose(decoder)[np.argsort(decoder.hierarchy.vertex_source)]
+        assert decoder.depths[0].nodes == 1
+        for frame in shown_frames(decoder):
+            shown = decoder.positions(frame, 0).astype(np.float64)
+            homogeneous = np.column_stack([pose - pose.mean(axis=0), np.ones(len(pose))])
+            fit, *_ = np.linalg.lstsq(homogeneous, shown)
+            assert np.abs(homogeneous @ fit - shown).max() < 1e-6 * size_of(source)
+
+
+def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(played):
+    decoder, _ = played
+    last = decoder.level_count - 1
+    final = decoder.read_segment(1, last).pose(last, decoder.origin, decoder.dtype)
+    branch = decoder.hierarchy.vertex_branch()
+    for depth in range(1, last):
+        exact = np.isin(branch, decoder.plan.exact_branches(depth))
+        assert exact.any() and np.array_equal(decoder.segment_positions(1, depth)[exact], final[exact])
+
+
+# ---- maps ----
+
+
+def test_the_parts_of_a_level_share_out_the_vertices(played):
+    decoder, _ = played
+    for level in decoder.depths:
+        parts = decoder.affines(0, level.depth)
+        assert len(parts.matrices) == len(parts.branch) == level.nodes
+        stops = parts.first_vertex + parts.vertex_count
+        assert parts.first_vertex[0] == 0 and stops[-1] == decoder.vertex_count
+        assert np.array_equal(parts.first_vertex[1:], stops[:-1]) and (parts.vertex_count > 0).all()
+        first_of_part = decoder.hierarchy.vertex_source[parts.first_vertex]
+        assert np.array_equal(decoder.vertex_branch[first_of_part], parts.branch)
+    assert parts.is_stem.all() and len(parts.branch) == decoder.branch_count
+
+
+def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
+    decoder, source = played
+    pose = base_pose(decoder)
+    for depth in range(decoder.level_count - 1):
+        for frame in shown_frames(decoder):
+            parts = decoder.affines(frame, depth)
+            shown = decoder.positions(frame, depth, np.float64)[decoder.hierarchy.vertex_source]
+            moved = applied(np.repeat(parts.matrices, parts.vertex_count, axis=0), pose[:, None])[:, 0]
+            as_one = np.repeat(~parts.is_stem, parts.vertex_count)
+            assert as_one.any() and np.abs(moved - shown)[as_one].max() < 1e-6 * size_of(source)
+
+
+def test_every_subtree_stays_attached_to_its_parents_stem(played):
+    decoder, source = played
+    assert not (decoder.plan.branches["flags"] & LOOSE).any()
+    pose, hierarchy = base_pose(decoder), decoder.hierarchy
+    attached = 0
+    for depth in range(decoder.level_count - 1):
+        for frame in shown_frames(decoder):
+            parts = decoder.affines(frame, depth)
+            shown = decoder.positions(frame, depth, np.float64)[hierarchy.vertex_source]
+            branch = hierarchy.vertex_branch()[parts.first_vertex]
+            attach = hierarchy.attach[branch]
+            children = np.flatnonzero(~parts.is_stem & (attach >= 0))
+            hung = applied(parts.matrices[children], pose[attach[children], None])[:, 0]
+            assert np.abs(hung - shown[attach[children]]).max(initial=0) < 1e-6 * size_of(source)
+            attached += len(children)
+    assert attached > 0 or decoder.branch_count == 1
+
+
+def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
+    decoder, source = played
+    order = decoder.hierarchy.vertex_source
+    for depth in range(decoder.level_count):
+        for frame in shown_frames(decoder)[:2]:
+            parts, residual = decoder.affines(frame, depth), decoder.residual(frame, depth)
+            full = decoder.positions(frame, dtype=np.float64)[order]
+            matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
+            restored = applied(matrices, residual[order][:, None])[:, 0]
+            assert np.abs(restored - full).max() < 1e-6 * size_of(source)
+
+
+# ---- frames ----
+
+
+def test_any_frames_alone_equal_those_of_the_whole(played):
+    decoder, _ = played
+    count = decoder.frame_count
+    for depth in (0, decoder.level_count - 1):
+        whole = decoder.positions(depth=depth)
+        boundary = decoder.segments[1][0]
+        for chosen in (slice(boundary - 2, boundary + 3), slice(boundary, None), slice(-3, None), slice(5, 5)):
+            assert np.array_equal(decoder.positions(chosen, depth), whole[chosen])
+        for frame in (0, boundary - 1, boundary, count - 1, -1, -count, np.int64(3)):
+            assert np.array_equal(decoder.positions(frame, depth), whole[frame])
+
+
+def test_blocks_are_the_motion_in_order(bushy_ath):
+    with athcodec.open(bushy_ath) as decoder:
+        blocks = list(decoder.blocks(depth=2))
+        assert [start for start, _ in blocks] == [start for start, _ in decoder.segments]
+        assert np.array_equal(np.concatenate([block for _, block in blocks]), decoder.positions(depth=2))
+        start, block = next(decoder.blocks(frames=slice(14, 20)))
+        assert start == 14 and np.array_equal(block, decoder.positions(slice(14, 20)))
+
+
+class Recorder(BytesIO):
+    """A file that remembers which byte ranges were read."""
+
+    def __init__(self, data: bytes):
+        super().__init__(data)
+        self.ranges: list[tuple[int, int]] = []
+
+    def read(self, size=-1):
+        start = self.tell()
+        data = super().read(size)
+        self.ranges.append((start, start + len(data)))
+        return data
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(level, plants):
+    for name in NAMES:
+        file = Recorder(plants[name][0].read_bytes())
+        decoder = athcodec.open(file)
+        if level >= decoder.level_count:
+            continue
+        prelude = decoder.container.prelude_length
+        assert all(stop <= prelude for _, stop in file.ranges), "opening reads the prelude alone"
+        file.ranges.clear()
+        before = decoder.bytes_read
+        start, _ = decoder.segments[1]
+        decoder.positions(start, level)
+        allowed = {(c.offset, c.offset + c.length) for c in decoder.container.chunks
+                   if c.is_motion and c.level <= level and c.segment == 1}
+        assert file.ranges and set(file.ranges) <= allowed
+        assert decoder.bytes_read - before == sum(stop - start for start, stop in file.ranges)
+
+
+def test_the_last_level_reads_no_maps_of_subtrees(plants):
+    file = Recorder(plants["sample"][0].read_bytes())
+    decoder = athcodec.open(file)
+    file.ranges.clear()
+    decoder.positions(0)
+    kinds = {c.kind for c in decoder.container.chunks if (c.offset, c.offset + c.length) in file.ranges}
+    assert ct.STEMS in kinds and ct.AFFINES not in kinds
+
+
+def test_attributes_are_read_when_asked_for(full_ath):
+    with athcodec.open(full_ath) as decoder:
+        decoder.positions()
+        before = decoder.bytes_read
+        assert set(decoder.attributes) == {"radius", "species"}
+        assert decoder.bytes_read > before
+
+
+@pytest.mark.parametrize("ask", [
+    lambda d: d.positions(50), lambda d: d.positions(-51), lambda d: d.positions(slice(0, 9, 2)),
+    lambda d: d.positions(0, 6), lambda d: d.positions(0, -1), lambda d: d.affines(50), lambda d: d.affines(0, 6),
+], ids=["frame beyond", "frame before", "every other frame", "level beyond", "level before", "maps of a frame beyond",
+        "maps of a level beyond"])
+def test_what_is_not_in_the_file_is_refused_with_the_range(ask, bushy_ath):
+    with athcodec.open(bushy_ath) as decoder:
+        with pytest.raises(LevelUnavailable, match="expected") as caught:
+            ask(decoder)
+        assert "\n" not in str(caught.value)
+
+
+# ---- the object ----
+
+
+def test_a_path_is_closed_again_and_a_file_object_is_left_open(bushy_ath):
+    with athcodec.open(bushy_ath) as decoder:
+        own = decoder._file
+    with open(bushy_ath, "rb") as file:
+        with athcodec.open(file) as decoder:
+            decoder.positions(0)
+        assert own.closed and not file.closed
+
+
+def test_a_file_that_cannot_be_opened_as_ath_is_closed(tmp_path):
+    (tmp_path / "no.ath").write_bytes(b"nothing of the sort")
+    with pytest.raises(FormatError):
+        athcodec.open(tmp_path / "no.ath")   # an open file would warn, and warnings are errors here
+
+
+def test_str_path_and_file_object_give_the_same(bushy_ath):
+    with athcodec.open(str(bushy_ath)) as by_name, athcodec.open(bushy_ath) as by_path:
+        in_memory = athcodec.open(BytesIO(bushy_ath.read_bytes()))
+        assert np.array_equal(by_name.positions(), by_path.positions())
+        assert np.array_equal(by_name.positions(), in_memory.positions())
+
+
+def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
+    summary = athcodec.encode(bushy_clip, tmp_path / "b.ath", rel_error=1e-3, segment_frames=16, effort="fast")
+    with athcodec.open(summary.path) as decoder:
+        info = json.loads(json.dumps(decoder.info(), allow_nan=False))
+        assert decoder.table1() == summary.table1
+    assert info["vertices"] == bushy_clip.vertex_count and info["frames"] == 50 and info["segments"] == 4
+    assert info["bytes"] == info["available_bytes"] == summary.bytes == summary.path.stat().st_size
+    assert info["complete"] and info["max_error_bound"] == summary.max_error_bound
+    assert [d["bytes"] for d in info["depths"]] == [d.bytes for d in summary.depths]
+    assert sum(summary.chunk_bytes.values()) == summary.bytes
+
+
+def test_the_table_of_the_ath_is_that_of_the_analysis(bushy_clip, bushy_ath):
+    with athcodec.open(bushy_ath) as decoder:
+        epsilon, eta, xi, lam = decoder.thresholds
+        expected = athcodec.build_ath(bushy_clip, epsilon, eta, xi, lam).table1()
+        assert decoder.table1() == expected
+
+
+def test_one_frame_has_no_frame_rate(tmp_path):
+    athcodec.encode(plant(frames=1), tmp_path / "one.ath", effort="fast")
+    with athcodec.open(tmp_path / "one.ath") as decoder:
+        assert decoder.fps == 0.0 and decoder.positions().shape[0] == 1
+
+
+def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
+    with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
+        assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
+        assert np.array_equal(partial.positions(), plain.positions())
+        plain.check()
+        partial.check()
+
+
+def test_checking_reads_every_byte_behind_the_tables(full_ath):
+    file = Recorder(full_ath.read_bytes())
+    decoder = athcodec.open(file)
+    decoder.check()
+    covered = np.zeros(decoder.file_length, bool)
+    for start, stop in file.ranges:
+        covered[start:stop] = True
+    assert covered.all()
+
+
+def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath):
+    data = bytearray(bushy_ath.read_bytes())
+    container = athcodec.open(bushy_ath).container
+    container.file.close()
+    last = container.chunks[-1]
+    data[last.offset + last.length // 2] ^= 1
+    decoder = athcodec.open(BytesIO(bytes(data)), strict=True)
+    decoder.positions(depth=decoder.level_count - 2)
+    with pytest.raises(BadChecksum, match="CORRECTIONS of level 5, segment 3"):
+        decoder.positions()
+
+
+@settings(STEADY, max_examples=60)
+@given(awkward_plants(dtype=np.float64, frames=18, offset=0.0))
+def test_maps_hang_together_on_degenerate_plants(scratch, clip):
+    size = size_of(clip.positions) or 1.0
+    athcodec.encode(clip, scratch / "maps.ath", max_error=1e-3 * size, segment_frames=16, effort="fast")
+    with athcodec.open(scratch / "maps.ath") as decoder:
+        hierarchy, pose = decoder.hierarchy, base_pose(decoder)
+        full = decoder.positions(17)[hierarchy.vertex_source]
+        for depth in range(decoder.level_count):
+            parts = decoder.affines(17, depth)
+            assert len(parts.branch) == decoder.depths[depth].nodes
+            matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
+            as_one = np.repeat(~parts.is_stem, parts.vertex_count)
+            shown = decoder.positions(17, depth)[hierarchy.vertex_source]
+            assert np.abs(applied(matrices, pose[:, None])[:, 0] - shown)[as_one].max(initial=0) < 1e-9 * size
+            residual = decoder.residual(17, depth)[hierarchy.vertex_source]
+            assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < 1e-9 * size
+            branch = hierarchy.vertex_branch()[parts.first_vertex]
+            loose = decoder.plan.branches["flags"][branch] & LOOSE > 0
+            hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
+            attach = hierarchy.attach[branch][hung]
+            placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
+            assert np.abs(placed - shown[attach]).max(initial=0) < 1e-9 * size

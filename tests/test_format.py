@@ -1,0 +1,297 @@
+"""FORMAT.md against the code: its tables, its dumps, and its pseudo-code, which is run.
+
+The Python blocks of FORMAT.md form a decoder. Executed as they stand, they have to give every bit that the package
+gives, on files that use all features. Claims about limits, names and offsets are read from the document's tables.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import struct
+from dataclasses import fields
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import zstandard
+
+import athcodec
+from athcodec import MotionClip, container, entropy, errors
+from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, crc32c
+from athcodec.transform import LevelStream, Plan, SegmentMotion
+
+FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
+TEXT = FORMAT.read_text(encoding="utf-8")
+
+
+def section(title: str) -> str:
+    """The text under a heading, up to the next of the same or a higher rank."""
+    marks, start = re.search(rf"^(#+) {re.escape(title)}\n()", TEXT, re.M).group(1), TEXT.index(f"# {title}\n")
+    end = re.compile(rf"^#{{1,{len(marks)}}} ", re.M).search(TEXT, start + len(title) + 2)
+    return TEXT[start: end.start() if end else None]
+
+
+def table(title: str, first_column: str) -> list[dict[str, str]]:
+    """Rows of the first table of a section whose first column has this name."""
+    lines = section(title).splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
+    rows = []
+    for line in lines[start:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return [dict(zip(rows[0], row)) for row in rows[2:]]
+
+
+def dump(text: str) -> bytes:
+    """The bytes of an annotated hex dump; checks that its offsets leave no hole."""
+    data = b""
+    for offset, line in re.findall(r"^ {4}([0-9a-f]{8})  ((?:[0-9a-f]{2} ?)+)", text, re.M):
+        assert int(offset, 16) == len(data), f"dump: line {offset}"
+        data += bytes.fromhex(line)
+    return data
+
+
+def reader(code: str):
+    return lambda data, at: struct.unpack_from(code, data, at)[0]
+
+
+@pytest.fixture(scope="module")
+def spec() -> SimpleNamespace:
+    """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
+    names = {"u8": reader("<B"), "u16": reader("<H"), "u32": reader("<I"), "f32": reader("<f"), "f64": reader("<d"),
+             "sqrt": math.sqrt, "single": lambda x: float(np.float32(x)),
+             "zstd": lambda data, size: zstandard.ZstdDecompressor().decompress(data, max_output_size=size)}
+    for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
+        exec(block, names)
+    return SimpleNamespace(**names)
+
+
+def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
+    with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        for level in range(decoder.level_count):
+            expected = decoder.positions(depth=level)
+            got = np.array(spec.decode(data, level), decoder.dtype)
+            assert got.tobytes() == expected.tobytes(), f"level {level}"
+
+
+# ---- tables and dumps ---------------------------------------------------------------------------------------------
+
+
+def test_document_describes_the_version_that_is_written():
+    assert f"Format_Version {container.MAJOR}.{container.MINOR}" in TEXT
+    assert f"* **{container.MAJOR}.{container.MINOR}**" in section("Version changes")
+
+
+@pytest.mark.parametrize("title, form", [
+    ("Header", container._HEADER), ("Chunk table", container._CHUNK), ("Error table", container._ERRORS)])
+def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
+    names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}
+    expected, at = [], 0
+    for code in re.findall(r"\d*[a-zA-Z]", form.format.lstrip("<")):
+        expected.append((at, struct.calcsize("<" + code), names[code[-1]]))
+        at += struct.calcsize("<" + code)
+    rows = table(title, "Offset")
+    assert [(int(row["Offset"]), int(row["Size"]), row["Type"]) for row in rows] == expected
+
+
+def test_magic_is_that_of_the_code():
+    assert bytes.fromhex(table("Header", "Offset")[0]["Range"]) == container.MAGIC
+
+
+def test_chunk_kinds_are_those_of_the_code():
+    rows = table("Chunk table", "Name")
+    assert {int(row["Kind"], 16): row["Name"] for row in rows} == container.KIND_NAMES
+    for row in rows:
+        kind = int(row["Kind"], 16)
+        assert kind & ~container.OPTIONAL == int(row["Kind_Id"])
+        assert (row["Required"] == "no") == bool(kind & container.OPTIONAL)
+
+
+def test_limits_are_those_of_the_code():
+    limits = container.Limits()
+    documented = {row["Limit"].removeprefix("Max_").lower(): int(row["Value"]) for row in table("Limits", "Limit")}
+    assert documented == {field.name: getattr(limits, field.name) for field in fields(limits)}
+
+
+def test_errors_are_those_of_the_code():
+    classes = [errors.FormatError, *errors.FormatError.__subclasses__()]
+    documented = {int(row["Code"]): row["Name"] for row in table("Errors", "Code")}
+    assert documented == {each.code: each.name for each in classes}
+
+
+def test_every_error_named_in_a_field_table_exists():
+    names = {row["Name"] for row in table("Errors", "Code")}
+    used = set(re.findall(r"\b[A-Z]+(?:_[A-Z]+)*_[A-Z]+\b", section("File")))
+    assert used <= names | {"NOT_AN_ATH_FILE"} and "BAD_CHUNK_TABLE" in used
+
+
+def test_checksum_has_the_check_value_of_the_document(spec):
+    value = int(re.search(r'bytes "123456789" is (0x[0-9A-F]{8})', section("Checksums").replace("\n", " ")).group(1), 16)
+    assert crc32c(b"123456789") == spec.crc32c(b"123456789") == value == 0xE3069283
+
+
+def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
+    clip = MotionClip(positions=np.array([[[1, 2, 3]]], np.float32), time=np.zeros(1), rest=np.array([[1.0, 2.0, 3.0]]),
+                      vertex_branch=np.zeros(1, np.int32), branch_parent=np.array([-1], np.int32))
+    athcodec.encode(clip, tmp_path / "smallest.ath", max_error=2**-7, attributes="none")
+    data = dump(section("Smallest file"))
+    assert (tmp_path / "smallest.ath").read_bytes() == data
+    assert_same_bits(spec, data)
+    with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        assert decoder.positions().tolist() == [[[1.0, 2.0, 3.0]]]
+
+
+# ---- the pseudo-code ------------------------------------------------------------------------------------------------
+
+
+def test_worked_example_decodes_step_by_step(spec):
+    text = section("Worked example")
+    stream = bytes.fromhex(re.search(r"^ {4}([0-9a-f ]+)$", text, re.M).group(1))
+    values = [int(n) for n in re.search(r"decodes to ([-0-9, ]+)\.", text).group(1).split(",")]
+    steps: list[dict[str, str]] = []
+
+    class Tracing(spec.RangeDecoder):
+        probability = "raw"
+
+        def bit(self, context):
+            self.probability = str(context.one)
+            return super().bit(context)
+
+        def narrow(self, bound):
+            steps.append({"Probability": self.probability, "range": f"{self.range:016x}", "bound": f"{bound:016x}",
+                          "code": f"{self.code:016x}"})
+            self.probability = "raw"
+            steps[-1]["Bit"] = str(super().narrow(bound))
+            return int(steps[-1]["Bit"])
+
+    decode = type(spec.decode_temporal)(spec.decode_temporal.__code__,
+                                        spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing})
+    assert decode(stream, 1, len(values)) == [values]
+    assert steps == table("Worked example", "Probability")
+    assert entropy.encode_temporal(np.array([values], np.int32)) == stream
+
+
+@pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
+def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
+    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32)) + change
+    with pytest.raises(spec.Invalid):
+        spec.decode_temporal(stream, 1, 3)
+    with pytest.raises(errors.BadChunk):
+        entropy.decode_temporal(stream, 1, 3, "here")
+
+
+def test_shuffle_of_the_document_restores_an_array(spec):
+    array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
+    data = container.pack_array(array, "numbers")
+    (length,) = struct.unpack_from("<H", data)
+    assert spec.unshuffle(spec.zstd(data[2 + length:], array.nbytes), array.size, 4) == array.tobytes()
+
+
+def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path):
+    path = tmp_path / "forked.ath"
+    athcodec.encode(forked_clip, path, max_error=0.001)
+    assert_same_bits(spec, path.read_bytes())
+
+
+@pytest.mark.parametrize("seed, wide, exact", [(1, False, False), (2, True, False), (3, False, True)])
+def test_pseudo_code_decodes_every_feature(spec, seed, wide, exact):
+    assert_same_bits(spec, HandMade(seed, wide, exact).file())
+
+
+class HandMade:
+    """A file that no encoder would write: random integers in every stream, all flags, learned time bases."""
+
+    SEGMENTS, FRAMES = 2, 37
+    # parent, vertices of the stem, flags; the stem of 70 makes two pieces
+    BRANCHES = ((-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET), (3, 3, LOOSE), (2, 9, WHOLE), (5, 4, SHEET),
+                (-1, 7, SHEET), (7, 2, SHEET | WHOLE), (7, 5, SHEET), (7, 4, 0), (10, 2, 0),
+                (-1, 1, WHOLE))
+
+    def __init__(self, seed: int, wide: bool, exact: bool):
+        self.random = np.random.default_rng(seed)
+        self.wide, self.exact = wide, exact
+        self.origin = np.array([10.0, -3.5, 0.25])
+        self.branches, self.rest = self._skeleton()
+        self.vertex_count = len(self.rest)
+        self.store = container.ChunkStore(io.BytesIO())
+        self.plan = Plan(self.branches, self.vertex_count)
+
+    def _skeleton(self) -> tuple[np.ndarray, np.ndarray]:
+        branches, rest = np.zeros(len(self.BRANCHES), BRANCH), []
+        for b, (parent, count, flags) in enumerate(self.BRANCHES):
+            first = [row["first"] for row in branches[:b]]
+            attach = -1 if parent < 0 else first[parent] + self.random.integers(2) * (self.BRANCHES[parent][1] // 2)
+            branches[b]["parent"], branches[b]["count"], branches[b]["flags"] = parent, count, flags
+            branches[b]["attach"], branches[b]["first"] = attach, len(rest)
+            branches[b]["lag"] = self.random.integers(4)
+            at = np.zeros(3) if attach < 0 else rest[attach]
+            for step in self.random.normal(0.3, 0.2, (count, 3)):
+                at = at + step
+                rest.append(at)
+        return branches, np.array(rest)
+
+    def file(self) -> bytes:
+        self._add_prelude()
+        for segment in range(self.SEGMENTS):
+            self._add_segment(segment)
+        levels = self.plan.level_count
+        header = container.Header(self.vertex_count, len(self.branches), self.FRAMES, self.SEGMENTS, levels, levels, 1.0,
+                                  self.wide)
+        out = io.BytesIO()
+        self.store.write(out, header, np.zeros((levels, self.SEGMENTS, 2)))
+        return out.getvalue()
+
+    def _add_prelude(self) -> None:
+        permutations = [self.random.permutation(n).astype(np.int32) for n in (len(self.branches), self.vertex_count)]
+        self.store.add(container.HIERARCHY, container.pack_hierarchy(
+            (0.5, 3, 0.25, 1), entropy.encode_hierarchy(self.branches, *permutations)))
+        head = container.Rest(self.origin, 0.01, np.dtype(np.float32))
+        if self.exact:
+            head.exact = (self.rest + self.origin).astype(np.float32)
+            self.plan.set_rest(head.exact.astype(np.float64) - self.origin)
+        else:
+            head.stream, decoded = entropy.encode_rest(self.branches, 0.01, self.rest)
+            self.plan.set_rest(decoded)
+        self.store.add(container.REST, container.pack_rest(head))
+        self.store.add(container.TIME, container.pack_time(np.arange(self.FRAMES) / 24.0))
+
+    def _rows(self, *shape: int) -> np.ndarray:
+        """Integers of all sizes, mostly small, with zeros at the high frequencies and whole rows of zeros."""
+        size = np.exp2(self.random.uniform(0, 3, (*shape[:-1], 1)) - 0.2 * np.arange(shape[-1]))
+        rows = np.rint(self.random.normal(0, 1, shape) * size) * (self.random.random((*shape[:-2], 1, 1)) < 0.8)
+        rows.flat[self.random.integers(rows.size)] = 40_000
+        return rows.astype(np.int32)
+
+    def _add_segment(self, segment: int) -> None:
+        start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
+        frames, levels = stop - start, self.plan.level_count
+        bases = {1: self.random.integers(-900, 900, (3, frames)).astype(np.int32)}
+        streams = [LevelStream(0.03 + 0.01 * level, float((0, 1, 4, 8)[level % 4]),
+                               bases[level] * 2.0**-10 if level in bases else None) for level in range(levels)]
+        motion = SegmentMotion(self.plan, frames, streams)
+        motion.coefficients[:] = self._rows(*motion.coefficients.shape)
+        motion.tracks[:] = self._rows(*motion.tracks.shape)
+        motion.node_tracks[:] = self._rows(*motion.node_tracks.shape)
+        motion.node_steps[:] = self.random.integers(-13, -4, len(motion.node_steps))
+        for level in range(levels):
+            if self.plan.has_stems(level):
+                head = container.StemsHead(streams[level].step, int(streams[level].omega))
+                if level in bases:
+                    head.bits, head.rank, head.basis = 11, 3, entropy.encode_temporal(bases[level])
+                self.store.add(container.STEMS, container.pack_stems(head, entropy.encode_stems(motion, level)),
+                               level, segment)
+            if self.plan.has_affines(level):
+                self.store.add(container.AFFINES, entropy.encode_affines(motion, level), level, segment)
+        self.store.add(container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)),
+                       levels - 1, segment)
+
+    def _corrections(self, frames: int) -> bytes:
+        vectors = self._rows(self.vertex_count, 3, frames).transpose(0, 2, 1)
+        vectors = vectors * (self.random.random((self.vertex_count, frames, 1)) < 0.3)
+        vertex, frame = np.nonzero(vectors.any(axis=2))
+        rows = np.column_stack([vertex, frame, vectors[vertex, frame]]).astype(np.int32)
+        return entropy.encode_corrections(rows, self.vertex_count, frames)

@@ -1,0 +1,259 @@
+"""A file cut anywhere: what is there plays, what is not is named, and `truncate` makes shorter files that are whole."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import truncate
+from athcodec.errors import BadChecksum, FormatError, LevelUnavailable, NotAnAthFile, Truncated
+
+
+class Whole:
+    """A complete file and all it plays."""
+
+    def __init__(self, path):
+        self.path, self.data = path, path.read_bytes()
+        with athcodec.open(path, strict=True) as decoder:
+            self.chunks, self.depths = decoder.container.chunks, decoder.depths
+            self.prelude = decoder.container.prelude_length
+            self.segments, self.header = decoder.segments, decoder.container.header
+            self.positions = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+            self.bound, self.attributes = decoder.max_error_bound, decoder.attributes
+
+    def cut(self, size: int, **options) -> athcodec.Decoder:
+        return athcodec.open(BytesIO(self.data[:size]), **options)
+
+    def deepest_within(self, size: int) -> int:
+        """By the chunks alone: the deepest level whose chunks, and those before it, end at `size` or earlier."""
+        late = [chunk.level for chunk in self.chunks if chunk.is_motion and chunk.offset + chunk.length > size]
+        return min(late, default=len(self.depths)) - 1
+
+
+@pytest.fixture(scope="module", params=["sample_ath", "bushy_ath", "full_ath"])
+def whole(request):
+    return Whole(request.getfixturevalue(request.param))
+
+
+@pytest.fixture(scope="module")
+def bushy(bushy_ath):
+    return Whole(bushy_ath)
+
+
+@pytest.fixture(scope="module")
+def full(full_ath):
+    return Whole(full_ath)
+
+
+def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
+    decoder, deepest = whole.cut(size), whole.deepest_within(size)
+    assert not decoder.complete and decoder.missing and "\n" not in decoder.missing
+    assert [depth.available for depth in decoder.depths] == [d <= deepest for d in range(len(whole.depths))]
+    with pytest.raises(Truncated):
+        decoder.check()
+    if deepest < 0:
+        with pytest.raises(Truncated, match="level 0"):
+            decoder.positions()
+    else:
+        assert decoder.deepest == deepest
+        assert np.array_equal(decoder.positions(), whole.positions[deepest])
+    if deepest + 1 < len(whole.depths):
+        with pytest.raises(LevelUnavailable, match=f"level {deepest + 1}, segment"):
+            decoder.positions(depth=deepest + 1)
+
+
+def test_every_chunk_boundary_is_a_place_to_stop(whole):
+    sizes = sorted({chunk.offset for chunk in whole.chunks if chunk.offset >= whole.prelude})
+    assert len(sizes) > 10
+    for size in sizes:
+        assert_plays_as_far_as_it_goes(whole, size)
+
+
+def test_so_is_any_byte_behind_the_prelude(whole):
+    for size in np.random.default_rng(0).integers(whole.prelude, len(whole.data), 40):
+        assert_plays_as_far_as_it_goes(whole, int(size))
+
+
+@pytest.mark.slow
+def test_so_is_every_byte_of_a_small_file(full):
+    for size in range(full.prelude, len(full.data)):
+        assert_plays_as_far_as_it_goes(full, size)
+
+
+def test_every_byte_inside_the_prelude_is_too_early(bushy, full):
+    for whole in (bushy, full):
+        for size in range(whole.prelude):
+            with pytest.raises((Truncated, NotAnAthFile)) as caught:
+                whole.cut(size)
+            assert "\n" not in str(caught.value)
+
+
+def test_an_empty_file_is_no_ath_file():
+    with pytest.raises(NotAnAthFile):
+        athcodec.open(BytesIO(b""))
+
+
+def test_every_prefix_fails_in_strict_opening(full):
+    for size in range(len(full.data)):
+        with pytest.raises(FormatError):
+            full.cut(size, strict=True)
+    full.cut(len(full.data), strict=True).check()
+
+
+def test_what_is_missing_is_named(bushy):
+    first = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 1, 2))
+    decoder = bushy.cut(first + 1)
+    levels = len(bushy.depths)
+    assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
+    assert decoder.missing.count("level") == levels - 1
+    last = bushy.chunks[-1]
+    assert bushy.cut(last.offset + last.length - 1).missing == f"level {levels - 1}: segment 3"
+
+
+def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):
+    size = next(c.offset for c in full.chunks if c.kind & 0x7FFF == 32) + 3
+    decoder = full.cut(size)
+    assert not decoder.complete and "attributes" in decoder.missing
+    assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.attributes == {}
+
+
+def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
+    """A player that streams shows each segment at the best level it has."""
+    size = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 3, 2))
+    decoder = bushy.cut(size)
+    start, stop = bushy.segments[1]
+    assert decoder.deepest == 2
+    assert np.array_equal(decoder.positions(slice(start, stop), 3), bushy.positions[3][start:stop])
+    with pytest.raises(LevelUnavailable, match="level 3, segment 2"):
+        decoder.positions(stop, 3)
+
+
+def test_a_prefix_cut_after_a_level_plays_that_level_bit_for_bit(whole):
+    for level in whole.depths:
+        decoder = whole.cut(level.bytes)
+        assert decoder.deepest == level.depth
+        assert np.array_equal(decoder.positions(), whole.positions[level.depth])
+        with pytest.raises(LevelUnavailable):
+            whole.cut(level.bytes - 1).positions(depth=level.depth)
+
+
+# ---- truncate ----
+
+
+def test_truncated_files_are_whole_and_play_the_same_levels(whole, tmp_path):
+    for level in whole.depths:
+        target = tmp_path / f"{level.depth}.ath"
+        size = truncate(whole.path, target, level.depth)
+        assert size == target.stat().st_size
+        with athcodec.open(target, strict=True) as decoder:
+            decoder.check()
+            assert decoder.complete and decoder.missing == ""
+            assert decoder.level_count == level.depth + 1 and decoder.full_level_count == len(whole.depths)
+            for depth in range(level.depth + 1):
+                assert np.array_equal(decoder.positions(depth=depth), whole.positions[depth])
+            with pytest.raises(LevelUnavailable, match=f"expected 0 to {level.depth}"):
+                decoder.positions(depth=level.depth + 1)
+
+
+def test_a_truncated_file_promises_the_error_of_its_last_level(whole, tmp_path):
+    for level in whole.depths:
+        truncate(whole.path, tmp_path / "cut.ath", level.depth)
+        with athcodec.open(tmp_path / "cut.ath") as decoder:
+            expected = whole.bound if level.depth == len(whole.depths) - 1 else level.max_error
+            assert decoder.max_error_bound == expected
+            assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.depths] == [
+                (d.max_error, d.rms_error, d.nodes) for d in whole.depths[: level.depth + 1]]
+
+
+def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, tmp_path):
+    sizes = [truncate(full.path, tmp_path / "cut.ath", level.depth) for level in full.depths]
+    assert sizes == sorted(set(sizes)) and sizes[-1] == len(full.data)
+    truncate(full.path, tmp_path / "cut.ath", 0)
+    with athcodec.open(tmp_path / "cut.ath") as decoder:
+        assert np.array_equal(decoder.faces, full_clip.faces) and np.array_equal(decoder.edges, full_clip.edges)
+        assert decoder.metadata == full_clip.metadata
+        assert {name: a.tobytes() for name, a in decoder.attributes.items()} == {
+            name: a.tobytes() for name, a in full_clip.attributes.items()}
+
+
+def test_truncating_twice_is_truncating_once(bushy, tmp_path):
+    truncate(bushy.path, tmp_path / "three.ath", 3)
+    truncate(tmp_path / "three.ath", tmp_path / "twice.ath", 1)
+    truncate(bushy.path, tmp_path / "once.ath", 1)
+    assert (tmp_path / "twice.ath").read_bytes() == (tmp_path / "once.ath").read_bytes()
+    with pytest.raises(LevelUnavailable, match="expected 0 to 1"):
+        truncate(tmp_path / "twice.ath", tmp_path / "deeper.ath", 2)
+
+
+def test_a_file_can_be_truncated_onto_itself(bushy, tmp_path):
+    path = tmp_path / "own.ath"
+    path.write_bytes(bushy.data)
+    truncate(path, path, 1)
+    with athcodec.open(path, strict=True) as decoder:
+        assert np.array_equal(decoder.positions(), bushy.positions[1])
+
+
+def test_keeping_every_level_keeps_every_byte(whole, tmp_path):
+    truncate(whole.path, tmp_path / "same.ath", len(whole.depths) - 1)
+    assert (tmp_path / "same.ath").read_bytes() == whole.data
+
+
+def test_a_prefix_can_be_truncated_to_what_it_holds(bushy, tmp_path):
+    (tmp_path / "prefix.ath").write_bytes(bushy.data[: bushy.depths[2].bytes + 5])
+    truncate(tmp_path / "prefix.ath", tmp_path / "two.ath", 2)
+    with athcodec.open(tmp_path / "two.ath", strict=True) as decoder:
+        decoder.check()
+        assert np.array_equal(decoder.positions(), bushy.positions[2])
+
+
+def damaged(whole: Whole, change) -> bytes:
+    data = bytearray(whole.data)
+    change(data)
+    return bytes(data)
+
+
+def flip(place: int):
+    def change(data: bytearray) -> None:
+        data[place] ^= 4
+    return change
+
+
+@pytest.mark.parametrize("make, depth, error", [
+    (lambda w: w.data[: w.depths[1].bytes - 1], 1, Truncated),
+    (lambda w: w.data[: w.prelude - 1], 0, Truncated),
+    (lambda w: damaged(w, flip(w.prelude + 3)), 1, BadChecksum),
+    (lambda w: damaged(w, flip(w.prelude - 3)), 0, BadChecksum),
+    (lambda w: damaged(w, flip(70)), 0, FormatError),
+    (lambda w: b"no ath file at all", 0, NotAnAthFile),
+    (lambda w: w.data, 6, LevelUnavailable),
+    (lambda w: w.data, -1, LevelUnavailable),
+], ids=["level cut off", "prelude cut off", "level damaged", "prelude damaged", "table damaged", "something else",
+        "level beyond", "level before"])
+def test_truncating_what_cannot_be_truncated_raises_and_leaves_nothing(make, depth, error, bushy, tmp_path):
+    source, folder = tmp_path / "source.ath", tmp_path / "out"
+    source.write_bytes(make(bushy))
+    folder.mkdir()
+    with pytest.raises(error):
+        truncate(source, folder / "target.ath", depth)
+    assert not list(folder.iterdir())
+
+
+def test_a_failed_truncation_leaves_the_older_target_alone(bushy, tmp_path):
+    source, target = tmp_path / "source.ath", tmp_path / "target.ath"
+    source.write_bytes(damaged(bushy, flip(bushy.prelude + 3)))
+    target.write_bytes(b"older")
+    with pytest.raises(BadChecksum):
+        truncate(source, target, 2)
+    assert target.read_bytes() == b"older" and len(list(tmp_path.iterdir())) == 2
+
+
+def test_damage_in_a_level_that_is_left_out_does_no_harm(bushy, tmp_path):
+    source = tmp_path / "source.ath"
+    source.write_bytes(damaged(bushy, flip(len(bushy.data) - 5)))
+    truncate(source, tmp_path / "cut.ath", 2)
+    with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
+        decoder.check()
+        assert np.array_equal(decoder.positions(), bushy.positions[2])
