@@ -77,7 +77,7 @@ _SIGNATURES = {
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
     "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double, c_void_p, c_double]),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
         c_int64, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_double, c_double, c_void_p, c_int64]),

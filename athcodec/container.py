@@ -172,6 +172,7 @@ class Container:
         self.available_length = file.seek(0, 2)
         self.header, front = self._read_header()
         self.chunks, self.errors = self._read_tables(front)
+        self._places = {(chunk.kind, chunk.level, chunk.segment): chunk for chunk in reversed(self.chunks)}
         self._check_length(strict)
 
     def _read(self, offset: int, length: int, what: str) -> bytes:
@@ -294,7 +295,7 @@ class Container:
         return chunk.offset + chunk.length <= self.available_length
 
     def find(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> Chunk | None:
-        return next((c for c in self.chunks if (c.kind, c.level, c.segment) == (kind, level, segment)), None)
+        return self._places.get((kind, level, segment))
 
     def level_end(self, level: int) -> int:
         """Bytes of the file cut after `level`."""
@@ -344,6 +345,12 @@ def _head(form: struct.Struct, data: bytes, what: str) -> tuple:
     if len(data) < form.size:
         raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {form.size}")
     return form.unpack_from(data)
+
+
+def brief(value: object) -> str:
+    """What a file holds, as an error message shows it."""
+    text = repr(value)
+    return text if len(text) <= 100 else text[:97] + "..."
 
 
 def _positive(value: float, what: str) -> float:
@@ -518,7 +525,7 @@ def _dtype_from(description: object, what: str) -> np.dtype:
     except (TypeError, ValueError, IndexError, KeyError, OverflowError, RecursionError, SyntaxError):
         dtype = None
     if dtype is None or dtype.hasobject or not 0 < dtype.itemsize <= ITEM_BYTES:
-        raise BadChunk(f"{what}: got type {description!r}; expected plain numbers, bytes or records")
+        raise BadChunk(f"{what}: got type {brief(description)}; expected plain numbers, bytes or records")
     return dtype
 
 
@@ -529,7 +536,8 @@ def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> byt
     """
     limits, head = Limits(), dict(notes)
     if len(name.encode(errors="replace")) > limits.string_bytes:
-        raise ClipError(f"attributes: got a name of {len(name)} characters; expected at most {limits.string_bytes} bytes")
+        raise ClipError(f"attributes: got a name of {len(name)} characters; expected at most {limits.string_bytes} "
+                        f"bytes")
     if array is not None and not 0 < array.dtype.itemsize <= ITEM_BYTES:
         raise ClipError(f"array {name!r}: got items of {array.dtype.itemsize} bytes; expected 1 to {ITEM_BYTES}")
     if array is not None and array.nbytes > limits.decoded_chunk_bytes:
@@ -551,10 +559,10 @@ def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarra
         return head, None
     dtype, shape = _dtype_from(head["dtype"], what), head.get("shape")
     if not isinstance(shape, list) or len(shape) > 32 or not all(isinstance(n, int) and 0 <= n < 1 << 40 for n in shape):
-        raise BadChunk(f"{what}: got shape {shape!r}; expected a list of sizes")
+        raise BadChunk(f"{what}: got shape {brief(shape)}; expected a list of sizes")
     if math.prod(shape) == 0:
         if math.prod(n or 1 for n in shape) * dtype.itemsize > limits.decoded_chunk_bytes:
-            raise LimitExceeded(f"{what}: got shape {shape!r}; the limit is {limits.decoded_chunk_bytes} bytes")
+            raise LimitExceeded(f"{what}: got shape {brief(shape)}; the limit is {limits.decoded_chunk_bytes} bytes")
         return head, np.zeros(shape, dtype)
     return head, _decompress(data[_ARRAY.size + length:], dtype, tuple(shape), what, limits)
 
@@ -564,7 +572,7 @@ def array_name(data: bytes, what: str, limits: Limits) -> str:
     (length,) = _head(_ARRAY, data, what)
     name = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what).get("name")
     if not isinstance(name, str) or not name:
-        raise BadChunk(f"{what}: got name {name!r}; expected text")
+        raise BadChunk(f"{what}: got name {brief(name)}; expected text")
     if len(name.encode(errors="replace")) > limits.string_bytes:
         raise LimitExceeded(f"{what}: got a name of {len(name)} characters; the limit is {limits.string_bytes} bytes")
     return name

@@ -171,7 +171,7 @@ class Decoder:
         """Median frame rate; 0 for a single frame."""
         return float(1 / np.median(np.diff(self.time))) if self.frame_count > 1 else 0.0
 
-    @property
+    @cached_property
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
         count, frames = self.container.header.segment_count, self.frame_count
@@ -309,7 +309,7 @@ class Decoder:
 
     def _derived_dtype(self, head: dict) -> np.dtype:
         if head.get("derived") not in INTEGER_TYPES or np.iinfo(head["derived"]).max < self.vertex_count - 1:
-            raise BadChunk(f"EDGES: got {head!r}; expected an array or a type that holds derived edges")
+            raise BadChunk(f"EDGES: got {ct.brief(head)}; expected an array or a type that holds derived edges")
         return np.dtype(head["derived"])
 
     @cached_property
@@ -339,11 +339,12 @@ class Decoder:
             name = ct.array_name(data, str(chunk), self.limits)
             _, array = ct.parse_array(data, str(chunk), self.limits)
             if array is None or name in result:
-                raise BadChunk(f"{chunk}: got attribute {name!r} twice or without data")
+                raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice or without data")
             result[name] = array
             total = sum(array.nbytes for array in result.values())
             if total > self.limits.memory_bytes:
-                raise LimitExceeded(f"{chunk}: got {total} bytes of attributes; the limit is {self.limits.memory_bytes}")
+                raise LimitExceeded(f"{chunk}: got {total} bytes of attributes; the limit is "
+                                    f"{self.limits.memory_bytes}")
         return result
 
     # ---- motion ----
@@ -456,7 +457,11 @@ class Decoder:
         is_stem = np.arange(len(first)) >= len(nodes)
         matrices = np.empty((len(first), 3, 4))
         matrices[: len(nodes)] = motion.node_matrices(depth, self.origin)[at]
-        matrices[len(nodes):] = stem_maps(self.hierarchy, self.plan.rest + self.origin, positions[None])[0, stems]
+        try:
+            maps = stem_maps(self.hierarchy, self.plan.rest + self.origin, positions[None])
+        except np.linalg.LinAlgError:
+            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant") from None
+        matrices[len(nodes):] = maps[0, stems]
         branch = self.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
         order = np.argsort(first, kind="stable")
         return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
@@ -471,7 +476,11 @@ class Decoder:
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
             rows = slice(first, first + count)
-            out[self._vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ np.linalg.pinv(matrix[:, :3]).T
+            try:
+                inverse = np.linalg.pinv(matrix[:, :3])
+            except np.linalg.LinAlgError:
+                raise BadChunk(f"frame {frame}: got a matrix without an inverse; expected one of a plant") from None
+            out[self._vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ inverse.T
         return out
 
     # ---- checks ----

@@ -31,6 +31,7 @@ from athcodec.transform import (DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, Level
                                 position_error, split_segments)
 
 DEFAULT_REL_ERROR = 1e-4
+LARGEST_COORDINATE = 1e36
 EFFORTS = ("fast", "default", "best")
 SPOOL_BYTES = 64 << 20
 STATIC_METADATA = ("unit", "up_axis")
@@ -82,6 +83,7 @@ class Settings:
     lags: np.ndarray  # (B,) int32, file order
     omega: tuple[int, ...]
     learned: tuple[bool, ...]
+    level_errors: np.ndarray  # (levels,) RMS error of the paper's maps at each level, scene units
     node_quality: float = qz.NODE_QUALITIES[0]
 
 
@@ -102,6 +104,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     clip.check()
     hierarchy = hierarchy_of(clip)
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
+    _check_coordinates(seen)
     job = _Job(clip, hierarchy, seen, tam, segment_frames or DEFAULT_SEGMENT, exact_rest, attributes == "all", effort,
                report)
     if target_size is not None:
@@ -129,6 +132,13 @@ def _check_options(max_error, rel_error, target_size, segment_frames, attributes
         raise ValueError(f"attributes: got {attributes!r}; expected 'all' or 'none'")
     if effort not in EFFORTS:
         raise ValueError(f"effort: got {effort!r}; expected one of {', '.join(EFFORTS)}")
+
+
+def _check_coordinates(seen: Survey) -> None:
+    largest = float(np.abs([seen.low, seen.high]).max())
+    if largest > LARGEST_COORDINATE:
+        raise ClipError(f"positions: got a coordinate of {largest:.3g}; expected at most {LARGEST_COORDINATE:g}, so that "
+                        f"errors are float32 numbers")
 
 
 def _relative_bound(fraction: float, job: _Job) -> float:
@@ -401,7 +411,7 @@ def _code_segment(shape: _Shape, settings: Settings, source: np.ndarray) -> tupl
     plan, last = shape.plan, shape.plan.level_count - 1
     coded = _code_stems(shape, settings, source)
     segment = coded.segment
-    segment.analyse_nodes(source, settings.node_quality, qz.DEAD_ZONE)
+    segment.analyse_nodes(source, settings.node_quality, settings.level_errors, qz.DEAD_ZONE)
     chunks: dict[tuple[int, int], bytes] = {(level, ct.STEMS): data for level, data in coded.stems.items()}
     for level in range(plan.level_count):
         if plan.has_affines(level):
@@ -431,7 +441,19 @@ class _Search:
         self.levels = ath.height + 2
         self.sample = job.source(len(job.segments) // 2)
         self.start = Settings(bound, limit, qz.single(step), qz.single(rest_step), job.wide,
-                              _loose_branches(job, self.sample), _lags(job, rest_step), (0,) * self.levels, (False,) * self.levels)
+                              _loose_branches(job, self.sample), _lags(job, rest_step), (0,) * self.levels,
+                              (False,) * self.levels, self._level_errors(bound))
+
+    def _level_errors(self, bound: float) -> np.ndarray:
+        """What independent least-squares maps would leave at each level, in a few frames; at least the bound."""
+        some = np.linspace(0, self.sample.shape[2] - 1, min(8, self.sample.shape[2])).astype(int)
+        frames = np.empty((len(some), *self.sample.shape[:2]))
+        frames[:, self.job.hierarchy.vertex_source] = np.moveaxis(self.sample[:, :, some], 2, 0) + self.job.origin
+        errors = np.full(self.levels, bound)
+        for level in range(self.levels - 1):
+            left = self.ath.approximation(frames, level) - frames
+            errors[level] = max(bound, math.sqrt((left**2).sum() / (frames.size / 3)))
+        return errors
 
     def best(self) -> Settings:
         report = self.job.report
@@ -527,7 +549,7 @@ class _Search:
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         for quality in qz.NODE_QUALITIES:
             coded.segment.clear_nodes()
-            coded.segment.analyse_nodes(self.sample, quality, qz.DEAD_ZONE)
+            coded.segment.analyse_nodes(self.sample, quality, settings.level_errors, qz.DEAD_ZONE)
             size = sum(len(entropy.encode_affines(coded.segment, level)) for level in range(self.levels)
                        if shape.plan.has_affines(level))
             if size * scale <= allowed:
@@ -562,7 +584,8 @@ def _bound_for_size(job: _Job, target: int) -> float:
             sizes[relative] = result.store.size(result.header)
         return sizes[relative]
 
-    fine, coarse = 1e-7, 0.1
+    least = qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
+    fine, coarse = 1e-7, max(0.1, 2 * least / diagonal)
     if size(coarse) > target:
         raise BoundError(f"target size: got {target} bytes; expected at least {size(coarse)} for this clip")
     while coarse / fine > 1.02:

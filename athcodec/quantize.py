@@ -11,8 +11,8 @@ import numpy as np
 from athcodec.errors import BoundError
 
 DEAD_ZONE = 0.55
-NODE_QUALITIES = (0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # step of a node's map over its own RMS error
-NODE_SHARE, NODE_BYTES = 0.046, 950  # of the file that the maps may take, whichever is more
+NODE_QUALITIES = (0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # step of a node's map over its own RMS error
+NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 REST_CAP = 1.1  # rest pose step over bound: its own error stays within the bound
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step

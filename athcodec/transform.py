@@ -154,9 +154,14 @@ class SegmentMotion:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
         lib.ath_analyse(self.plan.shape, self.motion, self._source(source), dead_zone)
 
-    def analyse_nodes(self, source: np.ndarray, quality: float, dead_zone: float) -> None:
-        """Fills the maps of the nodes, after `analyse` or `pose`; `quality`: a map's step over its own RMS error."""
-        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source), quality, dead_zone)
+    def analyse_nodes(self, source: np.ndarray, quality: float, level_errors: np.ndarray, dead_zone: float) -> None:
+        """Fills the maps of the nodes, after `analyse` or `pose`.
+
+        A map's step is `quality` times its own RMS error or that of its level, whichever is more; level_errors:
+        (level_count,) float64, scene units.
+        """
+        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source), quality,
+                              address(level_errors, np.float64, self.plan.level_count), dead_zone)
 
     def clear_nodes(self) -> None:
         """Forgets the maps of the nodes."""

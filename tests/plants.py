@@ -28,7 +28,8 @@ def grow(rng: np.random.Generator, vertex_branch: np.ndarray, branch_parent: np.
     rest = np.zeros((len(vertex_branch), 3))
     for branch, parent in enumerate(branch_parent):
         mine = np.flatnonzero(vertex_branch == branch)
-        start = rest[rng.choice(np.flatnonzero(vertex_branch == parent))] if parent >= 0 else rng.normal(size=3) * branch
+        base = np.flatnonzero(vertex_branch == parent)
+        start = rest[rng.choice(base)] if parent >= 0 else rng.normal(size=3) * branch
         heading = rng.normal(size=3)
         for vertex in mine:
             heading += wild * rng.normal(size=3)

@@ -1,4 +1,4 @@
-"""What a decoder gives: levels with the errors it announces, maps that hang together, and no more reading than needed."""
+"""What a decoder gives: levels with the errors it announces, maps that hang together, no needless reading."""
 
 from __future__ import annotations
 

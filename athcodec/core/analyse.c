@@ -273,7 +273,7 @@ static int32_t half_octaves(double step)
 }
 
 static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch,
-                         const double *source, double quality, double dead_zone)
+                         const double *source, double quality, double level_error, double dead_zone)
 {
     const ath_node *node = shape->nodes + n;
     const ath_piece *piece = shape->pieces + node->piece;
@@ -283,7 +283,8 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     ath_attach(shape, motion, piece, scratch->at);
     double square = node_moments(shape, node, T, scratch, source, tracks, centre);
     square = fit_node(node, root, T, tracks, centre, square);
-    motion->node_steps[n] = half_octaves(quality * ath_sqrt(square));
+    double error = ath_sqrt(square);
+    motion->node_steps[n] = half_octaves(quality * (error > level_error ? error : level_error));
     double step = ath_node_step(motion, n);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
@@ -291,10 +292,10 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     if (root) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
 }
 
-void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source, double node_quality,
-                       double dead_zone)
+void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source, double quality,
+                       const double *level_error, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(motion);
     for (int32_t n = 0; n < shape->node_count; n++)
-        if (shape->nodes[n].coded) analyse_node(shape, motion, n, &scratch, source, node_quality, dead_zone);
+        if (shape->nodes[n].coded) analyse_node(shape, motion, n, &scratch, source, quality, level_error[shape->nodes[n].level], dead_zone);
 }

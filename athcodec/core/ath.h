@@ -187,10 +187,11 @@ ATH_API uint32_t ath_crc32c(uint32_t crc, const uint8_t *bytes, size_t size);
 /* ---- encoding --------------------------------------------------------------------------------------------------- */
 
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
- * source: vertex-major doubles less the origin. node_quality: step of a map over its own RMS error. */
+ * source: vertex-major doubles less the origin. A map's step is `quality` times its own RMS error or that of its
+ * level, whichever is more; level_error: height + 2 lengths. */
 ATH_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double *source, double dead_zone);
 ATH_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source,
-                               double node_quality, double dead_zone);
+                               double quality, const double *level_error, double dead_zone);
 
 /* Largest distance and sum of squared distances between positions and source (plus origin). */
 ATH_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,

@@ -1,0 +1,159 @@
+"""Levels of detail: bytes, errors and gaps at the joints, beside the paper's own approximation A^d.
+
+Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is athcodec.ath:
+one independent least-squares affine map per piece and frame, as exact matrices, never quantised. Ours is what
+the decoder gives for the bytes of that level.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec._native import LOOSE
+from athcodec.ath import Ath, Gaps
+from athcodec.decoder import Depth
+from athcodec.metrics import ErrorMeter
+from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
+from bench.report import table
+
+GAP_FRAMES = 9
+ROUNDING = 1e-6  # the error table holds float32
+
+LEVELS_NOTE = """
+Bytes: the file cut after this level, with rest pose and hierarchy, without attributes. Errors over the
+diagonal of the bounding box of all frames, measured on decoded positions. Ratio: our RMS over the paper's.
+Above a level's nodes our stems are exact, the paper's are affine maps; the paper's maps are not quantised, so
+where pieces are rigid they have no error at all and ours have that of the bound. The last level is the
+original within the bound; the paper gets there by its residuals.
+"""
+
+GAPS_NOTE = """
+Over the diagonal. Joints: attach points between two different pieces of the level. Ours: the distance between
+the place where the child's matrix puts its attach point's rest position and the place where the parent's
+decoded stem has that vertex (float32 output and rest pose: their rounding is included). An exact stem hangs
+on its parent's decoded stem by construction and counts as 0 (so do all joints of the last level, left out
+here); 'measured' are the other joints. The paper's: the distance between the places where the child's and the
+parent's maps put the attach vertex. The RMS goes over all joints and frames on both sides. 'Loose' joints are
+measured ones whose child the encoder lets come off, because it does so in the source.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_clips(parser)
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    levels, gaps, broken = [], [], []
+    for path in args.clips:
+        with encoded(path, args.rel_error) as result:
+            ath = _same_nodes(result)
+            for stored in result.decoder.depths:
+                case = {"clip": path.stem, "level": stored.depth}
+                has_nodes = stored.depth <= ath.height
+                ours = measure(result.clip, result.decoder, stored.depth)
+                paper = _measure_paper(result.clip, ath, stored.depth) if has_nodes else None
+                levels.append(case | _level_row(stored, ours, paper))
+                broken += _broken_lines(path, stored, ours, result.decoder)
+                if has_nodes:
+                    gaps.append(case | _gap_row(result, ath, stored.depth, ours.diagonal))
+    return {"tables": [
+        table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
+        table(f"Gaps at the attach points, {GAP_FRAMES} frames", gaps, GAPS_NOTE),
+    ], "broken": broken}
+
+
+def _same_nodes(result: Encoded) -> Ath:
+    """The paper's ATH with the thresholds of the file."""
+    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound,
+                             hierarchy=result.decoder.hierarchy)
+    ours, theirs = result.decoder.table1(), ath.table1()
+    if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
+        raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
+    return ath
+
+
+def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMeter:
+    meter = ErrorMeter()
+    for _, frames in clip.blocks():
+        meter.add(frames, ath.approximation(frames, depth))
+    return meter
+
+
+def _level_row(stored: Depth, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
+    diagonal = ours.diagonal
+    return {
+        "nodes": stored.nodes, "bytes": stored.bytes,
+        "max": ours.max_error / diagonal, "RMS": ours.rms_error / diagonal,
+        "paper max": paper and paper.max_error / diagonal, "paper RMS": paper and paper.rms_error / diagonal,
+        "ratio": ours.rms_error / paper.rms_error if paper and paper.rms_error else None,
+    }
+
+
+def _broken_lines(path: Path, stored: Depth, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
+    """What the file says of this level's error, and promises of its last, that decoding does not bear out."""
+    is_last = stored.depth == decoder.level_count - 1
+    promised = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
+    if ours.max_error <= promised:
+        return []
+    return [f"{path.name}, level {stored.depth}: got an error of {ours.max_error:.9g}; "
+            f"expected at most {promised:.9g}"]
+
+
+# ---- gaps ----
+
+
+def _gap_row(result: Encoded, ath: Ath, depth: int, diagonal: float) -> dict[str, Any]:
+    clip = result.clip
+    frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
+    source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
+    paper = ath.attachment_gaps(source, depth)
+    joints = _Joints(result.decoder, depth)
+    ours = joints.gaps(frames)
+    return {
+        "joints": len(joints.branch), "measured": len(joints.measured), "loose": joints.loose,
+        "max": ours.max / diagonal, "RMS": ours.rms / diagonal,
+        "paper max": paper.max / diagonal, "paper RMS": paper.rms / diagonal,
+    }
+
+
+class _Joints:
+    """The attach points between two pieces of a level, by the branches that hang there, in file order."""
+
+    def __init__(self, decoder: athcodec.Decoder, depth: int) -> None:
+        self.decoder, self.depth = decoder, depth
+        hierarchy, parts = decoder.hierarchy, decoder.affines(0, depth)
+        part_of_branch = np.searchsorted(parts.first_vertex, hierarchy.first_vertex, side="right") - 1
+        part_of_attach = np.searchsorted(parts.first_vertex, hierarchy.attach, side="right") - 1
+        is_joint = (hierarchy.attach >= 0) & (part_of_branch != part_of_attach)
+        self.branch = np.flatnonzero(is_joint)
+        self.measured = np.flatnonzero(is_joint & ~parts.is_stem[part_of_branch])
+        self._part = part_of_branch[self.measured]
+        self._attach = hierarchy.vertex_source[hierarchy.attach[self.measured]]
+        if not parts.is_stem[part_of_attach[self.measured]].all():
+            raise RuntimeError(f"level {depth}: got a node on a node; expected exact stems above nodes")
+
+    @property
+    def loose(self) -> int:
+        """How many of the measured ones carry a translation of their own."""
+        return int((self.decoder.plan.branches["flags"][self.measured] & LOOSE > 0).sum())
+
+    def gaps(self, frames: list[int]) -> Gaps:
+        """Largest and RMS gap over these frames and all joints."""
+        if not len(self.measured):
+            return Gaps(0.0, 0.0)
+        squares = np.array([self._squares(frame) for frame in frames])
+        return Gaps(float(np.sqrt(squares.max())),
+                    float(np.sqrt(squares.sum() / (len(frames) * len(self.branch)))))
+
+    def _squares(self, frame: int) -> np.ndarray:
+        matrices = self.decoder.affines(frame, self.depth).matrices[self._part]
+        rest = self.decoder.rest[self._attach].astype(np.float64)
+        by_child = (matrices[:, :, :3] @ rest[:, :, None])[..., 0] + matrices[:, :, 3]
+        by_parent = self.decoder.positions(frame, self.depth, np.float64)[self._attach]
+        return ((by_child - by_parent) ** 2).sum(axis=1)

@@ -1,0 +1,74 @@
+"""Peak memory of encoding a clip, and the same clip repeated in time.
+
+It must not grow with the number of frames. All encodings have segments as long as those of the single clip,
+so that the number of frames alone differs. Every encoding, and every writing of a longer clip, is a process
+of its own (peak.py), because a process inherits the peak of the one that starts it: this one stays as small
+as its imports.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from athcodec.transform import MIN_SEGMENT, split_segments
+from bench.clips import add_clips, add_rel_error
+from bench.report import table
+
+ROOT = Path(__file__).resolve().parent.parent
+REPEATS = (4, 8)
+
+NOTE = """
+Times: how often the clip is repeated in time, in a gzip-compressed HDF5 file; all in segments of one length.
+Positions: the clip's own raw size. Peak: largest resident memory of the whole process; imports: the same
+before anything is read. A few segments are in work at once: clips with fewer need less.
+HDF5's chunk cache, at most 64 MiB, is part of it: it fills as a clip gets longer.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_clips(parser)
+    add_rel_error(parser)
+    parser.add_argument("--repeats", type=int, nargs="+", default=list(REPEATS), metavar="N",
+                        help="how many times over the clip is encoded too (default 4 8)")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    rows = []
+    for path in args.clips:
+        segment = str(_segment_frames(path))
+        for repeats in (1, *args.repeats):
+            with tempfile.TemporaryDirectory() as folder:
+                longer, file = str(Path(folder) / "clip.h5"), str(Path(folder) / "clip.ath")
+                _process("repeat", str(path.resolve()), longer, str(repeats))
+                peak = _process("encode", longer, file, str(args.rel_error), segment)
+            rows.append({"clip": path.stem, "times": repeats} | _row(peak))
+    return {"tables": [
+        table(f"Peak memory of encoding, bound {args.rel_error:g}, MB of 1,000,000 bytes", rows, NOTE),
+    ], "broken": []}
+
+
+def _segment_frames(path: Path) -> int:
+    with athcodec.read_hdf5(path) as clip:
+        segments = split_segments(clip.frame_count, clip.vertex_count)
+    return max(MIN_SEGMENT, *(stop - start for start, stop in segments))
+
+
+def _process(*words: str) -> dict[str, int]:
+    command = [sys.executable, "-m", "bench.peak", *words]
+    done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    return json.loads(done.stdout)
+
+
+def _row(peak: dict[str, int]) -> dict[str, float | int]:
+    return {
+        "frames": peak["frames"], "segments": peak["segments"], "positions": peak["raw_bytes"] / 1e6,
+        "file": peak["bytes"] / 1e6, "imports": peak["imports"] / 1e6, "peak": peak["peak"] / 1e6,
+        "peak - imports": (peak["peak"] - peak["imports"]) / 1e6,
+    }

@@ -1,0 +1,84 @@
+"""File sizes per clip and error bound, after the bound was verified by decoding.
+
+Files hold what the motion needs and nothing else: attributes, faces, edges and metadata other than unit and
+up axis are left out. Every file is decoded whole and measured against the source; its size counts only if the
+bound holds.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from athcodec.encoder import EFFORTS
+from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from bench.clips import Encoded, add_clips, encoded, measure
+from bench.report import table
+
+REL_ERRORS = (1e-3, 1e-4, 1e-5)
+
+SIZES_NOTE = """
+Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames.
+Ratio: float32 positions over the whole file. RMS over the diagonal; KG in per cent; motion: RMS error over
+the RMS distance from the rest pose.
+"""
+
+CHUNKS_NOTE = """
+HEADER is header, chunk table and error table; AFFINES are the maps of inner nodes, their share is that of the
+whole file.
+"""
+
+CHOICES_NOTE = """
+Rotations (step factors) and learned time bases by level.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_clips(parser)
+    parser.add_argument("--rel-error", type=float, nargs="+", default=list(REL_ERRORS), metavar="FRACTION",
+                        help="error bounds over the bounding box's diagonal")
+    parser.add_argument("--effort", nargs="+", choices=EFFORTS, default=["default"],
+                        help="efforts of the encoder")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    sizes, chunks, choices, broken = [], [], [], []
+    for path in args.clips:
+        for rel_error in args.rel_error:
+            for effort in args.effort:
+                case = {"clip": path.stem, "bound": f"{rel_error:g}", "effort": effort}
+                with encoded(path, rel_error, effort) as result:
+                    meter = measure(result.clip, result.decoder)
+                sizes.append(case | _size_row(result, meter, rel_error))
+                chunks.append(case | _chunk_row(result.summary.chunk_bytes))
+                choices.append(case | result.summary.choices)
+                if not sizes[-1]["kept"]:
+                    broken.append(_broken_line(path, rel_error, effort, meter.max_error, result))
+    return {"tables": [
+        table("Sizes", sizes, SIZES_NOTE),
+        table("Bytes per kind of chunk", chunks, CHUNKS_NOTE),
+        table("Choices of the encoder", choices, CHOICES_NOTE),
+    ], "broken": broken}
+
+
+def _size_row(result: Encoded, meter: ErrorMeter, rel_error: float) -> dict[str, Any]:
+    summary, clip = result.summary, result.clip
+    # the file's own promise, and what was asked for on the diagonal as measured here
+    bound = min(summary.max_error_bound, rel_error * meter.diagonal)
+    return {
+        "bytes": summary.bytes, "ratio": summary.ratio,
+        "bits/vertex/frame": bits_per_vertex_frame(summary.bytes, clip.frame_count, clip.vertex_count),
+        "max/bound": meter.max_error / bound, "kept": meter.max_error <= bound,
+        "RMS": meter.rms_error / meter.diagonal, "KG %": meter.kg_error,
+        "motion": meter.motion_normalised_error,
+    }
+
+
+def _chunk_row(chunk_bytes: dict[str, int]) -> dict[str, Any]:
+    return chunk_bytes | {"AFFINES %": 100 * chunk_bytes.get("AFFINES", 0) / sum(chunk_bytes.values())}
+
+
+def _broken_line(path: Path, rel_error: float, effort: str, max_error: float, result: Encoded) -> str:
+    return (f"{path.name} at {rel_error:g}, effort {effort}: got an error of {max_error:.6g}; "
+            f"expected at most {result.summary.max_error_bound:.6g}")

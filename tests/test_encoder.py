@@ -1,0 +1,335 @@
+"""How encoding behaves: sizes that were asked for, refusals, files that appear whole or not at all, and memory."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+
+import h5py
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import MotionClip
+from athcodec import clip as clip_module
+from athcodec.errors import BoundError, ClipError
+from plants import clip_of, plant
+
+
+@pytest.fixture
+def small():
+    return plant(seed=1, branches=5, longest=4, frames=40)
+
+
+def encoded(clip, folder, **options) -> bytes:
+    return athcodec.encode(clip, folder / "e.ath", **{"effort": "fast"} | options).path.read_bytes()
+
+
+# ---- bounds and sizes ----
+
+
+@pytest.mark.parametrize("target", [6_000, 15_000, 40_000])
+def test_a_target_size_is_met_from_below_and_used(target, sample_clip, sample_positions, tmp_path):
+    summary = athcodec.encode(sample_clip, tmp_path / "s.ath", target_size=target, effort="fast")
+    assert 0.85 * target <= summary.bytes <= target
+    assert summary.bytes == summary.path.stat().st_size
+    with athcodec.open(summary.path, strict=True) as decoder:
+        error = np.linalg.norm(decoder.positions() - sample_positions.astype(np.float64), axis=2).max()
+    assert error <= summary.max_error_bound
+
+
+def test_a_target_size_that_no_bound_reaches_is_refused_with_the_least_size(small, tmp_path):
+    with pytest.raises(BoundError, match=r"got 100 bytes; expected at least (\d+)") as caught:
+        athcodec.encode(small, tmp_path / "s.ath", target_size=100, effort="fast")
+    least = int(str(caught.value).split("at least ")[1].split()[0])
+    assert 100 < least < 5000
+    assert athcodec.encode(small, tmp_path / "s.ath", target_size=least, effort="fast").bytes <= least
+
+
+def test_a_generous_target_size_gives_a_fine_file(small, tmp_path):
+    summary = athcodec.encode(small, tmp_path / "s.ath", target_size=10**7, effort="fast")
+    assert summary.bytes < 10**5 and summary.relative_bound < 1e-5
+
+
+@pytest.mark.parametrize("place", [0.0, 1e6])
+def test_a_target_size_works_where_nothing_has_any_extent(place, tmp_path):
+    clip = clip_of(np.full((5, 3, 3), place), np.full((3, 3), place), [0, 0, 0], [-1])
+    assert athcodec.encode(clip, tmp_path / "s.ath", target_size=5000, effort="fast").bytes <= 5000
+
+
+def test_the_default_bound_is_a_ten_thousandth_of_the_diagonal(small, tmp_path):
+    summary = athcodec.encode(small, tmp_path / "s.ath", effort="fast")
+    box = np.ptp(small.positions.reshape(-1, 3).astype(float), axis=0)
+    assert summary.relative_bound == pytest.approx(1e-4)
+    assert summary.max_error_bound == pytest.approx(1e-4 * np.linalg.norm(box))
+
+
+def test_a_bound_in_scene_units_is_taken_as_it_is(small, tmp_path):
+    assert athcodec.encode(small, tmp_path / "s.ath", max_error=0.0123, effort="fast").max_error_bound == 0.0123
+
+
+def test_a_looser_bound_gives_a_smaller_file(sample_clip, tmp_path):
+    sizes = [len(encoded(sample_clip, tmp_path, rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
+    assert sizes == sorted(sizes, reverse=True) and sizes[0] > 4 * sizes[-1]
+
+
+def test_the_sample_is_coded_in_a_fiftieth_of_its_size(sample_clip, tmp_path):
+    assert athcodec.encode(sample_clip, tmp_path / "s.ath").ratio > 50
+
+
+@pytest.mark.parametrize("dtype, offset, bound", [(np.float32, 1e6, 1e-3), (np.float64, 1e6, 1e-12),
+                                                  (np.float32, 0.0, 1e-9)])
+def test_a_bound_finer_than_the_sources_numbers_is_refused_with_the_least_possible(dtype, offset, bound, tmp_path):
+    clip = plant(seed=1, branches=3, frames=16, dtype=dtype, offset=offset)
+    with pytest.raises(BoundError, match=rf"expected more than .* spacing of the source's {np.dtype(dtype).name}"):
+        athcodec.encode(clip, tmp_path / "s.ath", max_error=bound, effort="fast")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("options, error, message", [
+    ({"max_error": 1.0, "rel_error": 1e-3}, ValueError, "max_error and rel_error; expected one"),
+    ({"rel_error": 1e-3, "target_size": 10}, ValueError, "rel_error and target_size; expected one"),
+    ({"max_error": 0.0}, BoundError, "max_error: got 0.0"),
+    ({"max_error": -1.0}, BoundError, "max_error: got -1.0"),
+    ({"max_error": float("nan")}, BoundError, "max_error: got nan"),
+    ({"rel_error": float("inf")}, BoundError, "rel_error: got inf"),
+    ({"rel_error": 0}, BoundError, "rel_error: got 0"),
+    ({"target_size": 0}, BoundError, "target_size: got 0"),
+    ({"segment_frames": 15}, ValueError, "segment_frames: got 15; expected 16 to 256"),
+    ({"segment_frames": 257}, ValueError, "segment_frames: got 257; expected 16 to 256"),
+    ({"attributes": "some"}, ValueError, "attributes: got 'some'"),
+    ({"effort": "heroic"}, ValueError, "effort: got 'heroic'; expected one of fast, default, best"),
+])
+def test_options_out_of_range_are_refused_by_name(options, error, message, small, tmp_path):
+    with pytest.raises(error, match=message):
+        athcodec.encode(small, tmp_path / "s.ath", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_coordinates_beyond_what_a_file_can_hold_are_refused_and_leave_nothing(tmp_path):
+    clip = plant(seed=1, branches=3, frames=16, dtype=np.float64, scale=1e100)
+    with pytest.raises((ClipError, BoundError)):
+        athcodec.encode(clip, tmp_path / "s.ath", effort="fast")
+    assert not list(tmp_path.iterdir())
+
+
+# ---- files ----
+
+
+def poisoned_file(path, frame: int) -> None:
+    """A clip as HDF5, which is read in blocks, with one NaN in its motion."""
+    source = plant(seed=1, branches=5, longest=4, frames=60)
+    athcodec.write_hdf5(path, source)
+    with h5py.File(path, "r+") as file:
+        file["positions"][frame, 2, 1] = np.nan
+
+
+def test_nan_late_in_a_lazily_read_clip_is_named_and_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(clip_module, "BLOCK_BYTES", 2000)
+    poisoned_file(tmp_path / "poisoned.h5", 55)
+    out = tmp_path / "out"
+    out.mkdir()
+    with athcodec.read_hdf5(tmp_path / "poisoned.h5") as clip, pytest.raises(ClipError, match="frame 55, vertex 2"):
+        athcodec.encode(clip, out / "s.ath", effort="fast")
+    assert not list(out.iterdir())
+
+
+class Fading:
+    """Positions that turn bad between the first reading and the second."""
+
+    def __init__(self, array: np.ndarray, good_reads: int, error: type[Exception] | None = None):
+        self.array, self.shape, self.dtype = array, array.shape, array.dtype
+        self.good_reads, self.error = good_reads, error
+
+    def __getitem__(self, frames):
+        self.good_reads -= frames.stop == len(self.array)
+        if self.good_reads >= 0:
+            return self.array[frames]
+        if self.error:
+            raise self.error("the disk is gone")
+        return np.full_like(self.array[frames], np.nan)
+
+
+@pytest.mark.parametrize("error", [None, OSError])
+@pytest.mark.parametrize("good_reads", [0, 1])
+def test_a_source_that_fails_while_it_is_coded_leaves_no_file(error, good_reads, small, tmp_path):
+    fading = MotionClip(positions=Fading(small.positions, good_reads, error), rest=small.rest, time=small.time,
+                        vertex_branch=small.vertex_branch, branch_parent=small.branch_parent)
+    with pytest.raises(ClipError, match="positions: frame|positions: frames"):
+        athcodec.encode(fading, tmp_path / "s.ath", segment_frames=16, effort="fast")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("stage", ["survey", "search", "motion"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_an_interruption_leaves_the_old_file_and_no_other(stage, error, small, tmp_path):
+    def interrupt(now: str, fraction: float) -> None:
+        if now == stage and fraction >= (0.3 if stage == "motion" else 0):
+            raise error("enough")
+
+    target = tmp_path / "s.ath"
+    target.write_bytes(b"older")
+    with pytest.raises(error):
+        athcodec.encode(small, target, segment_frames=16, effort="fast", progress=interrupt)
+    assert target.read_bytes() == b"older" and list(tmp_path.iterdir()) == [target]
+
+
+def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
+    target = tmp_path / "s.ath"
+    target.write_bytes(b"older")
+    seen = set()
+
+    def look(stage: str, fraction: float) -> None:
+        if stage != "done":
+            seen.add(target.read_bytes())
+
+    summary = athcodec.encode(small, target, effort="fast", progress=look)
+    assert seen == {b"older"} and list(tmp_path.iterdir()) == [target]
+    with athcodec.open(target, strict=True) as decoder:
+        decoder.check()
+        assert decoder.file_length == summary.bytes
+
+
+def test_a_folder_that_does_not_exist_is_an_os_error(small, tmp_path):
+    with pytest.raises(OSError):
+        athcodec.encode(small, tmp_path / "nowhere" / "s.ath", effort="fast")
+
+
+def test_a_name_without_a_folder_is_a_file_here(small, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    athcodec.encode(small, "here.ath", effort="fast")
+    assert [path.name for path in tmp_path.iterdir()] == ["here.ath"]
+
+
+# ---- progress and determinism ----
+
+
+@pytest.mark.parametrize("effort", ["fast", "default", "best"])
+def test_progress_rises_through_the_stages(effort, small, tmp_path):
+    calls: list[tuple[str, float]] = []
+    athcodec.encode(small, tmp_path / "s.ath", segment_frames=16, effort=effort,
+                    progress=lambda stage, fraction: calls.append((stage, fraction)))
+    stages = list(dict.fromkeys(stage for stage, _ in calls))
+    assert stages == ["survey", "search", "motion", "done"]
+    for stage in stages:
+        fractions = [fraction for name, fraction in calls if name == stage]
+        assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] == 1.0
+    assert [fraction for stage, fraction in calls if stage == "motion"] == pytest.approx([1 / 3, 2 / 3, 1])
+
+
+@pytest.mark.parametrize("effort", ["fast", "default", "best"])
+def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
+    first, second = (encoded(bushy_clip, tmp_path, effort=effort, segment_frames=16) for _ in range(2))
+    assert first == second
+
+
+def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path, monkeypatch):
+    many = encoded(bushy_clip, tmp_path, segment_frames=16, effort="default")
+    monkeypatch.setattr("athcodec.encoder._threads", lambda: 1)
+    assert encoded(bushy_clip, tmp_path, segment_frames=16, effort="default") == many
+
+
+def test_encoding_leaves_the_clip_as_it_was(bushy_clip, tmp_path):
+    before = {name: getattr(bushy_clip, name).tobytes() for name in ("positions", "rest", "time", "vertex_branch",
+                                                                    "branch_parent", "stem_index")}
+    encoded(bushy_clip, tmp_path)
+    assert all(getattr(bushy_clip, name).tobytes() == data for name, data in before.items())
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype, tmp_path):
+    source = plant(seed=1, branches=5, frames=20, dtype=dtype)
+    swapped = source.positions.astype(source.positions.dtype.newbyteorder(">"))
+    strided = np.asfortranarray(source.positions)
+    files = []
+    for positions in (source.positions, swapped, strided):
+        clip = MotionClip(positions=positions, rest=source.rest, time=source.time, vertex_branch=source.vertex_branch,
+                          branch_parent=source.branch_parent)
+        files.append(encoded(clip, tmp_path))
+    assert files[0] == files[1] == files[2]
+
+
+def test_plain_lists_can_be_encoded(tmp_path):
+    clip = MotionClip(positions=np.zeros((2, 3, 3)) + [[[0.0], [1], [2]], [[0], [1], [2.5]]], time=[0, 1],
+                      vertex_branch=[0, 0, 0], branch_parent=[-1])
+    athcodec.encode(clip, tmp_path / "s.ath", rel_error=1e-3)
+    with athcodec.open(tmp_path / "s.ath", strict=True) as decoder:
+        assert np.abs(decoder.positions() - clip.positions).max() <= decoder.max_error_bound
+
+
+# ---- memory ----
+
+
+class Endless:
+    """Positions made when they are read, so many frames at a time at most."""
+
+    def __init__(self, rest: np.ndarray, frames: int, at_once: int):
+        self.rest, self.shape, self.dtype, self.at_once = rest, (frames, *rest.shape), np.dtype(np.float32), at_once
+        self.read = np.zeros(frames, int)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __array__(self, *_, **__):
+        raise AssertionError("the motion was read whole")
+
+    def __getitem__(self, frames: slice) -> np.ndarray:
+        assert isinstance(frames, slice) and frames.step is None
+        assert frames.stop - frames.start <= self.at_once, "more frames were read at once than a segment or block has"
+        self.read[frames] += 1
+        angle = np.arange(frames.start, frames.stop)[:, None, None] * 0.05
+        return np.float32(self.rest + 0.1 * np.sin(angle + self.rest[:, :1]) * self.rest[:, 2:] ** 2)
+
+
+def endless_clip(frames: int, vertices: int = 200, at_once: int = 32) -> MotionClip:
+    rest = np.stack([np.zeros(vertices), np.zeros(vertices), np.linspace(0, 3, vertices)], 1)
+    return MotionClip(positions=Endless(rest, frames, at_once), rest=rest, time=np.arange(frames) / 30,
+                      vertex_branch=np.zeros(vertices, int), branch_parent=[-1])
+
+
+def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
+    monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
+    clip = endless_clip(600)
+    summary = athcodec.encode(clip, tmp_path / "s.ath", segment_frames=32, effort="fast")
+    assert clip.positions.read.min() >= 2 and clip.positions.read.max() <= 4
+    with athcodec.open(summary.path, strict=True) as decoder:
+        for start, block in decoder.blocks():
+            source = clip.block(start, start + len(block))
+            assert np.linalg.norm(block.astype(np.float64) - source, axis=2).max() <= summary.max_error_bound
+
+
+def peak_memory(clip: MotionClip, folder) -> int:
+    tracemalloc.start()
+    try:
+        athcodec.encode(clip, folder / "s.ath", segment_frames=32, effort="fast")
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
+    monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
+    monkeypatch.setattr("athcodec.encoder.SPOOL_BYTES", 1 << 16)
+    peak_memory(endless_clip(64), tmp_path)   # what is made once, such as imports, is not counted
+    short, long = (peak_memory(endless_clip(frames), tmp_path) for frames in (320, 1600))
+    raw = 1600 * 200 * 12
+    assert long < 1.2 * short + 200_000, "but for a few numbers per frame and segment"
+    assert long - short < raw / 4
+
+
+def test_long_clips_decode_in_time_proportional_to_their_length(tmp_path):
+    """Looking chunks up must not cost more the more there are."""
+
+    def seconds(frames: int) -> float:
+        wave = np.zeros((frames, 1, 3)) + np.sin(np.arange(frames) / 9)[:, None, None]
+        athcodec.encode(clip_of(wave, np.zeros((1, 3)), [0], [-1]), tmp_path / "s.ath", rel_error=1e-2,
+                        segment_frames=16, effort="fast")
+        with athcodec.open(tmp_path / "s.ath") as decoder:
+            times = []
+            for _ in range(3):
+                start = time.perf_counter()
+                decoder.positions()
+                times.append(time.perf_counter() - start)
+        return min(times)
+
+    assert seconds(16_000) < 2.5 * 8 * seconds(2_000)
