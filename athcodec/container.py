@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -48,6 +50,7 @@ class Limits:
     vertices: int = 1 << 26
     branches: int = 1 << 20
     frames: int = 1 << 20
+    hierarchy_depth: int = 4096
     attributes: int = 256
     string_bytes: int = 4096
     chunk_bytes: int = 256 << 20
@@ -85,7 +88,8 @@ class Chunk:
 
     @property
     def is_motion(self) -> bool:
-        return self.kind in (STEMS, AFFINES, CORRECTIONS)
+        """Whether the kind belongs to a level and a segment: known ones, and those reserved for it."""
+        return 16 <= self.kind & ~OPTIONAL < 32
 
     def __str__(self) -> str:
         name = KIND_NAMES.get(self.kind, f"kind {self.kind:#06x}")
@@ -191,8 +195,8 @@ class Container:
             raise NotAnAthFile(f"file: got {front[:8]!r} at byte 0; expected {MAGIC!r}")
         if len(front) >= 12:
             major, minor = struct.unpack_from("<HH", front, 8)
-            if major != MAJOR:
-                raise UnsupportedVersion(f"file: got format version {major}.{minor}; expected {MAJOR}.x")
+            if (major, minor) != (MAJOR, MINOR):
+                raise UnsupportedVersion(f"file: got format version {major}.{minor}; expected {MAJOR}.{MINOR}")
         if len(front) < _HEADER.size:
             raise Truncated(f"header: got {len(front)} bytes; expected {_HEADER.size}")
         (_, _, _, self._checksum, length, chunk_count, vertices, branches, frames, segments, levels, full_levels, clips,
@@ -266,7 +270,7 @@ class Container:
         return _order(chunk) < _order(before) or (_order(chunk) == _order(before) and not repeatable)
 
     def _check_chunk(self, chunk: Chunk) -> None:
-        if chunk.kind not in KIND_NAMES and not chunk.kind & OPTIONAL:
+        if chunk.kind not in KIND_NAMES and (not chunk.kind & OPTIONAL or chunk.kind ^ OPTIONAL in KIND_NAMES):
             raise UnknownChunk(f"{chunk}: got a required kind that this decoder does not know")
         if chunk.length > self.limits.chunk_bytes:
             raise LimitExceeded(f"{chunk}: got {chunk.length} bytes; the limit is {self.limits.chunk_bytes}")
@@ -409,6 +413,8 @@ def parse_rest(data: bytes, vertex_count: int, limits: Limits) -> Rest:
 def pack_time(time: np.ndarray) -> bytes:
     """Times in seconds, (T,) float64, exactly: by a rule where one gives the very same numbers."""
     index, first = np.arange(len(time)), float(time[0])
+    if len(time) == 1:
+        return _TIME_UNIFORM.pack(0, first, 1.0)
     if len(time) > 1:
         steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
         with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
@@ -506,6 +512,9 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
     try:
         if expected == 0 or zstandard.frame_content_size(data) != expected:
             raise BadChunk(f"{what}: got a zstd frame of another size; expected {expected} bytes")
+        window = zstandard.get_frame_parameters(data).window_size  # max_window_size below does not bind in one call
+        if window > _ZSTD_WINDOW and window > expected:
+            raise LimitExceeded(f"{what}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
         return zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW).decompress(data, allow_extra_data=False)
     except (zstandard.ZstdError, MemoryError) as error:
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
@@ -515,16 +524,34 @@ def _type_of(dtype: np.dtype) -> object:
     return np.lib.format.dtype_to_descr(dtype)
 
 
-def _dtype_from(description: object, what: str) -> np.dtype:
-    def fields(entries):  # what JSON made lists of, as NumPy has it: (name, type) or (name, type, shape)
-        return [(tuple(name) if isinstance(name, list) else name, fields(kind) if isinstance(kind, list) else kind,
-                 *map(tuple, shape)) for name, kind, *shape in entries]
+_PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}")
 
-    try:
-        dtype = np.lib.format.descr_to_dtype(fields(description) if isinstance(description, list) else description)
-    except (TypeError, ValueError, IndexError, KeyError, OverflowError, RecursionError, SyntaxError):
-        dtype = None
-    if dtype is None or dtype.hasobject or not 0 < dtype.itemsize <= ITEM_BYTES:
+
+def _is_type(description: object, nesting: int = 16) -> bool:
+    """Whether a type follows the grammar of FORMAT.md: a plain one, or a record's [name, type(, shape)] entries."""
+    if isinstance(description, str):
+        return _PLAIN_TYPE.fullmatch(description) is not None
+    return isinstance(description, list) and nesting > 0 and bool(description) and all(
+        isinstance(entry, list) and 2 <= len(entry) <= 3 and isinstance(entry[0], str)
+        and _is_type(entry[1], nesting - 1) and all(map(_is_shape, entry[2:])) for entry in description)
+
+
+def _is_shape(shape: object) -> bool:
+    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < 1 << 40 for n in shape)
+
+
+def _as_numpy(description: list) -> list:
+    """Record entries as NumPy wants them: tuples."""
+    return [(name, _as_numpy(kind) if isinstance(kind, list) else kind, *map(tuple, shape))
+            for name, kind, *shape in description]
+
+
+def _dtype_from(description: object, what: str) -> np.dtype:
+    dtype = None
+    if _is_type(description):
+        with suppress(TypeError, ValueError, OverflowError):
+            dtype = np.lib.format.descr_to_dtype(_as_numpy(description) if isinstance(description, list) else description)
+    if dtype is None or not 0 < dtype.itemsize <= ITEM_BYTES:
         raise BadChunk(f"{what}: got type {brief(description)}; expected plain numbers, bytes or records")
     return dtype
 
@@ -538,6 +565,9 @@ def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> byt
     if len(name.encode(errors="replace")) > limits.string_bytes:
         raise ClipError(f"attributes: got a name of {len(name)} characters; expected at most {limits.string_bytes} "
                         f"bytes")
+    description = None if array is None else json.loads(json.dumps(_type_of(array.dtype)))
+    if array is not None and not _is_type(description):
+        raise ClipError(f"array {name!r}: got type {array.dtype}; expected plain numbers, bytes or records")
     if array is not None and not 0 < array.dtype.itemsize <= ITEM_BYTES:
         raise ClipError(f"array {name!r}: got items of {array.dtype.itemsize} bytes; expected 1 to {ITEM_BYTES}")
     if array is not None and array.nbytes > limits.decoded_chunk_bytes:
@@ -545,32 +575,40 @@ def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> byt
     if name:
         head["name"] = name
     if array is not None:
-        head |= {"dtype": _type_of(array.dtype), "shape": list(array.shape)}
+        head |= {"dtype": description, "shape": list(array.shape)}
     text = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
     body = _compress(array) if array is not None and array.size else b""
     return _ARRAY.pack(len(text)) + text + body
 
 
+def _array_head(data: bytes, what: str) -> tuple[dict, bytes]:
+    (length,) = _head(_ARRAY, data, what)
+    if length > len(data) - _ARRAY.size:
+        raise BadChunk(f"{what}: got a head of {length} bytes; expected at most what the chunk holds")
+    return _parse_json(data[_ARRAY.size: _ARRAY.size + length], what), data[_ARRAY.size + length:]
+
+
 def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
     """(head, array): array is None where only notes were stored."""
-    (length,) = _head(_ARRAY, data, what)
-    head = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what)
-    if "dtype" not in head:
-        return head, None
-    dtype, shape = _dtype_from(head["dtype"], what), head.get("shape")
-    if not isinstance(shape, list) or len(shape) > 32 or not all(isinstance(n, int) and 0 <= n < 1 << 40 for n in shape):
-        raise BadChunk(f"{what}: got shape {brief(shape)}; expected a list of sizes")
-    if math.prod(shape) == 0:
+    head, body = _array_head(data, what)
+    array = None
+    if "dtype" in head:
+        dtype, shape = _dtype_from(head["dtype"], what), head.get("shape")
+        if not _is_shape(shape):
+            raise BadChunk(f"{what}: got shape {brief(shape)}; expected a list of sizes")
+        if math.prod(shape) > 0:
+            return head, _decompress(body, dtype, tuple(shape), what, limits)
         if math.prod(n or 1 for n in shape) * dtype.itemsize > limits.decoded_chunk_bytes:
             raise LimitExceeded(f"{what}: got shape {brief(shape)}; the limit is {limits.decoded_chunk_bytes} bytes")
-        return head, np.zeros(shape, dtype)
-    return head, _decompress(data[_ARRAY.size + length:], dtype, tuple(shape), what, limits)
+        array = np.zeros(shape, dtype)
+    if body:
+        raise BadChunk(f"{what}: got {len(body)} bytes behind a head without data; expected none")
+    return head, array
 
 
 def array_name(data: bytes, what: str, limits: Limits) -> str:
     """The name of a static array without its data."""
-    (length,) = _head(_ARRAY, data, what)
-    name = _parse_json(data[_ARRAY.size: _ARRAY.size + length], what).get("name")
+    name = _array_head(data, what)[0].get("name")
     if not isinstance(name, str) or not name:
         raise BadChunk(f"{what}: got name {brief(name)}; expected text")
     if len(name.encode(errors="replace")) > limits.string_bytes:
@@ -581,7 +619,7 @@ def array_name(data: bytes, what: str, limits: Limits) -> str:
 def pack_metadata(metadata: dict) -> bytes:
     """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
     try:
-        text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False).encode()
+        text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     except (TypeError, ValueError, RecursionError) as error:
         raise ClipError(f"metadata: {error}; expected text, numbers, booleans and lists of them") from None
     if len(text) > Limits.metadata_bytes:
@@ -598,8 +636,10 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
         try:
             size = zstandard.frame_content_size(text)
         except zstandard.ZstdError:
-            size = -1
-        if not 0 < size <= limits.metadata_bytes:
+            size = 0
+        if size <= 0:
+            raise BadChunk("METADATA: got a zstd frame that does not say its size; expected one that does")
+        if size > limits.metadata_bytes:
             raise LimitExceeded(f"METADATA: got {size} bytes; the limit is {limits.metadata_bytes}")
         text = zstd_decompress_exact(text, size, "METADATA", limits)
     if len(text) > limits.metadata_bytes:
@@ -609,7 +649,8 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
 
 def _parse_json(text: bytes, what: str) -> dict:
     try:
-        value = json.loads(text.decode())
+        value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
+        json.dumps(value, ensure_ascii=False).encode()  # lone surrogates
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, dict):
@@ -617,3 +658,17 @@ def _parse_json(text: bytes, what: str) -> dict:
     return value
 
 
+def _unique(pairs: list) -> dict:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("a key twice")
+    return dict(pairs)
+
+
+def _refuse(constant: str):
+    raise ValueError(constant)
+
+
+def _finite(number: str) -> float:
+    if not math.isfinite(float(number)):
+        raise ValueError(number)
+    return float(number)

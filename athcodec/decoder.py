@@ -21,7 +21,7 @@ from athcodec._native import WHOLE
 from athcodec.ath import stem_maps
 from athcodec.clip import check_stem_index
 from athcodec.container import Container, Limits
-from athcodec.errors import (BadChecksum, BadChunk, BadHeader, ClipError, LevelUnavailable, LimitExceeded,
+from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, LevelUnavailable, LimitExceeded,
                              Truncated)
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.transform import LevelStream, Plan, SegmentMotion, scatter
@@ -83,12 +83,16 @@ class Decoder:
         self.thresholds, stream = ct.parse_hierarchy(data)
         branches, branch_source, self._vertex_source = entropy.decode_hierarchy(stream, header.branch_count,
                                                                                 header.vertex_count)
+        if branches["depth"].max() >= limits.hierarchy_depth:
+            raise LimitExceeded(f"HIERARCHY: got a depth of {branches['depth'].max() + 1}; the limit is "
+                                f"{limits.hierarchy_depth}")
         self.plan = Plan(branches, header.vertex_count)
         if self.plan.level_count != header.full_level_count:
             raise BadHeader(f"header: got Full_Level_Count {header.full_level_count}; expected "
                             f"{self.plan.level_count}, as the hierarchy has it")
         self.hierarchy = Hierarchy.from_parts(branches["parent"], branches["count"], branches["attach"],
                                               self._vertex_source, branch_source)
+        self._check_motion_chunks()
         self._read_rest()
         self.time = ct.parse_time(self.container.required(ct.TIME), header.frame_count, limits)
         self._segments: dict[int, tuple[int, SegmentMotion, np.ndarray | None]] = {}
@@ -100,6 +104,19 @@ class Decoder:
         if needed > self.limits.memory_bytes:
             raise LimitExceeded(f"header: got {header.vertex_count} vertices in segments of {frames} frames, about "
                                 f"{needed} bytes; the limit is {self.limits.memory_bytes}")
+
+    def _check_motion_chunks(self) -> None:
+        """Every stream that the hierarchy asks for is in the table, and no other. Raises BadChunkTable."""
+        segments, last = range(self.container.header.segment_count), self.full_level_count - 1
+        there = {(c.kind, c.level, c.segment) for c in self.container.chunks if c.is_motion}
+        wanted = {(kind, level, segment) for level in range(self.level_count) for segment in segments
+                  for kind, present in ((ct.STEMS, self.plan.has_stems(level)), (ct.AFFINES, self.plan.has_affines(level)))
+                  if present}
+        allowed = wanted | {(ct.CORRECTIONS, last, segment) for segment in segments}
+        for kind, level, segment in sorted((there - allowed) | (wanted - there)):
+            word = "a" if (kind, level, segment) in there else "no"
+            raise BadChunkTable(f"chunk table: got {word} {ct.KIND_NAMES[kind]} of level {level}, segment {segment}; "
+                                f"expected what the hierarchy asks for")
 
     def _read_rest(self) -> None:
         rest = ct.parse_rest(self.container.required(ct.REST), self.vertex_count, self.limits)
@@ -300,11 +317,12 @@ class Decoder:
         if found is None:
             return None
         head, array = found
-        if array is None:
+        if array is None and kind == ct.EDGES:
             return derived_edges(self.hierarchy).astype(self._derived_dtype(head))
-        if array.ndim != 2 or array.dtype.kind not in "iu" or (
+        if array is None or array.ndim != 2 or array.dtype.kind not in "iu" or (
+                kind == ct.EDGES and array.shape[1] != 2) or (
                 array.size and (array.min() < 0 or array.max() >= self.vertex_count)):
-            raise BadChunk(f"{name}: got {array.dtype} {array.shape}; expected rows of vertex numbers")
+            raise BadChunk(f"{name}: got {ct.brief(head)}; expected rows of vertex numbers")
         return array
 
     def _derived_dtype(self, head: dict) -> np.dtype:
@@ -381,7 +399,7 @@ class Decoder:
             head, bodies[d] = ct.parse_stems(self._required(ct.STEMS, d, segment), stop - start, where)
             streams[d] = LevelStream(head.step, float(head.omega))
             if head.bits:
-                steps = entropy.decode_temporal(head.basis, head.rank, stop - start, where)
+                steps = entropy.decode_temporal(head.basis, head.rank, stop - start, head.bits, where)
                 streams[d].temporal = steps.astype(np.float64) * 2.0 ** -(head.bits - 1)
         return streams, bodies
 

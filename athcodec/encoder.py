@@ -103,6 +103,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     report = progress or (lambda stage, fraction: None)
     clip.check()
     hierarchy = hierarchy_of(clip)
+    _check_limits(clip, hierarchy)
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
     _check_coordinates(seen)
     job = _Job(clip, hierarchy, seen, tam, segment_frames or DEFAULT_SEGMENT, exact_rest, attributes == "all", effort,
@@ -134,11 +135,22 @@ def _check_options(max_error, rel_error, target_size, segment_frames, attributes
         raise ValueError(f"effort: got {effort!r}; expected one of {', '.join(EFFORTS)}")
 
 
+def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
+    """Raises ClipError for counts that decoders refuse."""
+    limits = ct.Limits()
+    for name, value, limit in (("vertices", clip.vertex_count, limits.vertices),
+                               ("branches", clip.branch_count, limits.branches),
+                               ("frames", clip.frame_count, limits.frames),
+                               ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth)):
+        if value > limit:
+            raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
+
+
 def _check_coordinates(seen: Survey) -> None:
     largest = float(np.abs([seen.low, seen.high]).max())
     if largest > LARGEST_COORDINATE:
-        raise ClipError(f"positions: got a coordinate of {largest:.3g}; expected at most {LARGEST_COORDINATE:g}, so that "
-                        f"errors are float32 numbers")
+        raise ClipError(f"positions: got a coordinate of {largest:.3g}; expected at most {LARGEST_COORDINATE:g}, so "
+                        f"that errors are float32 numbers")
 
 
 def _relative_bound(fraction: float, job: _Job) -> float:
@@ -391,7 +403,7 @@ def _code_stems(shape: _Shape, settings: Settings, source: np.ndarray) -> _Coded
             head = ct.StemsHead(settings.step, settings.omega[level])
             if level in bases:
                 head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
-                head.basis = entropy.encode_temporal(bases[level])
+                head.basis = entropy.encode_temporal(bases[level], head.bits)
             stems[level] = ct.pack_stems(head, entropy.encode_stems(segment, level))
     positions = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
     factor = 1.0
@@ -569,29 +581,47 @@ def _thin_branches(job: _Job) -> np.ndarray:
 
 
 def _bound_for_size(job: _Job, target: int) -> float:
-    """The smallest bound, within about 2 %, whose file is not above `target` bytes. Raises BoundError."""
+    """A bound whose file takes 97 to 100 % of `target` bytes, or the finest that does not exceed it. Raises BoundError.
+
+    Size falls about as the square root of the bound; between two known sizes it is interpolated in logarithms.
+    """
     diagonal = job.seen.diagonal or 1.0
-    sizes: dict[float, int] = {}
-
-    def size(relative: float) -> int:
-        if relative not in sizes:
-            job.report("size", len(sizes) / 14)
-            with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-                try:
-                    result = job.encode(relative * diagonal, ct.ChunkStore(spool))
-                except BoundError:
-                    return sizes.setdefault(relative, 1 << 62)
-            sizes[relative] = result.store.size(result.header)
-        return sizes[relative]
-
     least = qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
-    fine, coarse = 1e-7, max(0.1, 2 * least / diagonal)
-    if size(coarse) > target:
-        raise BoundError(f"target size: got {target} bytes; expected at least {size(coarse)} for this clip")
-    while coarse / fine > 1.02:
-        middle = math.sqrt(fine * coarse)
-        fine, coarse = (fine, middle) if size(middle) <= target else (middle, coarse)
-    return coarse * diagonal
+    low, high = 1e-7, max(0.1, 2 * least / diagonal)  # low: too large a file; high: one that fits, once tried
+    sizes: dict[float, int] = {}
+    guess = min(DEFAULT_REL_ERROR, high)
+    while high / low > 1.02 and sizes.get(high, 0) < 0.97 * target:
+        job.report("size", len(sizes) / (len(sizes) + 4))
+        sizes[guess] = _file_size(job, guess * diagonal)
+        low, high = (low, guess) if sizes[guess] <= target else (guess, high)
+        guess = _next_guess(low, high, sizes, target)
+    if sizes.get(high, target + 1) > target:
+        raise BoundError(f"target size: got {target} bytes; expected at least {_file_size(job, high * diagonal)} for "
+                         f"this clip")
+    return high * diagonal
+
+
+def _file_size(job: _Job, bound: float) -> float:
+    with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+        try:
+            result = job.encode(bound, ct.ChunkStore(spool))
+        except BoundError:
+            return math.inf
+    return result.store.size(result.header)
+
+
+def _next_guess(low: float, high: float, sizes: dict[float, float], target: int) -> float:
+    """Where in [low, high] the size is expected to be just below the target."""
+    wanted = math.log(0.985 * target)
+    if low in sizes and high in sizes and math.isfinite(sizes[low]):
+        a, b = math.log(sizes[low]), math.log(sizes[high])
+        part = (a - wanted) / (a - b) if a > b else 0.5
+        return low * (high / low) ** min(max(part, 0.05), 0.95)
+    known = low if low in sizes else high
+    if not math.isfinite(sizes[known]):
+        return math.sqrt(low * high)
+    guess = known * math.exp((math.log(sizes[known]) - wanted) / 0.5)
+    return min(max(guess, low * 1.01), high if high not in sizes else high / 1.01)
 
 
 def _summary(path: Path, clip: MotionClip, job: _Job, result: _Result, chunks: list[ct.Chunk]) -> Summary:

@@ -45,17 +45,17 @@ def decode_rest(data, branches: np.ndarray, vertex_count: int, step: float) -> n
     return rest
 
 
-def encode_temporal(steps: np.ndarray) -> bytes:
-    """A learned temporal basis as stored integers, (rank, frames) int32."""
+def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
+    """A learned temporal basis as stored integers of `bits` bits, (rank, frames) int32."""
     rank, frames = steps.shape
-    return encode_stream("ath_encode_temporal", 1024 + 8 * steps.size, rank, frames,
+    return encode_stream("ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1,
                          address(steps, np.int32, steps.size))
 
 
-def decode_temporal(data, rank: int, frames: int, where: str) -> np.ndarray:
+def decode_temporal(data, rank: int, frames: int, bits: int, where: str) -> np.ndarray:
     """(rank, frames) int32. Raises BadChunk."""
     steps = np.zeros((rank, frames), np.int32)
-    decode_stream("ath_decode_temporal", data, where, rank, frames, steps.ctypes.data)
+    decode_stream("ath_decode_temporal", data, where, rank, frames, 1 << bits - 1, steps.ctypes.data)
     return steps
 
 

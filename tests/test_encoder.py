@@ -13,7 +13,7 @@ import athcodec
 from athcodec import MotionClip
 from athcodec import clip as clip_module
 from athcodec.errors import BoundError, ClipError
-from plants import clip_of, plant
+from plants import chain_plant, clip_of, plant
 
 
 @pytest.fixture
@@ -111,6 +111,24 @@ def test_coordinates_beyond_what_a_file_can_hold_are_refused_and_leave_nothing(t
     with pytest.raises((ClipError, BoundError)):
         athcodec.encode(clip, tmp_path / "s.ath", effort="fast")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("clip, message", [
+    (lambda: chain_plant(4097, 1, frames=2), "4097 branches on branches"),
+    (lambda: clip_of(np.zeros(((1 << 20) + 1, 1, 3)), np.zeros((1, 3)), [0], [-1]), "1048577 frames"),
+], ids=["depth", "frames"])
+def test_counts_that_decoders_refuse_are_refused_when_encoding(clip, message, tmp_path):
+    with pytest.raises(ClipError, match=message):
+        athcodec.encode(clip(), tmp_path / "s.ath", effort="fast")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_deepest_chain_that_is_encoded_can_be_decoded(tmp_path):
+    clip = chain_plant(4096, 1, frames=2)
+    summary = athcodec.encode(clip, tmp_path / "s.ath", rel_error=1e-3, effort="fast")
+    with athcodec.open(summary.path, strict=True) as decoder:
+        error = np.linalg.norm(decoder.positions().astype(np.float64) - clip.positions, axis=2).max()
+    assert error <= summary.max_error_bound
 
 
 # ---- files ----

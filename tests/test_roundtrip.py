@@ -26,9 +26,10 @@ def diagonal(clip: MotionClip) -> float:
 
 
 def bound_for(clip: MotionClip, fraction: float) -> float:
-    """A fraction of the diagonal, but something that the source's numbers can express."""
+    """A fraction of the diagonal, but something that the source's numbers and 30-bit steps can express."""
     low, high = clip.positions.min(axis=(0, 1)), clip.positions.max(axis=(0, 1))
-    return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype))
+    away = float(np.abs(clip.positions - clip.rest).max())
+    return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype), 1e-6 * away)
 
 
 def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **options) -> None:

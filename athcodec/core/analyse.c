@@ -237,16 +237,16 @@ static double node_moments(const ath_shape *shape, const ath_node *node, int32_t
     return square;
 }
 
-/* Turns the moments into the least-squares map e = Y w (attached nodes) or e = s + Y w (roots, which hang on nothing).
+/* Turns the moments into the least-squares map e = Y w (attached nodes) or e = s + Y w (roots and loose parts).
  * Returns the mean square of what it leaves, over vertices and frames. */
-static double fit_node(const ath_node *node, int root, int32_t T, double *tracks, const double centre[3], double square)
+static double fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3], double square)
 {
     double *shift = tracks + 9 * T, left = 1.0;
     for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
     for (int32_t i = 0; i < 3 * T; i++) {
         double mean = shift[i], explained = 0.0;
         shift[i] = 0.0;
-        if (root && left > 1e-6) {
+        if (free_base && left > 1e-6) {
             for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
             shift[i] = mean / left;
             explained += shift[i] * mean;
@@ -279,17 +279,17 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     const ath_piece *piece = shape->pieces + node->piece;
     int32_t T = motion->frames;
     double *tracks = scratch->rows, centre[3];
-    int root = piece->parent < 0;
+    int free_base = ath_has_shift(piece);
     ath_attach(shape, motion, piece, scratch->at);
     double square = node_moments(shape, node, T, scratch, source, tracks, centre);
-    square = fit_node(node, root, T, tracks, centre, square);
+    square = fit_node(node, free_base, T, tracks, centre, square);
     double error = ath_sqrt(square);
     motion->node_steps[n] = half_octaves(quality * (error > level_error ? error : level_error));
     double step = ath_node_step(motion, n);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
         code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, ath_node_track(motion, n, r));
-    if (root) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
+    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
 }
 
 void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source, double quality,

@@ -150,9 +150,9 @@ ATH_API int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size,
                                  int32_t *vertex_source);
 ATH_API int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                             int32_t branch_count, double step, double *rest);
-/* rank x frames integers of a learned temporal basis. */
+/* rank x frames integers of a learned temporal basis; `limit` stands for 1. */
 ATH_API int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames,
-                                int32_t *basis);
+                                int32_t limit, int32_t *basis);
 /* Coefficients and tracks of the pieces of one level; the arrays are zero on entry there. */
 ATH_API int ath_decode_stems(void *model, const uint8_t *bytes, size_t size, const ath_shape *shape,
                              const ath_motion *motion, int32_t level);
@@ -210,7 +210,7 @@ ATH_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacit
 ATH_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                 int32_t branch_count, double step, const double *source, double *rest);
 ATH_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                                    const int32_t *basis);
+                                    int32_t limit, const int32_t *basis);
 ATH_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
                                  const ath_motion *motion, int32_t level);
 ATH_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,

@@ -25,6 +25,7 @@ typedef struct {
     ath_context count_mantissa[COUNT_BINS][4];
     uint32_t history[HISTORY_ROWS][ATH_SEGMENT_FRAMES]; /* running mean magnitude of a row's frequency, in 1/16 */
     int32_t history_count[HISTORY_ROWS];
+    int invalid; /* a row said that it codes more frequencies than there are */
 } coefficient_model;
 
 static void coefficient_model_init(coefficient_model *model)
@@ -58,6 +59,7 @@ static int32_t code_count(ath_coder *coder, coefficient_model *model, int32_t hi
         ath_context *context = &model->count_mantissa[coded - 1][taken == 0 ? 0 : taken == 1 ? 1 + (built & 1) : 3];
         built = built << 1 | coder_bit(coder, context, (int)(count >> bit & 1));
     }
+    model->invalid |= built > limit;
     return ath_min(built, limit);
 }
 
@@ -91,22 +93,24 @@ static void remember_row(coefficient_model *model, int32_t slot, int32_t frames,
     }
 }
 
-/* One row: three axes of `frames` integers; `above` is the unit's row before, or null; `slot` names the row in the
- * history. When decoding, `row` is zero on entry. Returns how many frequencies are coded. */
-static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t frames, int32_t slot, const int32_t *above,
-                        int32_t above_count, int encoding, int32_t *row)
+/* One row: three axes of `frames` integers, of which the first `rank` may be coded; `above` is the unit's row before,
+ * or null; `slot` names the row in the history. When decoding, `row` is zero on entry. Returns how many frequencies
+ * are coded. */
+static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t frames, int32_t rank, int32_t slot,
+                        const int32_t *above, int32_t above_count, int encoding, int32_t *row)
 {
     const uint32_t *history = model->history[slot];
-    int32_t count = code_count(coder, model, model->history_count[slot], above_count, frames,
+    int32_t count = code_count(coder, model, model->history_count[slot], above_count, rank,
                                encoding ? used_frequencies(row, frames) : 0);
     for (int32_t k = 0; k < count; k++) {
         uint32_t before = 0, over = 0, beside = 0;
         for (int32_t axis = 0; axis < 3; axis++) {
-            const int32_t *own = row + axis * frames, *other = above + axis * frames;
+            const int32_t *own = row + axis * frames;
             before += 2 * magnitude_at(own, frames, k - 1) + magnitude_at(own, frames, k - 2);
-            if (above)
-                over += 2 * magnitude_at(other, frames, k) + magnitude_at(other, frames, k - 1)
-                        + magnitude_at(other, frames, k + 1);
+            if (!above) continue;
+            const int32_t *other = above + axis * frames;
+            over += 2 * magnitude_at(other, frames, k) + magnitude_at(other, frames, k - 1)
+                    + magnitude_at(other, frames, k + 1);
         }
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t *own = row + axis * frames;

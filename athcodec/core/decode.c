@@ -25,6 +25,18 @@ static int is_permutation(int32_t count, int32_t *source)
     return distinct;
 }
 
+/* Inside the subtree of a whole node there are no nodes, so nothing there may be whole. */
+static int whole_are_nodes(const ath_branch *branches, int32_t branch_count)
+{
+    int32_t inside_until = 0;
+    for (int32_t b = 0; b < branch_count; b++) {
+        if (!(branches[b].flags & ATH_WHOLE)) continue;
+        if (b < inside_until) return 0;
+        inside_until = b + branches[b].subtree;
+    }
+    return 1;
+}
+
 int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count, int32_t vertex_count,
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
@@ -33,6 +45,7 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
     int valid = code_hierarchy(&coder, model, branch_count, vertex_count, branches, branch_source, vertex_source);
     valid = valid && is_permutation(branch_count, branch_source) && is_permutation(vertex_count, vertex_source);
     valid = valid && ath_count_pieces(branches, branch_count, vertex_count) > 0;
+    valid = valid && whole_are_nodes(branches, branch_count);
     return finished(&coder, valid);
 }
 
@@ -45,12 +58,12 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
     return finished(&coder, 1);
 }
 
-int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t *basis)
+int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,
+                        int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    code_temporal(&coder, model, rank, frames, basis);
-    return finished(&coder, 1);
+    return finished(&coder, code_temporal(&coder, model, rank, frames, limit, basis));
 }
 
 int ath_decode_stems(void *model, const uint8_t *bytes, size_t size, const ath_shape *shape, const ath_motion *motion,
@@ -58,8 +71,7 @@ int ath_decode_stems(void *model, const uint8_t *bytes, size_t size, const ath_s
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    code_stems(&coder, model, shape, motion, level);
-    return finished(&coder, 1);
+    return finished(&coder, code_stems(&coder, model, shape, motion, level));
 }
 
 int ath_decode_affines(void *model, const uint8_t *bytes, size_t size, const ath_shape *shape, const ath_motion *motion,

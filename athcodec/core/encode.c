@@ -24,11 +24,11 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
 }
 
 int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                            const int32_t *basis)
+                            int32_t limit, const int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_temporal(&coder, model, rank, frames, (int32_t *)basis);
+    code_temporal(&coder, model, rank, frames, limit, (int32_t *)basis);
     return coder_finish(&coder);
 }
 

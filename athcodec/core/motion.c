@@ -166,7 +166,7 @@ ATH_HOT void ath_turn(int32_t T, const double *omega, double *restrict R)
     }
 }
 
-/* placed = c + R (x0 - a + sum over modes of basis * row), modes ascending, one vertex after the other. */
+/* placed = c + R (x0 - a + sum over modes of basis * row), modes ascending, rows of zeros left out. */
 ATH_HOT static void place_vertex(int32_t T, int32_t rank, const double *basis, size_t stride, const uint8_t *used,
                                  const double *rows, const double *d, const ath_frames *at, double *restrict out)
 {
@@ -273,7 +273,7 @@ static void turn_with_sheet(const ath_shape *shape, int32_t T, const ath_piece *
             R[k] = scratch->at.rotation[k * T + t];
             H[k] = H[k] + 0.01 * size2 * R[k];
         }
-        if (size2 > 0.0)
+        if (size2 > 1e-200)
             for (int32_t step = 0; step < POLAR_ITERATIONS; step++) ath_turn_towards(H, size2, R);
         for (int32_t k = 0; k < 9; k++) rotation[k * T + t] = R[k];
     }
@@ -380,11 +380,11 @@ static void affine_part(const ath_shape *shape, const ath_node *node, const doub
 }
 
 static void coded_map(const ath_motion *motion, const ath_node *node, int32_t n, const ath_scratch *scratch,
-                      int root, double *E)
+                      int shifted, double *E)
 {
     double step = ath_node_step(motion, n);
     ath_stream stream = ath_node_stream(motion, step);
-    if (root) {
+    if (shifted) {
         inverse_track(&stream, motion->frames, step, ath_node_track(motion, n, 3), scratch->track);
         ath_move_point(motion->frames, scratch->track, scratch->at.point);
     }
@@ -447,7 +447,7 @@ void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, c
     for (int32_t i = 0; i < 9 * motion->frames; i++) E[i] = 0.0;
     if (node->coded) {
         ath_attach(shape, motion, shape->pieces + node->piece, scratch->at);
-        coded_map(motion, node, n, scratch, shape->pieces[node->piece].parent < 0, E);
+        coded_map(motion, node, n, scratch, ath_has_shift(shape->pieces + node->piece), E);
     } else {
         turned_attach(shape, motion, node->piece, scratch);
         map_of_modes(shape, motion, node, scratch, E);

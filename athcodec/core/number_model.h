@@ -38,7 +38,7 @@ ATH_INLINE int32_t number_class(uint32_t expected)
 static void number_model_init(number_model *model)
 {
     for (int32_t class = 0; class < NUMBER_CLASSES; class++) {
-        uint32_t mean = class < 2 ? (uint32_t)(class * 8 + 1)
+        uint32_t mean = class < 2 ? (uint32_t)(class * 2 + 1)
                                   : (uint32_t)(5 + (class & 1) * 2) << (class / 2 - 1); /* in 1/32, mid of the class */
         uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
         for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {

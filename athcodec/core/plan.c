@@ -28,8 +28,8 @@ int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t ver
     for (int32_t b = branch_count - 1; b > 0; b--)
         if (branches[b].parent >= 0) branches[branches[b].parent].subtree += branches[b].subtree;
     for (int32_t b = 1; b < branch_count; b++) { /* depth-first order: a branch lies inside its parent's subtree */
-        const ath_branch *parent = branches + branches[b].parent;
-        if (branches[b].parent >= 0 && b + branches[b].subtree > branches[b].parent + parent->subtree) return 0;
+        int32_t parent = branches[b].parent;
+        if (parent >= 0 && b + branches[b].subtree > parent + branches[parent].subtree) return 0;
     }
     return next == vertex_count ? total : 0;
 }

@@ -1,5 +1,5 @@
 /* The adaptive binary range coder of FORMAT.md, "Range coder": 64-bit interval, 32-bit renormalisation, 16-bit
- * probabilities whose rate of adaptation falls from 1/2 to 1/96 as a context gathers experience.
+ * probabilities whose rate of adaptation falls from 2/5 to 1/95 as a context gathers experience.
  *
  * Models that use it are written once and compiled twice: `coder_bit` returns the bit it decoded, or encodes the bit
  * it is given and returns that. A file that defines ATH_ENCODING before including this header gets the encoder. */
@@ -15,7 +15,7 @@ typedef struct {
 
 enum { RATE_LIMIT = 60, PROBABILITY_MIN = 48 };
 
-/* 65536 / (experience + 2.5), rounded down */
+/* 65536 / (experience + 2.5) and at last 65536 / 95, rounded down */
 static const uint16_t ath_rate[RATE_LIMIT + 1] = {
     26214, 18724, 14563, 11915, 10082, 8738, 7710, 6898, 6241, 5698, 5242, 4854, 4519, 4228, 3971, 3744, 3542, 3360,
     3196, 3048, 2912, 2788, 2674, 2570, 2473, 2383, 2299, 2221, 2148, 2080, 2016, 1956, 1899, 1846, 1795, 1747,

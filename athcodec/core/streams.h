@@ -59,7 +59,9 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    ath_branch *branch = branches + b, *before = branches + b - 1;
+    static const ath_branch none = {.lag = 1};
+    ath_branch *branch = branches + b;
+    const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
     if (branch->parent < -1) return 0;
     int32_t depth = branch->parent < 0 ? 0 : branches[branch->parent].depth + 1, class = ath_min(depth, 15);
@@ -68,10 +70,10 @@ static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     if (more >= (uint32_t)vertices_left) return 0;
     branch->count = (int32_t)more + 1;
     mean_count[class] += (ath_min((int32_t)more, 1 << 16) * 16 - mean_count[class]) / 4;
-    branch->flags = code_flags(coder, model, b == 0 ? 0 : before->flags, branch->flags);
-    branch->lag = code_signed(coder, &model->lag, 0, branch->lag - (b == 0 ? 1 : before->lag)) + (b == 0 ? 1 : before->lag);
-    if (branch->lag < 0 || branch->lag > 65535) return 0;
-    branch->first = b == 0 ? 0 : before->first + before->count;
+    branch->flags = code_flags(coder, model, before->flags, branch->flags);
+    branch->lag = code_signed(coder, &model->lag, 0, branch->lag - before->lag) + before->lag;
+    if (branch->lag < 0 || branch->lag > 65535 || (branch->parent < 0 && branch->flags & ATH_LOOSE)) return 0;
+    branch->first = before->first + before->count;
     return 1;
 }
 
@@ -220,36 +222,42 @@ static void code_rest(ath_coder *coder, rest_model *model, const ath_branch *bra
 
 /* ---- learned temporal basis ---- */
 
-static void code_temporal(ath_coder *coder, number_model *model, int32_t rank, int32_t frames, int32_t *basis)
+/* Entries are at most `limit`, which stands for 1. */
+static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, int32_t frames, int32_t limit,
+                         int32_t *basis)
 {
     number_model_init(model);
     for (int32_t r = 0; r < rank; r++) {
         uint32_t mean = 1024;
         int32_t before = 0, slope = 0;
         for (int32_t t = 0; t < frames; t++) {
-            int32_t *value = basis + (size_t)r * (size_t)frames + t, predicted = before + slope;
-            int32_t rest = code_signed(coder, model, mean, *value - predicted);
-            *value = predicted + ath_max(ath_min(rest, 1 << 20), -(1 << 20));
-            *value = ath_max(ath_min(*value, 1 << 20), -(1 << 20));
-            slope = t > 0 ? (*value - before) : 0;
+            int32_t *value = basis + (size_t)r * (size_t)frames + t;
+            int32_t rest = code_signed(coder, model, mean, *value - before - slope);
+            *value = before + slope + rest;
+            if (*value < -limit || *value > limit) return 0;
+            slope = t > 0 ? *value - before : 0;
             before = *value;
             mean = mean - (mean + 3) / 4 + clipped(rest) * 4;
         }
     }
+    return 1;
 }
 
 /* ---- stems ---- */
+
+/* Frequencies that a row of a level's stream may code. */
+static int32_t rank_of(const ath_motion *motion, int32_t level) { return motion->streams[level].temporal_rank; }
 
 static void code_piece(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
                        int32_t p, int32_t level)
 {
     const ath_piece *piece = shape->pieces + p;
-    int32_t from = 0, to = 0, above_count = 0;
+    int32_t from = 0, to = 0, above_count = 0, frames = motion->frames, rank = rank_of(motion, level);
     if (level == (piece->low_level >= 0 ? piece->low_level : piece->level)) {
         if (ath_has_shift(piece))
-            code_row(coder, model, motion->frames, SHIFT_SLOT, 0, 0, ENCODING, ath_shift_track(motion, p));
+            code_row(coder, model, frames, rank, SHIFT_SLOT, 0, 0, ENCODING, ath_shift_track(motion, p));
         if (ath_omega_step(shape, piece, motion->streams + level) > 0.0)
-            code_row(coder, model, motion->frames, OMEGA_SLOT, 0, 0, ENCODING, ath_omega_track(motion, p));
+            code_row(coder, model, frames, rank, OMEGA_SLOT, 0, 0, ENCODING, ath_omega_track(motion, p));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
     if (piece->level == level) {
@@ -259,16 +267,17 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_sha
     const int32_t *above = 0;
     for (int32_t m = from; m < to; m++) {
         int32_t *row = ath_coefficients_of(motion, piece->first + m);
-        above_count = code_row(coder, model, motion->frames, m, above, above_count, ENCODING, row);
+        above_count = code_row(coder, model, frames, rank, m, above, above_count, ENCODING, row);
         above = row;
     }
 }
 
-static void code_stems(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
+static int code_stems(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
                        int32_t level)
 {
     coefficient_model_init(model);
     for (int32_t p = 0; p < shape->piece_count; p++) code_piece(coder, model, shape, motion, p, level);
+    return !model->invalid;
 }
 
 /* ---- maps of nodes ---- */
@@ -293,13 +302,14 @@ static int code_affines(ath_coder *coder, affine_model *model, const ath_shape *
         const int32_t *above = 0;
         for (int32_t r = 0; r < node->rank; r++) {
             int32_t *row = ath_node_track(motion, n, r);
-            above_count = code_row(coder, &model->rows, motion->frames, r, above, above_count, ENCODING, row);
+            above_count = code_row(coder, &model->rows, motion->frames, motion->frames, r, above, above_count, ENCODING, row);
             above = row;
         }
-        if (shape->pieces[node->piece].parent < 0)
-            code_row(coder, &model->rows, motion->frames, SHIFT_SLOT, 0, 0, ENCODING, ath_node_track(motion, n, 3));
+        if (ath_has_shift(shape->pieces + node->piece))
+            code_row(coder, &model->rows, motion->frames, motion->frames, SHIFT_SLOT, 0, 0, ENCODING,
+                     ath_node_track(motion, n, 3));
     }
-    return 1;
+    return !model->rows.invalid;
 }
 
 /* ---- corrections ---- */
