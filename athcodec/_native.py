@@ -77,7 +77,7 @@ _SIGNATURES = {
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
     "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double, c_void_p, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_void_p, c_double]),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
         c_int64, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_double, c_double, c_void_p, c_int64]),
@@ -138,6 +138,8 @@ def encode_stream(function_name: str, capacity: int, *arguments) -> bytes:
         size = getattr(lib, function_name)(model.ctypes.data, buffer.ctypes.data, capacity, *arguments)
         if size >= 0:
             return buffer[:size].tobytes()
+        if size < -1:
+            raise ValueError(f"{function_name}: got integers that the stream cannot hold")
         capacity *= 4
 
 

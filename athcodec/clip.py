@@ -15,6 +15,7 @@ import numpy as np
 
 from .errors import ClipError
 
+LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
 DEFAULT_FPS = 30.0
 RESERVED_NAMES = frozenset(
@@ -203,13 +204,15 @@ def check_float_dtype(name: str, dtype: np.dtype) -> None:
 
 
 def check_finite(frames: np.ndarray, start: int = 0) -> None:
-    """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite."""
-    finite = np.isfinite(frames)
-    if finite.all():
+    """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite numbers whose
+    squares are finite in float32 arithmetic too."""
+    usable = np.abs(frames) <= LARGEST_COORDINATE
+    if usable.all():
         return
-    frame, vertex = np.argwhere(~finite.all(axis=2))[0]
+    frame, vertex = np.argwhere(~usable.all(axis=2))[0]
     point = _point(frames[frame, vertex])
-    raise ClipError(f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers")
+    raise ClipError(f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers up to "
+                    f"{LARGEST_COORDINATE:g}")
 
 
 def check_time(time: Any, frame_count: int) -> np.ndarray:

@@ -11,7 +11,8 @@ import json
 import math
 import re
 import struct
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -19,8 +20,8 @@ import numpy as np
 import zstandard
 
 from athcodec._native import crc32c
-from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, LimitExceeded, NotAnAthFile,
-                             TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
+from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, FormatError, LimitExceeded,
+                             NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 1
@@ -533,6 +534,7 @@ def _is_type(description: object, nesting: int = 16) -> bool:
         return _PLAIN_TYPE.fullmatch(description) is not None
     return isinstance(description, list) and nesting > 0 and bool(description) and all(
         isinstance(entry, list) and 2 <= len(entry) <= 3 and isinstance(entry[0], str)
+        and (entry[0] or (len(entry) == 2 and str(entry[1]).startswith("|V")))
         and _is_type(entry[1], nesting - 1) and all(map(_is_shape, entry[2:])) for entry in description)
 
 
@@ -549,8 +551,9 @@ def _as_numpy(description: list) -> list:
 def _dtype_from(description: object, what: str) -> np.dtype:
     dtype = None
     if _is_type(description):
+        record = isinstance(description, list)
         with suppress(TypeError, ValueError, OverflowError):
-            dtype = np.lib.format.descr_to_dtype(_as_numpy(description) if isinstance(description, list) else description)
+            dtype = np.lib.format.descr_to_dtype(_as_numpy(description) if record else description)
     if dtype is None or not 0 < dtype.itemsize <= ITEM_BYTES:
         raise BadChunk(f"{what}: got type {brief(description)}; expected plain numbers, bytes or records")
     return dtype
@@ -561,24 +564,32 @@ def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> byt
 
     Raises ClipError for what no reader would accept.
     """
-    limits, head = Limits(), dict(notes)
-    if len(name.encode(errors="replace")) > limits.string_bytes:
-        raise ClipError(f"attributes: got a name of {len(name)} characters; expected at most {limits.string_bytes} "
-                        f"bytes")
-    description = None if array is None else json.loads(json.dumps(_type_of(array.dtype)))
-    if array is not None and not _is_type(description):
-        raise ClipError(f"array {name!r}: got type {array.dtype}; expected plain numbers, bytes or records")
-    if array is not None and not 0 < array.dtype.itemsize <= ITEM_BYTES:
-        raise ClipError(f"array {name!r}: got items of {array.dtype.itemsize} bytes; expected 1 to {ITEM_BYTES}")
-    if array is not None and array.nbytes > limits.decoded_chunk_bytes:
-        raise ClipError(f"array {name!r}: got {array.nbytes} bytes; expected at most {limits.decoded_chunk_bytes}")
-    if name:
-        head["name"] = name
-    if array is not None:
-        head |= {"dtype": description, "shape": list(array.shape)}
-    text = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
-    body = _compress(array) if array is not None and array.size else b""
-    return _ARRAY.pack(len(text)) + text + body
+    what, limits = f"array {brief(name)}" if name else "array", Limits()
+    head: dict[str, object] = notes | ({"name": name} if name else {})
+    with _refusals(what):
+        if array is not None:
+            description = json.loads(json.dumps(_type_of(array.dtype)))
+            if array.nbytes > limits.decoded_chunk_bytes:  # before it is compressed
+                raise LimitExceeded(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
+            _dtype_from(description, what)
+            head |= {"dtype": description, "shape": list(array.shape)}
+        text = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
+        packed = _ARRAY.pack(len(text)) + text + (_compress(array) if array is not None and array.size else b"")
+        parse_array(packed, what, limits)
+        if name:
+            array_name(packed, what, limits)
+    return packed
+
+
+@contextmanager
+def _refusals(what: str) -> Iterator[None]:
+    """What a reader would refuse of something that is being written is the source's fault: ClipError."""
+    try:
+        yield
+    except FormatError as error:
+        raise ClipError(str(error)) from None
+    except (TypeError, ValueError, RecursionError, struct.error) as error:
+        raise ClipError(f"{what}: {error}; expected plain data that a file can hold") from None
 
 
 def _array_head(data: bytes, what: str) -> tuple[dict, bytes]:
@@ -618,14 +629,12 @@ def array_name(data: bytes, what: str, limits: Limits) -> str:
 
 def pack_metadata(metadata: dict) -> bytes:
     """JSON, zstd-compressed where that is shorter. Raises ClipError for what no reader would accept."""
-    try:
+    with _refusals("metadata"):
         text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-    except (TypeError, ValueError, RecursionError) as error:
-        raise ClipError(f"metadata: {error}; expected text, numbers, booleans and lists of them") from None
-    if len(text) > Limits.metadata_bytes:
-        raise ClipError(f"metadata: got {len(text)} bytes; expected at most {Limits.metadata_bytes}")
-    packed = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
-    return b"\1" + packed if len(packed) < len(text) else b"\0" + text
+        shorter = zstandard.ZstdCompressor(level=19, write_content_size=True).compress(text)
+        packed = b"\1" + shorter if len(shorter) < len(text) else b"\0" + text
+        parse_metadata(packed, Limits())
+    return packed
 
 
 def parse_metadata(data: bytes, limits: Limits) -> dict:

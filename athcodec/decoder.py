@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import builtins
 import os
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,16 +108,19 @@ class Decoder:
 
     def _check_motion_chunks(self) -> None:
         """Every stream that the hierarchy asks for is in the table, and no other. Raises BadChunkTable."""
-        segments, last = range(self.container.header.segment_count), self.full_level_count - 1
-        there = {(c.kind, c.level, c.segment) for c in self.container.chunks if c.is_motion}
-        wanted = {(kind, level, segment) for level in range(self.level_count) for segment in segments
-                  for kind, present in ((ct.STEMS, self.plan.has_stems(level)), (ct.AFFINES, self.plan.has_affines(level)))
-                  if present}
-        allowed = wanted | {(ct.CORRECTIONS, last, segment) for segment in segments}
-        for kind, level, segment in sorted((there - allowed) | (wanted - there)):
-            word = "a" if (kind, level, segment) in there else "no"
-            raise BadChunkTable(f"chunk table: got {word} {ct.KIND_NAMES[kind]} of level {level}, segment {segment}; "
-                                f"expected what the hierarchy asks for")
+        segments, last = self.container.header.segment_count, self.full_level_count - 1
+        wanted = {(kind, level) for level in range(self.level_count) for kind, present in
+                  ((ct.STEMS, self.plan.has_stems(level)), (ct.AFFINES, self.plan.has_affines(level))) if present}
+        there = Counter((c.kind, c.level) for c in self.container.chunks if c.is_motion)  # a segment once: container.py
+        del there[ct.CORRECTIONS, last]
+        for kind, level in sorted(there.keys() | wanted):
+            if (kind, level) not in wanted:
+                raise BadChunkTable(f"chunk table: got {ct.KIND_NAMES[kind]} of level {level}; expected none, as the "
+                                    f"hierarchy has it")
+            if there[kind, level] != segments:
+                absent = next(i for i in range(segments) if self.container.find(kind, level, i) is None)
+                raise BadChunkTable(f"chunk table: got no {ct.KIND_NAMES[kind]} of level {level}, segment {absent}; "
+                                    f"expected one of each segment")
 
     def _read_rest(self) -> None:
         rest = ct.parse_rest(self.container.required(ct.REST), self.vertex_count, self.limits)

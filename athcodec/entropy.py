@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec._native import BRANCH, address, decode_stream, encode_stream, lib
-from athcodec.transform import Plan, SegmentMotion
+from athcodec.transform import SegmentMotion
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:

@@ -15,7 +15,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises OSError."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
     try:
-        with os.fdopen(handle, "wb") as out:
+        with os.fdopen(handle, "w+b") as out:
             yield out
             out.flush()
             os.fsync(out.fileno())

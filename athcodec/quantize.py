@@ -11,9 +11,10 @@ import numpy as np
 from athcodec.errors import BoundError
 
 DEAD_ZONE = 0.55
-NODE_QUALITIES = (0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # step of a node's map over its own RMS error
+NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of maps: step over the error that is theirs
 NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
+LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
 REST_CAP = 1.1  # rest pose step over bound: its own error stays within the bound
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
@@ -31,12 +32,15 @@ def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
     return 2 * float(np.spacing(largest))
 
 
-def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> None:
-    """Raises BoundError for a bound that is not above least_bound."""
+def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, reach: float) -> None:
+    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `reach`."""
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound > least):
         raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, twice the spacing of the "
                          f"source's {np.dtype(dtype).name} coordinates")
+    if reach > LARGEST_REACH * bound:
+        raise BoundError(f"max error: got {bound:.3g}; expected at least {reach / LARGEST_REACH:.3g} for positions "
+                         f"and a rest pose that are up to {reach:.3g} apart")
 
 
 def single(value: float) -> float:

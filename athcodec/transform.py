@@ -8,11 +8,10 @@ share. `SegmentMotion` owns the integers of one segment and turns positions into
 from __future__ import annotations
 
 from ctypes import addressof
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec import _native
 from athcodec._native import BRANCH, NODE, PIECE, Motion, Shape, Stream, address, lib
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128
@@ -106,7 +105,6 @@ class LevelStream:
     step: float
     omega: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
-    temporal_steps: np.ndarray | None = field(default=None, repr=False)  # the same as stored integers
 
 
 class SegmentMotion:
@@ -124,7 +122,7 @@ class SegmentMotion:
         self.node_steps = np.zeros(shape.node_count, np.int32)
         self._carriers = np.empty((max(shape.carrier_vertices, 1), 3, frames))
         self._carrier_frames = np.empty((max(shape.carrier_pieces, 1), 12, frames))
-        self._cosines = cosine_basis(frames)
+        self.cosines = cosine_basis(frames)
         self._work = np.empty(lib.ath_motion_work(frames))
         self._bind()
 
@@ -132,12 +130,12 @@ class SegmentMotion:
         self._c_streams = (Stream * len(self.streams))()
         self._temporal = []  # keeps what the C structs point to
         for c_stream, stream in zip(self._c_streams, self.streams):
-            temporal = self._cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
+            temporal = self.cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
             self._temporal.append(temporal)
             c_stream.step, c_stream.omega = stream.step, stream.omega
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(
-            frames=self.frames, streams=addressof(self._c_streams), cosines=self._cosines.ctypes.data,
+            frames=self.frames, streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
             coefficients=self.coefficients.ctypes.data, tracks=self.tracks.ctypes.data,
             node_tracks=self.node_tracks.ctypes.data, node_steps=self.node_steps.ctypes.data,
             carriers=self._carriers.ctypes.data, carrier_frames=self._carrier_frames.ctypes.data,
@@ -154,14 +152,13 @@ class SegmentMotion:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
         lib.ath_analyse(self.plan.shape, self.motion, self._source(source), dead_zone)
 
-    def analyse_nodes(self, source: np.ndarray, quality: float, level_errors: np.ndarray, dead_zone: float) -> None:
+    def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
 
-        A map's step is `quality` times its own RMS error or that of its level, whichever is more; level_errors:
-        (level_count,) float64, scene units.
+        A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
-        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source), quality,
-                              address(level_errors, np.float64, self.plan.level_count), dead_zone)
+        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source),
+                              address(level_steps, np.float64, self.plan.level_count), dead_zone)
 
     def clear_nodes(self) -> None:
         """Forgets the maps of the nodes."""

@@ -30,7 +30,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     with encoded(args.clips[0], args.rel_error) as result:
         frame = _furthest_frame(result) if args.frame is None else args.frame
         args.out.write_text(_svg(result, frame))
-        rows = [{"clip": args.clips[0].stem, "frame": frame, "levels": len(result.decoder.depths), "file": args.out.name}]
+        levels = len(result.decoder.depths)
+        rows = [{"clip": args.clips[0].stem, "frame": frame, "levels": levels, "file": args.out.name}]
     return {"tables": [table("picture", rows, "")], "broken": []}
 
 
@@ -74,7 +75,8 @@ def _svg(result: Encoded, frame: int) -> str:
         lines = "".join(f'<path d="{path(points, chain)}" stroke="{_colour(error[chain].max() / worst)}"/>'
                         for chain in chains)
         caption = f"level {level.depth} &#183; {level.bytes / 1000:.1f} kB"
-        detail = f"{level.nodes} part{'s' * (level.nodes > 1)} &#183; max error {_length(level.max_error, result.clip.metadata.get('unit', ''))}"
+        furthest = _length(level.max_error, result.clip.metadata.get("unit", ""))
+        detail = f"{level.nodes} part{'s' * (level.nodes > 1)} &#183; max error {furthest}"
         left = MARGIN + i * (panel + MARGIN) + (panel - width) / 2
         panels.append(f'<g transform="translate({left:.0f} {MARGIN})">'
                       f'<path d="{behind}" stroke="{FADED}"/>{lines}'

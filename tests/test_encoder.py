@@ -243,7 +243,7 @@ def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
 
 def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path, monkeypatch):
     many = encoded(bushy_clip, tmp_path, segment_frames=16, effort="default")
-    monkeypatch.setattr("athcodec.encoder._threads", lambda: 1)
+    monkeypatch.setattr("athcodec.encoder.threads", lambda: 1)
     assert encoded(bushy_clip, tmp_path, segment_frames=16, effort="default") == many
 
 

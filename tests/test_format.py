@@ -175,18 +175,18 @@ def test_worked_example_decodes_step_by_step(spec):
 
     decode = type(spec.decode_temporal)(spec.decode_temporal.__code__,
                                         spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing})
-    assert decode(stream, 1, len(values)) == [values]
+    assert decode(stream, 1, len(values), 8) == [values]
     assert steps == table("Worked example", "Probability")
-    assert entropy.encode_temporal(np.array([values], np.int32)) == stream
+    assert entropy.encode_temporal(np.array([values], np.int32), 8) == stream
 
 
 @pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
 def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
-    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32)) + change
+    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32), 8) + change
     with pytest.raises(spec.Invalid):
-        spec.decode_temporal(stream, 1, 3)
+        spec.decode_temporal(stream, 1, 3, 8)
     with pytest.raises(errors.BadChunk):
-        entropy.decode_temporal(stream, 1, 3, "here")
+        entropy.decode_temporal(stream, 1, 3, 8, "here")
 
 
 def test_shuffle_of_the_document_restores_an_array(spec):
@@ -207,18 +207,157 @@ def test_pseudo_code_decodes_every_feature(spec, seed, wide, exact):
     assert_same_bits(spec, HandMade(seed, wide, exact).file())
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_random_decisions_mean_the_same_to_the_document_and_the_code(spec, seed):
+    """Among them loose roots, whole parts of whole subtrees, wrong permutations, and valid streams."""
+    random = np.random.default_rng(seed)
+    branches, vertices = int(random.integers(1, 4)), int(random.integers(3, 7))
+    fields = ["parent", "count", "attach", "flags", "lag", "first", "depth", "subtree"]
+
+    def by_document(stream):
+        rows, *sources = spec.decode_hierarchy(stream, branches, vertices)
+        return [[getattr(row, name) for name in fields] for row in rows], *sources
+
+    def by_code(stream):
+        rows, *sources = entropy.decode_hierarchy(stream, branches, vertices)
+        return [[int(row[name]) for name in fields] for row in rows], *(x.tolist() for x in sources)
+
+    for _ in range(20):
+        stream = random_stream(spec, random, "decode_hierarchy", branches, vertices)
+        assert outcome(spec, by_document, stream) == outcome(spec, by_code, stream)
+
+
+def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str, *arguments: int) -> bytes:
+    """What a function of the document reads as decisions made by chance, up to the first invalid one."""
+    made = []
+    chance = random.uniform(0.15, 0.85)
+
+    class Deciding(spec.RangeDecoder):
+        """Keeps the interval's lower end, as an encoder does, instead of reading."""
+
+        def __init__(self, _):
+            self.low, self.range, self.length = 0, spec.MASK, 8
+            made.append(self)
+
+        def narrow(self, bound):
+            bit = int(random.random() < chance)
+            self.low, self.range = (self.low, bound) if bit else (self.low + bound, self.range - bound)
+            if self.range < 1 << 32:
+                self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
+            return bit
+
+        def finish(self):
+            pass
+
+    function = getattr(spec, name)
+    try:
+        type(function)(function.__code__, function.__globals__ | {"RangeDecoder": Deciding})(b"", *arguments)
+    except spec.Invalid:
+        pass
+    last, zeros = made[0].low + made[0].range - 1, 0
+    while last >> zeros + 1 << zeros + 1 >= made[0].low and zeros < 8 * made[0].length:
+        zeros += 1
+    return (last >> zeros << zeros).to_bytes(made[0].length, "big").rstrip(b"\0")
+
+
+def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
+    try:
+        return decode(stream)
+    except (spec.Invalid, errors.BadChunk):
+        return "invalid"
+
+
+# ---- what the document and the code refuse ----
+
+
+def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None:
+    with pytest.raises(spec.Invalid, match=f"^{error}$"):
+        spec.decode(data, 1)
+    with pytest.raises(errors.FormatError) as caught, athcodec.open(io.BytesIO(data)) as decoder:
+        decoder.check()
+    assert caught.value.name == error
+
+
+def test_a_branch_in_a_whole_subtree_may_not_be_whole(spec):
+    whole = [(parent, count, flags | WHOLE if b == 6 else flags)
+             for b, (parent, count, flags) in enumerate(HandMade.BRANCHES)]
+    assert_refused_alike(spec, HandMade(1, False, False, whole).file(), "BAD_CHUNK")
+
+
+def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
+    file = HandMade(1, False, False)
+    file.bases = {1: (11, 3)}
+    assert_same_bits(spec, file.file())
+    file = HandMade(1, False, False)
+    file.bases, file.excess = {1: (11, 3)}, 1
+    assert_refused_alike(spec, file.file(), "BAD_CHUNK")
+
+
+@pytest.mark.parametrize("values, valid", [([128, -128], True), ([-128, 128], True), ([129, 0], False),
+                                           ([0, -129], False), ([0, 1 << 20], False)])
+def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
+    stream = entropy.encode_temporal(np.array([values], np.int32), 30)
+
+    def by_code(data):
+        return entropy.decode_temporal(data, 1, 2, 8, "here").tolist()
+
+    for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), by_code:
+        assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
+
+
+@pytest.mark.parametrize("kind, level", [(container.STEMS, 1), (container.STEMS, 4),
+                                         (container.AFFINES, 0)])
+def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kind, level):
+    file = HandMade(1, False, False)
+    file.leave_out = (kind, level, 1)
+    assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
+
+
+@pytest.mark.parametrize("kind, level", [(container.AFFINES, -1), (container.CORRECTIONS, 0),
+                                         (container.CORRECTIONS, -2)])
+def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec, kind, level):
+    file = HandMade(1, False, False)
+    file.store.add(kind, bytes(4), level % file.plan.level_count, 1)
+    assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
+
+
+def test_unknown_optional_kinds_are_skipped(spec):
+    file = HandMade(1, False, False)
+    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8013, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
+        file.store.add(kind, b"from the future", level)
+    assert_same_bits(spec, file.file())
+
+
+@pytest.mark.parametrize("kind, level, error", [
+    (0x8001, 255, "UNKNOWN_CHUNK"), (0x0004, 255, "UNKNOWN_CHUNK"), (0x8010, 0, "UNKNOWN_CHUNK"),
+    (0x0020, 255, "UNKNOWN_CHUNK"), (19, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
+    (0x8021, 0, "BAD_CHUNK_TABLE"), (0x800F, 0, "BAD_CHUNK_TABLE")])
+def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
+    file = HandMade(1, False, False)
+    file.store.add(kind, b"from the future", level)
+    assert_refused_alike(spec, file.file(), error)
+
+
+# ---- files made by hand ----
+
+
 class HandMade:
     """A file that no encoder would write: random integers in every stream, all flags, learned time bases."""
 
     SEGMENTS, FRAMES = 2, 37
-    # parent, vertices of the stem, flags; the stem of 70 makes two pieces
-    BRANCHES = ((-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET), (3, 3, LOOSE), (2, 9, WHOLE),
+    # parent, vertices of the stem, flags; the stem of 70 makes two pieces. Nodes that are loose and have maps
+    # of their own: 2, 3, and 16, which is whole. Loose and no nodes: 14, 17
+    BRANCHES = ((-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET | LOOSE), (3, 3, LOOSE), (2, 9, WHOLE),
                 (5, 4, SHEET), (-1, 7, SHEET), (7, 2, SHEET | WHOLE), (7, 5, SHEET), (7, 4, 0), (10, 2, 0),
-                (-1, 1, WHOLE))
+                (-1, 1, WHOLE), (12, 2, 0), (12, 3, LOOSE), (-1, 3, 0), (15, 4, LOOSE | WHOLE),
+                (16, 2, LOOSE))
 
-    def __init__(self, seed: int, wide: bool, exact: bool):
+    def __init__(self, seed: int, wide: bool, exact: bool, parts=BRANCHES):
         self.random = np.random.default_rng(seed)
-        self.wide, self.exact = wide, exact
+        self.wide, self.exact, self.parts = wide, exact, parts
+        self.bases = {1: (11, 3), 2: (8, 1), 4: (16, 18)}  # Basis_Bits, Basis_Rank
+        self.excess = 0  # frequencies that rows code beyond the rank of their learned basis
+        self.leave_out = ()
         self.origin = np.array([10.0, -3.5, 0.25])
         self.branches, self.rest = self._skeleton()
         self.vertex_count = len(self.rest)
@@ -226,10 +365,10 @@ class HandMade:
         self.plan = Plan(self.branches, self.vertex_count)
 
     def _skeleton(self) -> tuple[np.ndarray, np.ndarray]:
-        branches, rest = np.zeros(len(self.BRANCHES), BRANCH), []
-        for b, (parent, count, flags) in enumerate(self.BRANCHES):
+        branches, rest = np.zeros(len(self.parts), BRANCH), []
+        for b, (parent, count, flags) in enumerate(self.parts):
             first = [row["first"] for row in branches[:b]]
-            place = self.random.integers(2) * (self.BRANCHES[parent][1] // 2)
+            place = self.random.integers(2) * (self.parts[parent][1] // 2)
             attach = first[parent] + place if parent >= 0 else -1
             branches[b]["parent"], branches[b]["count"], branches[b]["flags"] = parent, count, flags
             branches[b]["attach"], branches[b]["first"] = attach, len(rest)
@@ -274,29 +413,54 @@ class HandMade:
         rows.flat[self.random.integers(rows.size, size=9)] = 40_000
         return rows.astype(np.int32)
 
-    def _add_segment(self, segment: int) -> None:
-        start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
-        frames, levels = stop - start, self.plan.level_count
-        bases = {1: self.random.integers(-900, 900, (3, frames)).astype(np.int32)}
-        waves = {level: basis * 2.0**-10 for level, basis in bases.items()}
-        streams = [LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 1, 4, 8)[level % 4]),
-                               waves.get(level)) for level in range(levels)]
+    def _basis(self, bits: int, rank: int, frames: int) -> np.ndarray:
+        """Entries up to the ends of their range."""
+        limit = 1 << bits - 1
+        basis = self.random.integers(-limit, limit + 1, (rank, frames)).astype(np.int32)
+        basis[0, :3] = limit, -limit, limit
+        return basis
+
+    def _motion(self, frames: int, bases: dict[int, np.ndarray]) -> SegmentMotion:
+        streams = [LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 1, 4, 8)[level % 4]))
+                   for level in range(self.plan.level_count)]
+        for level, basis in bases.items():
+            streams[level].temporal = basis * 2.0 ** (1 - self.bases[level][0])
         motion = SegmentMotion(self.plan, frames, streams)
         motion.coefficients[:] = self._rows(*motion.coefficients.shape)
         motion.tracks[:] = self._rows(*motion.tracks.shape)
         motion.node_tracks[:] = self._rows(*motion.node_tracks.shape)
         motion.node_steps[:] = self.random.integers(-13, -4, len(motion.node_steps))
+        ranks = [len(bases.get(level, range(frames))) for level in range(self.plan.level_count)]
+        for p, piece in enumerate(self.plan.pieces):
+            first, low = piece["first"], piece["low_modes"]
+            base_rank = ranks[piece["low_level"] if piece["low_level"] >= 0 else piece["level"]]
+            motion.tracks[p, :, :, base_rank:] = 0
+            motion.coefficients[first: first + low, :, base_rank:] = 0
+            motion.coefficients[first + low: first + piece["count"], :, ranks[piece["level"]]:] = 0
+        return motion
+
+    def _add_segment(self, segment: int) -> None:
+        start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
+        frames, levels = stop - start, self.plan.level_count
+        bases = {level: self._basis(bits, rank + self.excess, frames)
+                 for level, (bits, rank) in self.bases.items()}
+        motion = self._motion(frames, bases)
         for level in range(levels):
             if self.plan.has_stems(level):
-                head = container.StemsHead(streams[level].step, int(streams[level].omega))
+                head = container.StemsHead(motion.streams[level].step, int(motion.streams[level].omega))
                 if level in bases:
-                    head.bits, head.rank, head.basis = 11, 3, entropy.encode_temporal(bases[level])
+                    head.bits, head.rank = self.bases[level]
+                    head.basis = entropy.encode_temporal(bases[level][: head.rank], head.bits)
                 stream = entropy.encode_stems(motion, level)
-                self.store.add(container.STEMS, container.pack_stems(head, stream), level, segment)
+                self._add(container.STEMS, container.pack_stems(head, stream), level, segment)
             if self.plan.has_affines(level):
-                self.store.add(container.AFFINES, entropy.encode_affines(motion, level), level, segment)
-        self.store.add(container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)),
-                       levels - 1, segment)
+                self._add(container.AFFINES, entropy.encode_affines(motion, level), level, segment)
+        self._add(container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)),
+                  levels - 1, segment)
+
+    def _add(self, kind: int, payload: bytes, level: int, segment: int) -> None:
+        if (kind, level, segment) != self.leave_out:
+            self.store.add(kind, payload, level, segment)
 
     def _corrections(self, frames: int) -> bytes:
         vectors = self._rows(self.vertex_count, 3, frames).transpose(0, 2, 1)

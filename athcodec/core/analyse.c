@@ -208,13 +208,13 @@ void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double 
     for (int32_t p = 0; p < shape->piece_count; p++) analyse_piece(shape, motion, p, &scratch, source, dead_zone);
 }
 
-/* Sums over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of e * w_r,
- * track 3 the mean of e, `centre` the mean of w. Returns the sum over frames of the mean square of e. */
-static double node_moments(const ath_shape *shape, const ath_node *node, int32_t T, const ath_scratch *scratch,
-                           const double *source, double *tracks, double centre[3])
+/* Means over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of
+ * e * w_r, track 3 the mean of e, `centre` the mean of w. */
+static void node_moments(const ath_shape *shape, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                         const double *source, double *tracks, double centre[3])
 {
     const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
-    double *local = scratch->placed, square = 0.0, weight = 1.0 / (double)node->count;
+    double *local = scratch->placed, weight = 1.0 / (double)node->count;
     memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
     centre[0] = centre[1] = centre[2] = 0.0;
     for (int32_t v = node->first; v < node->first + node->count; v++) {
@@ -224,7 +224,6 @@ static double node_moments(const ath_shape *shape, const ath_node *node, int32_t
         for (int32_t axis = 0; axis < 3; axis++)
             for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
                 local[t] -= d[axis];
-                square += local[t] * local[t] * weight;
                 tracks[9 * T + t] += local[t] * weight;
             }
         for (int32_t r = 0; r < node->rank; r++) {
@@ -234,31 +233,20 @@ static double node_moments(const ath_shape *shape, const ath_node *node, int32_t
             for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
         }
     }
-    return square;
 }
 
-/* Turns the moments into the least-squares map e = Y w (attached nodes) or e = s + Y w (roots and loose parts).
- * Returns the mean square of what it leaves, over vertices and frames. */
-static double fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3], double square)
+/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, and e = s + Y w
+ * for roots and loose parts. */
+static void fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3])
 {
     double *shift = tracks + 9 * T, left = 1.0;
     for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
     for (int32_t i = 0; i < 3 * T; i++) {
-        double mean = shift[i], explained = 0.0;
-        shift[i] = 0.0;
-        if (free_base && left > 1e-6) {
-            for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
-            shift[i] = mean / left;
-            explained += shift[i] * mean;
-        }
-        for (int32_t r = 0; r < node->rank; r++) {
-            double *y = tracks + 3 * r * T + i;
-            explained += *y * *y;
-            *y -= shift[i] * centre[r];
-        }
-        square -= explained;
+        double mean = shift[i];
+        for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
+        shift[i] = free_base && left > 1e-6 ? mean / left : 0.0;
+        for (int32_t r = 0; r < node->rank; r++) tracks[3 * r * T + i] -= shift[i] * centre[r];
     }
-    return square > 0.0 ? square / (double)T : 0.0;
 }
 
 /* The largest half-octave step that is not above `step`. */
@@ -273,7 +261,7 @@ static int32_t half_octaves(double step)
 }
 
 static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch,
-                         const double *source, double quality, double level_error, double dead_zone)
+                         const double *source, double level_step, double dead_zone)
 {
     const ath_node *node = shape->nodes + n;
     const ath_piece *piece = shape->pieces + node->piece;
@@ -281,10 +269,9 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     double *tracks = scratch->rows, centre[3];
     int free_base = ath_has_shift(piece);
     ath_attach(shape, motion, piece, scratch->at);
-    double square = node_moments(shape, node, T, scratch, source, tracks, centre);
-    square = fit_node(node, free_base, T, tracks, centre, square);
-    double error = ath_sqrt(square);
-    motion->node_steps[n] = half_octaves(quality * (error > level_error ? error : level_error));
+    node_moments(shape, node, T, scratch, source, tracks, centre);
+    fit_node(node, free_base, T, tracks, centre);
+    motion->node_steps[n] = half_octaves(level_step / ath_sqrt((double)node->count));
     double step = ath_node_step(motion, n);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
@@ -292,10 +279,11 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
 }
 
-void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source, double quality,
-                       const double *level_error, double dead_zone)
+void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source,
+                       const double *level_steps, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(motion);
     for (int32_t n = 0; n < shape->node_count; n++)
-        if (shape->nodes[n].coded) analyse_node(shape, motion, n, &scratch, source, quality, level_error[shape->nodes[n].level], dead_zone);
+        if (shape->nodes[n].coded)
+            analyse_node(shape, motion, n, &scratch, source, level_steps[shape->nodes[n].level], dead_zone);
 }

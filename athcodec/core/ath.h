@@ -187,11 +187,11 @@ ATH_API uint32_t ath_crc32c(uint32_t crc, const uint8_t *bytes, size_t size);
 /* ---- encoding --------------------------------------------------------------------------------------------------- */
 
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
- * source: vertex-major doubles less the origin. A map's step is `quality` times its own RMS error or that of its
- * level, whichever is more; level_error: height + 2 lengths. */
+ * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
+ * its number of vertices: the same error in all of them together costs the same everywhere. */
 ATH_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double *source, double dead_zone);
 ATH_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source,
-                               double quality, const double *level_error, double dead_zone);
+                               const double *level_steps, double dead_zone);
 
 /* Largest distance and sum of squared distances between positions and source (plus origin). */
 ATH_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
@@ -203,7 +203,8 @@ ATH_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int w
                                      const double *source, const double origin[3], double limit, double step,
                                      int32_t *corrections, int64_t capacity);
 
-/* Writers of the streams above: the size written, or -1 when `capacity` is too small. */
+/* Writers of the streams above: the size written, -1 when `capacity` is too small, -2 when the input cannot be
+ * expressed. */
 ATH_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                      int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                      const int32_t *vertex_source);

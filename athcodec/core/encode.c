@@ -2,16 +2,19 @@
 #define ATH_ENCODING
 #include "streams.h"
 
+/* The size written; -1: no space, -2: the input is not something that the stream can hold. */
+static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
+
 int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                              const int32_t *vertex_source)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_hierarchy(&coder, model, branch_count, vertex_count, (ath_branch *)branches, (int32_t *)branch_source,
-                   (int32_t *)vertex_source);
+    int valid = code_hierarchy(&coder, model, branch_count, vertex_count, (ath_branch *)branches,
+                               (int32_t *)branch_source, (int32_t *)vertex_source);
     ath_count_pieces((ath_branch *)branches, branch_count, vertex_count); /* `subtree` served as memory */
-    return coder_finish(&coder);
+    return written(&coder, valid);
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
@@ -28,8 +31,7 @@ int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_temporal(&coder, model, rank, frames, limit, (int32_t *)basis);
-    return coder_finish(&coder);
+    return written(&coder, code_temporal(&coder, model, rank, frames, limit, (int32_t *)basis));
 }
 
 int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape, const ath_motion *motion,
@@ -37,8 +39,7 @@ int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_stems(&coder, model, shape, motion, level);
-    return coder_finish(&coder);
+    return written(&coder, code_stems(&coder, model, shape, motion, level));
 }
 
 int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
@@ -46,8 +47,7 @@ int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const a
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_affines(&coder, model, shape, motion, level);
-    return coder_finish(&coder);
+    return written(&coder, code_affines(&coder, model, shape, motion, level));
 }
 
 int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames,

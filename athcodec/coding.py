@@ -1,0 +1,257 @@
+"""One clip as the encoder codes it: hierarchy and rest pose under some settings, and the streams of one segment.
+
+Both the search for settings (search.py) and the encoder itself call what is here. Everything is closed loop: pieces are
+predicted from what the decoder will have, corrections are found on what it will output.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec import entropy
+from athcodec import quantize as qz
+from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE
+from athcodec.ath import Ath, Survey
+from athcodec.clip import MotionClip
+from athcodec.errors import BoundError
+from athcodec.hierarchy import Hierarchy
+from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments
+
+
+def threads() -> int:
+    """Segments that are worked on at once."""
+    return min(4, os.cpu_count() or 1)
+
+
+@dataclass
+class Source:
+    """A clip in file order, less an origin, cut into segments."""
+
+    clip: MotionClip
+    hierarchy: Hierarchy
+    seen: Survey
+    segment_frames: int
+    exact_rest: bool
+    rest: np.ndarray = field(init=False)  # (N, 3) float64
+    origin: np.ndarray = field(init=False)  # (3,) float64
+    wide: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
+    segments: list[tuple[int, int]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.origin = np.float64((self.seen.low + self.seen.high) / 2)
+        self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
+        self.wide = ~_thin_branches(self)
+        self.segments = split_segments(self.clip.frame_count, self.clip.vertex_count, self.segment_frames)
+
+    @property
+    def reach(self) -> float:
+        """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
+        low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)
+        high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
+        return float(np.linalg.norm(high - low))
+
+    def positions(self, segment: int) -> np.ndarray:
+        """(N, 3, T) float64 positions of a segment."""
+        return gather(self.clip.block(*self.segments[segment]), self.hierarchy.vertex_source, self.origin)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a trial varies; steps in scene units."""
+
+    bound: float
+    limit: float
+    step: float
+    rest_step: float
+    sheet: np.ndarray  # (B,) bool, file order
+    loose: np.ndarray  # (B,) bool, file order
+    lags: np.ndarray  # (B,) int32, file order
+    omega: tuple[int, ...]  # per level: rotation factors
+    learned: tuple[bool, ...]  # per level: whether the time basis is
+    node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
+
+
+class Shape:
+    """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
+
+    def __init__(self, source: Source, ath: Ath, settings: Settings):
+        hierarchy = source.hierarchy
+        self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
+        branches = np.zeros(hierarchy.branch_count, BRANCH)
+        branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
+        branches["attach"] = hierarchy.attach
+        branches["flags"] = (SHEET * settings.sheet + WHOLE * ath.whole_branches()
+                             + LOOSE * settings.loose)
+        branches["lag"] = settings.lags
+        self.hierarchy_stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+        self.plan = Plan(branches, hierarchy.vertex_count)
+        self.rest_chunk = self._code_rest(source, branches, settings)
+        self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
+
+    def _code_rest(self, source: Source, branches: np.ndarray, settings: Settings) -> ct.Rest:
+        head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
+        if source.exact_rest:
+            pose = source.clip.rest[source.hierarchy.vertex_source].astype(source.clip.rest_dtype)
+            head.exact = pose
+            self.plan.set_rest(pose.astype(np.float64) - source.origin)
+        else:
+            head.stream, decoded = entropy.encode_rest(branches, settings.rest_step, source.rest)
+            self.plan.set_rest(decoded)
+        return head
+
+
+def lags(source: Source, step: float) -> np.ndarray:
+    """Predictors of the rest pose, (B,): linear along beams, by trial elsewhere."""
+    hierarchy = source.hierarchy
+    lags = np.ones(hierarchy.branch_count, np.int32)
+    for b in np.flatnonzero(source.wide):
+        first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
+        attach = hierarchy.attach[b]
+        lags[b] = qz.rest_lag(source.rest[first: first + count], source.rest[attach] if attach >= 0 else None, step)
+    return lags
+
+
+def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
+    """Branches whose base leaves its attach point by more than their own size: fallen leaves, separate parts."""
+    hierarchy, rest = source.hierarchy, source.rest
+    first, attach = hierarchy.first_vertex, np.maximum(hierarchy.attach, 0)
+    gap = np.linalg.norm(sample[first] - sample[attach], axis=1)
+    rest_gap = np.linalg.norm(rest[first] - rest[attach], axis=1)
+    stretch = np.abs(gap - rest_gap[:, None]).max(axis=1)
+    return (hierarchy.attach >= 0) & (stretch > np.maximum(_stem_sizes(source), rest_gap))
+
+
+def _stem_sizes(source: Source) -> np.ndarray:
+    """Diagonals of the stems' bounding boxes in the rest pose, (B,)."""
+    first = source.hierarchy.first_vertex
+    return np.linalg.norm(np.maximum.reduceat(source.rest, first) - np.minimum.reduceat(source.rest, first), axis=1)
+
+
+def _thin_branches(source: Source) -> np.ndarray:
+    """Branches that look like beams: the way along their vertices is not much longer than they are wide."""
+    hierarchy, rest = source.hierarchy, source.rest
+    first = hierarchy.first_vertex
+    steps = np.zeros(len(rest))
+    steps[1:] = np.linalg.norm(np.diff(rest, axis=0), axis=1)
+    steps[first] = 0.0
+    way = np.add.reduceat(steps, first)
+    return way <= 1.3 * _stem_sizes(source)
+
+
+def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> list[LevelStream]:
+    streams = []
+    for level in range(levels):
+        stream = LevelStream(settings.step, float(settings.omega[level]))
+        if level in bases:
+            stream.temporal = qz.temporal_basis(bases[level])
+        streams.append(stream)
+    return streams
+
+
+def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
+    """All quantised tracks of one level's stream over time, in units of their steps: (rows, frames)."""
+    pieces = segment.plan.pieces
+    base = np.where(pieces["low_level"] >= 0, pieces["low_level"], pieces["level"])
+    slots = []
+    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]),
+                          (pieces["low_modes"], pieces["count"], pieces["level"])):
+        for piece in np.flatnonzero(at == level):
+            start = low if np.isscalar(low) else low[piece]
+            slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
+    coefficients = segment.coefficients[np.concatenate(slots) if slots else np.zeros(0, int)]
+    tracks = segment.tracks[base == level]
+    rows = np.concatenate([coefficients.reshape(-1, segment.frames), tracks.reshape(-1, segment.frames)])
+    return rows[np.any(rows, axis=1)] @ segment.cosines
+
+
+def _learn_bases(shape: Shape, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
+    """Temporal bases of the levels that learn theirs, from a finer pass with cosines."""
+    levels = [level for level, learned in enumerate(settings.learned) if learned]
+    if not levels:
+        return {}
+    finer = 32
+    fine = replace(settings, step=qz.single(settings.step / finer))
+    segment = SegmentMotion(shape.plan, positions.shape[2], _streams(fine, shape.plan.level_count, {}))
+    segment.analyse(positions, qz.DEAD_ZONE)
+    bases = {level: qz.learn_temporal_basis(_level_rows(segment, level) / finer, qz.TEMPORAL_TOLERANCE)
+             for level in levels}
+    return {level: basis for level, basis in bases.items() if basis is not None}
+
+
+@dataclass
+class Coded:
+    """The stems of one segment: integers, streams by level, corrections (K, 5), and the corrected positions."""
+
+    segment: SegmentMotion
+    stems: dict[int, bytes]
+    corrections: np.ndarray
+    decoded: np.ndarray  # (N, 3, T)
+    correction_step: float
+
+    @property
+    def bytes(self) -> int:
+        return sum(map(len, self.stems.values())) + len(self.correction_chunk)
+
+    @cached_property
+    def correction_chunk(self) -> bytes:
+        if not len(self.corrections):
+            return b""
+        vertices, _, frames = self.decoded.shape
+        stream = entropy.encode_corrections(self.corrections, vertices, frames)
+        return ct.pack_corrections(self.correction_step, stream)
+
+
+def code_stems(shape: Shape, settings: Settings, positions: np.ndarray) -> Coded:
+    """Streams of the stems and the corrections that keep the limit."""
+    plan = shape.plan
+    bases = _learn_bases(shape, settings, positions)
+    streams = _streams(settings, plan.level_count, bases)
+    segment = SegmentMotion(plan, positions.shape[2], streams)
+    segment.analyse(positions, qz.DEAD_ZONE)
+    stems = {}
+    for level in range(plan.level_count):
+        if plan.has_stems(level):
+            head = ct.StemsHead(settings.step, settings.omega[level])
+            if level in bases:
+                head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
+                head.basis = entropy.encode_temporal(bases[level], head.bits)
+            stems[level] = ct.pack_stems(head, entropy.encode_stems(segment, level))
+    decoded = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
+    factor = 1.0
+    while True:
+        step = qz.single(qz.CORRECTION_STEP * settings.limit * factor)
+        corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step)
+        if corrections is not None:
+            return Coded(segment, stems, corrections, decoded, step)
+        factor *= 0.5
+        if factor < 1e-3:
+            raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "
+                             f"{shape.dtype.name} numbers")
+
+
+def code_segment(shape: Shape, settings: Settings, positions: np.ndarray) -> tuple[dict, np.ndarray]:
+    """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level."""
+    plan, last = shape.plan, shape.plan.level_count - 1
+    coded = code_stems(shape, settings, positions)
+    segment = coded.segment
+    segment.analyse_nodes(positions, settings.node_steps, qz.DEAD_ZONE)
+    chunks: dict[tuple[int, int], bytes] = {(level, ct.STEMS): data for level, data in coded.stems.items()}
+    for level in range(plan.level_count):
+        if plan.has_affines(level):
+            chunks[level, ct.AFFINES] = entropy.encode_affines(segment, level)
+    if len(coded.corrections):
+        chunks[last, ct.CORRECTIONS] = coded.correction_chunk
+    errors = np.zeros((plan.level_count, 2))
+    for level in range(plan.level_count):
+        decoded = coded.decoded if level == last else segment.pose(level, shape.origin, shape.dtype)
+        largest, squares = position_error(decoded, positions, shape.origin)
+        errors[level] = largest, math.sqrt(squares / (positions.shape[0] * positions.shape[2]))
+    if errors[last, 0] > settings.bound:
+        raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.bound}")
+    return chunks, errors

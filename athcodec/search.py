@@ -1,0 +1,165 @@
+"""Which settings make the smallest file: candidates code a sample of the segments, and their bytes are counted.
+
+Bases, rotations, time bases and steps are searched one after the other. `Search` knows what to try; what a trial does
+is coding.py's business.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec import entropy
+from athcodec import quantize as qz
+from athcodec.ath import Ath
+from athcodec.coding import Settings, Shape, Source, code_stems, lags, loose_branches, threads
+from athcodec.errors import BoundError
+from athcodec.transform import Plan
+
+EFFORTS = ("fast", "default", "best")
+
+Progress = Callable[[str, float], None]
+
+
+class Search:
+    """Finds settings by coding a sample of the segments with each candidate and counting the bytes."""
+
+    def __init__(self, source: Source, ath: Ath, bound: float, effort: str, report: Progress):
+        self.source, self.ath, self.effort, self.report = source, ath, effort, report
+        relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
+        step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+        self.levels = ath.height + 2
+        self.sample = source.positions(len(source.segments) // 2)
+        self.start = Settings(
+            bound=bound, limit=qz.error_limit(bound, source.seen.diagonal), step=qz.single(step),
+            rest_step=qz.single(rest_step), sheet=source.wide, loose=loose_branches(source, self.sample),
+            lags=lags(source, rest_step), omega=(0,) * self.levels, learned=(False,) * self.levels,
+            node_steps=np.full(self.levels, step))
+
+    def _level_errors(self, bound: float) -> np.ndarray:
+        """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
+
+        The level's own: the RMS that independent least-squares maps would leave, in a few frames, at least the bound.
+        """
+        some = np.linspace(0, self.sample.shape[2] - 1, min(8, self.sample.shape[2])).astype(int)
+        frames = np.empty((len(some), *self.sample.shape[:2]))
+        frames[:, self.source.hierarchy.vertex_source] = np.moveaxis(self.sample[:, :, some], 2, 0) + self.source.origin
+        nodes = self._inner_nodes()
+        errors = np.full(self.levels, bound)
+        for level in np.flatnonzero(nodes):
+            left = self.ath.approximation(frames, int(level)) - frames
+            whole = max(bound, math.sqrt((left**2).sum() / (frames.size / 3)))
+            errors[level] = whole * math.sqrt(self.source.clip.vertex_count / nodes[level])
+        return errors
+
+    def _inner_nodes(self) -> np.ndarray:
+        """Nodes of more than one branch, per level."""
+        hierarchy, branches = self.source.hierarchy, self.ath.node_branch
+        branches = branches[hierarchy.subtree_branches[branches] > 1]
+        return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
+
+    def best(self) -> Settings:
+        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_steps]
+        if self.effort == "fast":
+            steps = [self._with_rotations]
+        elif self.effort == "best":
+            steps += [self._with_rotations, self._with_learned, self._with_steps]
+        settings = self.start
+        for done, step in enumerate([*steps, self._with_node_steps]):
+            self.report("search", done / (len(steps) + 1))
+            settings = step(settings)
+        self.report("search", 1.0)
+        return settings
+
+    def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
+        """(bytes of a whole file, bytes per level in the sample) at these settings."""
+        shape = Shape(self.source, self.ath, settings)
+        try:
+            coded = code_stems(shape, settings, self.sample)
+        except BoundError:
+            return math.inf, np.full(self.levels, math.inf)
+        levels = np.zeros(self.levels)
+        for level, data in coded.stems.items():
+            levels[level] = len(data)
+        corrections = len(coded.correction_chunk)
+        if corrections:
+            levels += corrections * self._share(shape.plan, coded.corrections)
+        scale = self.source.clip.frame_count / self.sample.shape[2]
+        return levels.sum() * scale + shape.prelude_bytes, levels
+
+    def _share(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
+        """Fractions of the corrections that fall on the pieces of each level."""
+        level_of_vertex = np.repeat(np.where(plan.pieces["low_level"] >= 0, plan.pieces["low_level"],
+                                             plan.pieces["level"]), plan.pieces["count"])
+        counts = np.bincount(level_of_vertex[corrections[:, 0]], minlength=self.levels)
+        return counts / counts.sum()
+
+    def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
+        with ThreadPoolExecutor(threads()) as pool:
+            return list(pool.map(self.cost, candidates))
+
+    def _with_basis(self, settings: Settings) -> Settings:
+        """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
+        sheets = [self.source.wide, np.zeros_like(self.source.wide), np.ones_like(self.source.wide)]
+        if not self.source.wide.any() or self.source.wide.all():
+            sheets = sheets[1:]
+        omegas = {settings.omega, (2,) * self.levels} if not any(settings.omega) else {settings.omega}
+        candidates = [replace(settings, sheet=sheet, omega=omega) for sheet in sheets for omega in sorted(omegas)]
+        costs = [cost for cost, _ in self._costs(candidates)]
+        return replace(candidates[int(np.argmin(costs))], omega=settings.omega)
+
+    def _with_rotations(self, settings: Settings) -> Settings:
+        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
+        candidates = [replace(settings, omega=(k,) * self.levels) for k in factors]
+        per_level = np.array([levels for _, levels in self._costs(candidates)])
+        chosen = per_level.argmin(axis=0)
+        return replace(settings, omega=tuple(int(factors[i]) for i in chosen))
+
+    def _with_learned(self, settings: Settings) -> Settings:
+        """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
+        learning = replace(settings, learned=(True,) * self.levels)
+        (cost, cosines), (_, learned) = self._costs([settings, learning])
+        mixed = replace(settings, learned=tuple((learned < cosines).tolist()))
+        return mixed if any(mixed.learned) and self.cost(mixed)[0] < cost else settings
+
+    def _with_steps(self, settings: Settings) -> Settings:
+        """Walks step, then rest step, to the cheapest on a geometric grid."""
+        settings = self._walk(settings, "step", 1.15, math.inf)
+        if self.source.exact_rest:
+            return settings
+        return self._walk(settings, "rest_step", 1.4, qz.REST_CAP * settings.bound)
+
+    def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
+        def moved(exponent: int) -> Settings:
+            return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
+
+        def costs_at(exponents) -> dict[int, float]:
+            return dict(zip(exponents, (cost for cost, _ in self._costs([moved(e) for e in exponents]))))
+
+        costs = costs_at((-1, 0, 1))
+        while True:
+            best = min(costs, key=costs.get)
+            wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
+            if not wanted:
+                return moved(best)
+            costs |= costs_at(wanted)
+
+    def _with_node_steps(self, settings: Settings) -> Settings:
+        """The finest maps of inner nodes that keep to their share of the file."""
+        shape, errors = Shape(self.source, self.ath, settings), self._level_errors(settings.bound)
+        coded = code_stems(shape, settings, self.sample)
+        scale = self.source.clip.frame_count / self.sample.shape[2]
+        rest = coded.bytes * scale + shape.prelude_bytes
+        allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        for quality in qz.NODE_QUALITIES:
+            coded.segment.clear_nodes()
+            coded.segment.analyse_nodes(self.sample, quality * errors, qz.DEAD_ZONE)
+            size = sum(len(entropy.encode_affines(coded.segment, level)) for level in range(self.levels)
+                       if shape.plan.has_affines(level))
+            if size * scale <= allowed:
+                break
+        return replace(settings, node_steps=quality * errors)
