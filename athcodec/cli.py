@@ -36,7 +36,6 @@ from .clip import MotionClip
 from .decoder import Decoder, Depth
 from .encoder import DEFAULT_REL_ERROR, EFFORTS
 from .errors import AthError, ClipError, LevelUnavailable
-from .exporters import Hdf5Writer
 from .metrics import ErrorMeter, compare_clips
 from .transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from .units import METRES, Length, parse_length, parse_size
@@ -225,6 +224,8 @@ def _write_hdf5(
     report: Report | None = None,
 ) -> None:
     """Decode segment by segment, so that a clip larger than memory works."""
+    from .exporters import Hdf5Writer  # only here: see __init__.py
+
     writer = Hdf5Writer(
         path,
         time=decoder.time[frames.start : frames.stop],

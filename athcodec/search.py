@@ -156,10 +156,12 @@ class Search:
         rest = coded.bytes * scale + shape.prelude_bytes
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         for quality in qz.NODE_QUALITIES:
+            steps = quality * errors
+            steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
             coded.segment.clear_nodes()
-            coded.segment.analyse_nodes(self.sample, quality * errors, qz.DEAD_ZONE)
+            coded.segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             size = sum(len(entropy.encode_affines(coded.segment, level)) for level in range(self.levels)
                        if shape.plan.has_affines(level))
             if size * scale <= allowed:
                 break
-        return replace(settings, node_steps=quality * errors)
+        return replace(settings, node_steps=steps)
