@@ -47,7 +47,8 @@ class Source:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.wide = ~_thin_branches(self)
-        self.segments = split_segments(self.clip.frame_count, self.clip.vertex_count, self.segment_frames)
+        self.segments = split_segments(self.clip.frame_count, self.clip.vertex_count, self.segment_frames,
+                                       ct.Limits.memory_bytes)
 
     @property
     def reach(self) -> float:

@@ -25,7 +25,7 @@ from athcodec.container import Container, Limits
 from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, LevelUnavailable, LimitExceeded,
                              Truncated)
 from athcodec.hierarchy import Hierarchy, derived_edges
-from athcodec.transform import LevelStream, Plan, SegmentMotion, scatter
+from athcodec.transform import LevelStream, Plan, SegmentMotion, decoding_bytes, scatter
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 TABLE_KEYS = ("epsilon", "eta", "xi", "lam")
@@ -101,7 +101,7 @@ class Decoder:
 
     def _check_memory(self, header: ct.Header) -> None:
         frames = -(-header.frame_count // header.segment_count)
-        needed = header.vertex_count * (3 * frames * (4 + 8 + 8) + 512)
+        needed = decoding_bytes(header.vertex_count, frames)
         if needed > self.limits.memory_bytes:
             raise LimitExceeded(f"header: got {header.vertex_count} vertices in segments of {frames} frames, about "
                                 f"{needed} bytes; the limit is {self.limits.memory_bytes}")

@@ -12,15 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec._native import BRANCH, NODE, PIECE, Motion, Shape, Stream, address, lib
+from athcodec._native import BRANCH, NODE, PIECE, PIECE_VERTICES, Motion, Shape, Stream, address, lib
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128
 SEGMENT_BYTES = 256 << 20
 
 
-def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT) -> list[tuple[int, int]]:
-    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 256 MiB."""
+def decoding_bytes(vertex_count: int, frames: int) -> int:
+    """Memory that decoding a segment takes, at most: integers, two sets of positions, bases."""
+    return vertex_count * (3 * frames * (4 + 8 + 8) + 8 * PIECE_VERTICES)
+
+
+def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT,
+                   memory: int = 2 << 30) -> list[tuple[int, int]]:
+    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 256 MiB, or where a
+    decoder would need more than `memory` bytes."""
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
+    while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
+        limit -= 1
     count = -(-frame_count // limit)
     return [(frame_count * i // count, frame_count * (i + 1) // count) for i in range(count)]
 

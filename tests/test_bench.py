@@ -6,16 +6,15 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+import athcodec
 from athcodec.container import KIND_NAMES
 
 KINDS = {*KIND_NAMES.values(), "HEADER"}
 ROOT = Path(__file__).resolve().parent.parent
-
-pytestmark = pytest.mark.skipif(not (ROOT / "bench").is_dir(), reason="sdists have no bench")
-
 
 def run_bench(tmp_path, *words):
     """(printed text, contents of the JSON file) of one run on the sample."""
@@ -64,3 +63,12 @@ def test_figures_come_with_command_versions_and_machine(tmp_path):
     assert result["command"].startswith("python -m bench sizes --rel-error 1e-2")
     assert {"python", "numpy", "athcodec"} <= result["versions"].keys()
     assert {"cpu", "cores"} <= result["machine"].keys()
+
+
+def test_the_picture_has_a_panel_for_every_level(tmp_path):
+    drawing = tmp_path / "levels.svg"
+    run_bench(tmp_path, "picture", "--out", str(drawing), "--frame", "0")
+    captions = ["".join(text.itertext()) for text in ElementTree.parse(drawing).iter("{http://www.w3.org/2000/svg}text")]
+    with athcodec.read_hdf5(athcodec.sample_path()) as clip:
+        levels = athcodec.build_ath(clip, max_error=1e-4 * 10.657).height + 2
+    assert [caption.split()[1] for caption in captions[::2]] == [str(level) for level in range(levels)]

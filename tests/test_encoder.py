@@ -12,7 +12,9 @@ import pytest
 import athcodec
 from athcodec import MotionClip
 from athcodec import clip as clip_module
+from athcodec.container import Limits
 from athcodec.errors import BoundError, ClipError
+from athcodec.transform import decoding_bytes, split_segments
 from plants import chain_plant, clip_of, plant
 
 
@@ -351,3 +353,10 @@ def test_long_clips_decode_in_time_proportional_to_their_length(tmp_path):
         return min(times)
 
     assert seconds(16_000) < 2.5 * 8 * seconds(2_000)
+
+
+def test_segments_are_short_enough_for_a_decoder_within_its_default_memory():
+    for vertices in (1_000, 100_000, 1_000_000, 2_000_000, 3_000_000):
+        segments = split_segments(1_000, vertices, memory=Limits.memory_bytes)
+        assert [start for start, _ in segments[1:]] == [stop for _, stop in segments[:-1]]
+        assert max(decoding_bytes(vertices, stop - start) for start, stop in segments) <= Limits.memory_bytes
