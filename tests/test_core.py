@@ -30,11 +30,3 @@ def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_f
     subprocess.run([compiler, "-nostdlib", "-r", *objects, "-o", whole], check=True)
     undefined = subprocess.run(["nm", "-u", whole], check=True, capture_output=True, text=True).stdout.split()
     assert set(undefined) - {"U"} <= {"memcpy", "memset", "memmove"}
-
-
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_the_header_serves_cpp(compiler, tmp_path):
-    source = tmp_path / "engine.cpp"
-    source.write_text('#include "ath.h"\nint main() { return static_cast<int>(ath_crc32c(0, nullptr, 0)); }\n')
-    subprocess.run([compiler, "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{CORE}", "-fsyntax-only",
-                    source], check=True)
