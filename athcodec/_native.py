@@ -16,7 +16,6 @@ from athcodec.errors import BadChunk
 
 PIECE_VERTICES = 64
 SEGMENT_FRAMES = 256
-MAX_DEPTH = 30
 SHEET, LOOSE, WHOLE = 1, 2, 4
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])

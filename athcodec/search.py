@@ -67,7 +67,7 @@ class Search:
         if self.effort == "fast":
             steps = [self._with_rotations]
         elif self.effort == "best":
-            steps += [self._with_rotations, self._with_learned, self._with_steps]
+            steps += [self._with_rotations, self._with_learned, self._with_finer_steps]
         settings = self.start
         for done, step in enumerate([*steps, self._with_node_steps]):
             self.report("search", done / (len(steps) + 1))
@@ -127,11 +127,17 @@ class Search:
         return mixed if any(mixed.learned) and self.cost(mixed)[0] < cost else settings
 
     def _with_steps(self, settings: Settings) -> Settings:
-        """Walks step, then rest step, to the cheapest on a geometric grid."""
-        settings = self._walk(settings, "step", 1.15, math.inf)
+        return self._walk_steps(settings, 1.15, 1.4)
+
+    def _with_finer_steps(self, settings: Settings) -> Settings:
+        return self._walk_steps(settings, 1.04, 1.12)
+
+    def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
+        """Walks step, then rest step, to the cheapest on geometric grids."""
+        settings = self._walk(settings, "step", factor, math.inf)
         if self.source.exact_rest:
             return settings
-        return self._walk(settings, "rest_step", 1.4, qz.REST_CAP * settings.bound)
+        return self._walk(settings, "rest_step", rest_factor, qz.REST_CAP * settings.bound)
 
     def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
         def moved(exponent: int) -> Settings:

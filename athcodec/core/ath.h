@@ -29,14 +29,12 @@ extern "C" {
 
 enum {
     ATH_PIECE_VERTICES = 64,   /* longest piece of a stem */
-    ATH_SEGMENT_FRAMES = 256,  /* longest segment */
-    ATH_MAX_DEPTH = 30         /* deepest node; what is deeper moves with it until the last level */
+    ATH_SEGMENT_FRAMES = 256   /* longest segment */
 };
 
 typedef enum ath_result {
     ATH_OK = 0,
-    ATH_BAD_STREAM = 1,   /* a stream's content is not valid */
-    ATH_NO_SPACE = 2      /* the output buffer is too small (encoding) */
+    ATH_BAD_STREAM = 1    /* a stream's content is not valid */
 } ath_result;
 
 enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };
