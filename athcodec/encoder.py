@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -209,15 +210,16 @@ class _Job:
 
     def _add_motion(self, store: ct.ChunkStore, shape: Shape, settings: Settings) -> np.ndarray:
         """Codes all segments, a few at a time; returns (levels, segments, 2) errors."""
-        errors = np.zeros((shape.plan.level_count, len(self.source.segments), 2))
+        count = len(self.source.segments)
+        errors = np.zeros((shape.plan.level_count, count, 2))
         with ThreadPoolExecutor(threads()) as pool:
-            pending: list = []
-            for index in range(len(self.source.segments)):
+            pending: deque[Future] = deque()
+            for index in range(count):
+                if len(pending) == threads():
+                    self._collect(store, errors, index - len(pending), pending.popleft())
                 pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index)))
-                if len(pending) > threads():
-                    self._collect(store, errors, index + 1 - len(pending), pending.pop(0))
             while pending:
-                self._collect(store, errors, len(self.source.segments) - len(pending), pending.pop(0))
+                self._collect(store, errors, count - len(pending), pending.popleft())
         return errors
 
     def _collect(self, store: ct.ChunkStore, errors: np.ndarray, index: int, future) -> None:
