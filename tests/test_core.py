@@ -20,7 +20,7 @@ def decoder_sources():
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_functions(compiler, tmp_path):
-    strict = ["-std=c11", "-O2", "-ffreestanding", "-DATH_FREESTANDING", "-fno-math-errno", "-ffp-contract=off", "-Wall",
+    strict = ["-std=c11", "-O2", "-ffreestanding", "-fno-math-errno", "-ffp-contract=off", "-Wall",
               "-Wextra", "-Wconversion", "-Werror"]
     objects = []
     for source in decoder_sources():
