@@ -346,19 +346,24 @@ def mutations(rng: np.random.Generator, payload: bytes):
     return bytes(changed)
 
 
+def seconds_to_use(chunks, parts) -> float:
+    start = time.perf_counter()
+    use(parts.with_chunks(chunks))
+    return time.perf_counter() - start
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_a_spoilt_chunk_with_a_good_checksum_is_refused_or_plays(name, parts):
+    """And neither takes much longer than the sound file."""
     rng = np.random.default_rng(KINDS[name])
-    slowest = 0.0
+    slowest, sound = 0.0, seconds_to_use(parts.chunks, parts)
     for _ in range(60):
         places = [i for i, (c, _) in enumerate(parts.chunks) if c.kind == KINDS[name]]
         i = int(rng.choice(places))
         chunks = list(parts.chunks)
         chunks[i] = chunks[i][0], mutations(rng, chunks[i][1])
-        start = time.perf_counter()
-        use(parts.with_chunks(chunks))
-        slowest = max(slowest, time.perf_counter() - start)
-    assert slowest < 2.0
+        slowest = max(slowest, seconds_to_use(chunks, parts))
+    assert slowest < 100 * sound
 
 
 @pytest.mark.slow
@@ -514,9 +519,10 @@ def test_streams_of_one_byte_over_and_over_end(name, byte, size, parts):
     head = {"HIERARCHY": 16, "REST": 36, "STEMS": 8, "AFFINES": 0, "CORRECTIONS": 4}[name]
     level = {"STEMS": 3, "AFFINES": 1, "CORRECTIONS": 3}.get(name)
     payload = parts.payload(KINDS[name], level)[:head] + byte * size
+    sound = seconds_to_use(parts.chunks, parts)
     start = time.perf_counter()
     use(parts.with_payload(KINDS[name], payload, level))
-    assert time.perf_counter() - start < 2.0
+    assert time.perf_counter() - start < 100 * sound
 
 
 # ---- zstd ----
