@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .hierarchy import Hierarchy, hierarchy_of
+from athcodec.hierarchy import Hierarchy, hierarchy_of
 
 if TYPE_CHECKING:
-    from .clip import MotionClip
+    from athcodec.clip import MotionClip
 
 MAX_DEPTH = 30
 RANK_TOLERANCE = 1e-3

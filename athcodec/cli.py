@@ -30,15 +30,14 @@ from rich.table import Table
 from rich.text import Text
 
 import athcodec
-
-from .ath import Thresholds
-from .clip import MotionClip
-from .decoder import Decoder, Depth
-from .encoder import DEFAULT_REL_ERROR, EFFORTS
-from .errors import AthError, ClipError, LevelUnavailable
-from .metrics import ErrorMeter, compare_clips
-from .transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
-from .units import METRES, Length, parse_length, parse_size
+from athcodec.ath import Thresholds
+from athcodec.clip import MotionClip
+from athcodec.decoder import Decoder, Depth
+from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
+from athcodec.errors import AthError, ClipError, LevelUnavailable
+from athcodec.metrics import ErrorMeter, compare_clips
+from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.units import METRES, Length, parse_length, parse_size
 
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""
@@ -224,7 +223,7 @@ def _write_hdf5(
     report: Report | None = None,
 ) -> None:
     """Decode segment by segment, so that a clip larger than memory works."""
-    from .exporters import Hdf5Writer  # only here: see __init__.py
+    from athcodec.exporters import Hdf5Writer  # only here: see __init__.py
 
     writer = Hdf5Writer(
         path,

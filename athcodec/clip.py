@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import ClipError
+from athcodec.errors import ClipError
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20

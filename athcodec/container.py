@@ -20,8 +20,20 @@ import numpy as np
 import zstandard
 
 from athcodec._native import crc32c
-from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, FormatError, LimitExceeded,
-                             NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
+from athcodec.errors import (
+    BadChecksum,
+    BadChunk,
+    BadChunkTable,
+    BadHeader,
+    ClipError,
+    FormatError,
+    LimitExceeded,
+    NotAnAthFile,
+    TrailingBytes,
+    Truncated,
+    UnknownChunk,
+    UnsupportedVersion,
+)
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 1

@@ -22,8 +22,16 @@ from athcodec._native import WHOLE
 from athcodec.ath import stem_maps
 from athcodec.clip import check_stem_index
 from athcodec.container import Container, Limits
-from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, ClipError, LevelUnavailable, LimitExceeded,
-                             Truncated)
+from athcodec.errors import (
+    BadChecksum,
+    BadChunk,
+    BadChunkTable,
+    BadHeader,
+    ClipError,
+    LevelUnavailable,
+    LimitExceeded,
+    Truncated,
+)
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.transform import LevelStream, Plan, SegmentMotion, decoding_bytes, scatter
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .clip import MotionClip, check_branches, check_indices, check_stem_index
-from .errors import ClipError
+from athcodec.clip import MotionClip, check_branches, check_indices, check_stem_index
+from athcodec.errors import ClipError
 
 MAX_VERTICES = 2**31 - 1
 

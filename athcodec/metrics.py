@@ -11,8 +11,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from .clip import MotionClip
-from .errors import ClipError
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
 
 _SLICE_VALUES = 1 << 20
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 from athcodec import container as ct
 from athcodec.errors import LevelUnavailable, Truncated
@@ -25,7 +24,7 @@ def truncate(source, target, depth: int) -> int:
         if absent:
             raise Truncated(f"{absent[0]}: got a file of {container.available_length} bytes; expected at least "
                             f"{absent[0].offset + absent[0].length}")
-        with new_file(Path(target)) as out:
+        with new_file(target) as out:
             out.write(front)
             for chunk in chunks:
                 out.write(container.payload(chunk))

@@ -8,8 +8,6 @@ branch_order.
 from __future__ import annotations
 
 import json
-import os
-import secrets
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any
@@ -17,9 +15,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
-from ..errors import ClipError
-from ..hierarchy import branch_orders
+from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
+from athcodec.errors import ClipError
+from athcodec.files import Part
+from athcodec.hierarchy import branch_orders
 
 CHUNK_BYTES = 1 << 20
 
@@ -74,8 +73,8 @@ class Hdf5Writer:
         }
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
-        self._path = os.path.realpath(path)
-        self._part = self._open()
+        self._part: Part | None = Part(path)
+        self._file = h5py.File(self._part.name, "x")
         try:
             self._positions = self._create_positions(dtype)
             self._write_arrays(arrays | _further(attributes))
@@ -114,7 +113,7 @@ class Hdf5Writer:
             if self._written < self._frame_count:
                 raise ClipError(f"frames: got {self._written}, expected {self._frame_count}, one per time")
             self._file.close()
-            os.replace(self._part, self._path)
+            self._part.complete()
             self._part = None
         except BaseException:
             self.abort()
@@ -128,18 +127,7 @@ class Hdf5Writer:
         try:
             self._file.close()
         finally:
-            if os.path.exists(part):
-                os.remove(part)
-
-    def _open(self) -> str:
-        directory, name = os.path.split(self._path)
-        if not os.path.isdir(directory):
-            raise FileNotFoundError(f"{self._path}: the directory {directory} does not exist")
-        if os.path.isdir(self._path):
-            raise IsADirectoryError(f"{self._path}: is a directory, expected a file name")
-        part = os.path.join(directory, f".{name}.{secrets.token_hex(4)}.part")
-        self._file = h5py.File(part, "x")
-        return part
+            part.discard()
 
     def _create_positions(self, dtype: np.dtype) -> h5py.Dataset:
         shape = (self._frame_count, self._vertex_count, 3)

@@ -25,9 +25,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..clip import RESERVED_NAMES, MotionClip, frame_rate
-from ..errors import ClipError
-from ..hierarchy import branch_orders, branches_from_edges
+from athcodec.clip import RESERVED_NAMES, MotionClip, frame_rate
+from athcodec.errors import ClipError
+from athcodec.hierarchy import branch_orders, branches_from_edges
 
 CHUNK_CACHE_BYTES = 64 << 20
 MAX_ATTRIBUTE_BYTES = 1 << 30
