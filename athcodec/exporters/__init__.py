@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from .hdf5 import Hdf5Writer, write_hdf5
+from athcodec.exporters.hdf5 import Hdf5Writer, write_hdf5
 
 __all__ = ["Hdf5Writer", "write_hdf5"]

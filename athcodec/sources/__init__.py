@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .hdf5 import read_hdf5
+from athcodec.sources.hdf5 import read_hdf5
 
 __all__ = ["read_hdf5", "sample_path"]
 
