@@ -21,7 +21,7 @@ from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
-from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments
+from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
 
 
 def threads() -> int:
@@ -150,7 +150,7 @@ def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> l
     for level in range(levels):
         stream = LevelStream(settings.step, float(settings.omega[level]))
         if level in bases:
-            stream.temporal = qz.temporal_basis(bases[level])
+            stream.temporal = temporal_basis(bases[level], qz.TEMPORAL_BITS)
         streams.append(stream)
     return streams
 
@@ -158,7 +158,6 @@ def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> l
 def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
     """All quantised tracks of one level's stream over time, in units of their steps: (rows, frames)."""
     pieces = segment.plan.pieces
-    base = np.where(pieces["low_level"] >= 0, pieces["low_level"], pieces["level"])
     slots = []
     for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]),
                           (pieces["low_modes"], pieces["count"], pieces["level"])):
@@ -166,7 +165,7 @@ def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
     coefficients = segment.coefficients[np.concatenate(slots) if slots else np.zeros(0, int)]
-    tracks = segment.tracks[base == level]
+    tracks = segment.tracks[segment.plan.base_level == level]
     rows = np.concatenate([coefficients.reshape(-1, segment.frames), tracks.reshape(-1, segment.frames)])
     return rows[np.any(rows, axis=1)] @ segment.cosines
 

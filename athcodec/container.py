@@ -19,7 +19,7 @@ from typing import BinaryIO
 import numpy as np
 import zstandard
 
-from athcodec._native import crc32c
+from athcodec._native import SEGMENT_FRAMES, crc32c
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -124,9 +124,17 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
     table = b"".join(_CHUNK.pack(c.kind, c.clip, c.level, c.segment, c.length, c.checksum) for c in chunks)
     table += np.ascontiguousarray(_round_up(errors)).astype("<f4").tobytes()
     header.chunk_count = len(chunks)
-    header.file_length = _HEADER.size + len(table) + sum(c.length for c in chunks)
+    header.file_length = _file_length(header, chunks)
     checksum = crc32c(_pack_header(header, 0) + table)
     return _pack_header(header, checksum) + table
+
+
+def _tables_size(header: Header, chunk_count: int) -> int:
+    return chunk_count * _CHUNK.size + header.level_count * header.segment_count * _ERRORS.size
+
+
+def _file_length(header: Header, chunks: list[Chunk]) -> int:
+    return _HEADER.size + _tables_size(header, len(chunks)) + sum(chunk.length for chunk in chunks)
 
 
 def _round_up(values: np.ndarray) -> np.ndarray:
@@ -157,8 +165,7 @@ class ChunkStore:
 
     def size(self, header: Header) -> int:
         """Bytes of the whole file."""
-        tables = len(self.entries) * _CHUNK.size + header.level_count * header.segment_count * _ERRORS.size
-        return _HEADER.size + tables + sum(chunk.length for chunk, _ in self.entries)
+        return _file_length(header, [chunk for chunk, _ in self.entries])
 
     def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
         """Writes the whole file in its order and returns its chunks."""
@@ -232,8 +239,8 @@ class Container:
                 raise LimitExceeded(f"header: got {name} {value}; the limit is {limit}")
         checks = [
             (header.branch_count <= header.vertex_count, "Branch_Count", header.branch_count, "at most Vertex_Count"),
-            (header.segment_count <= header.frame_count <= 256 * header.segment_count, "Segment_Count",
-             header.segment_count, "segments of 1 to 256 frames"),
+            (header.segment_count <= header.frame_count <= SEGMENT_FRAMES * header.segment_count, "Segment_Count",
+             header.segment_count, f"segments of 1 to {SEGMENT_FRAMES} frames"),
             (2 <= header.full_level_count <= 32, "Full_Level_Count", header.full_level_count, "2 to 32"),
             (1 <= header.level_count <= header.full_level_count, "Level_Count", header.level_count,
              "1 to Full_Level_Count"),
@@ -250,7 +257,7 @@ class Container:
     def _read_tables(self, front: bytes) -> tuple[list[Chunk], np.ndarray]:
         header = self.header
         table_size = header.chunk_count * _CHUNK.size
-        size = table_size + header.level_count * header.segment_count * _ERRORS.size
+        size = _tables_size(header, header.chunk_count)
         if size > self.limits.table_bytes:
             raise LimitExceeded(f"chunk table: got {size} bytes; the limit is {self.limits.table_bytes}")
         table = self._read(_HEADER.size, size, "chunk table")

@@ -33,7 +33,15 @@ from athcodec.errors import (
     Truncated,
 )
 from athcodec.hierarchy import Hierarchy, derived_edges
-from athcodec.transform import LevelStream, Plan, SegmentMotion, decoding_bytes, scatter
+from athcodec.transform import (
+    LevelStream,
+    Plan,
+    SegmentMotion,
+    balanced_segments,
+    decoding_bytes,
+    scatter,
+    temporal_basis,
+)
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 TABLE_KEYS = ("epsilon", "eta", "xi", "lam")
@@ -104,7 +112,6 @@ class Decoder:
         self._check_motion_chunks()
         self._read_rest()
         self.time = ct.parse_time(self.container.required(ct.TIME), header.frame_count, limits)
-        self._segments: dict[int, tuple[int, SegmentMotion, np.ndarray | None]] = {}
         self._damaged_from = self._first_damaged_level() if allow_partial else header.level_count
 
     def _check_memory(self, header: ct.Header) -> None:
@@ -203,8 +210,7 @@ class Decoder:
     @cached_property
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
-        count, frames = self.container.header.segment_count, self.frame_count
-        return [(frames * i // count, frames * (i + 1) // count) for i in range(count)]
+        return balanced_segments(self.frame_count, self.container.header.segment_count)
 
     @property
     def bytes_read(self) -> int:
@@ -412,7 +418,7 @@ class Decoder:
             streams[d] = LevelStream(head.step, float(head.omega))
             if head.bits:
                 steps = entropy.decode_temporal(head.basis, head.rank, stop - start, head.bits, where)
-                streams[d].temporal = steps.astype(np.float64) * 2.0 ** -(head.bits - 1)
+                streams[d].temporal = temporal_basis(steps, head.bits)
         return streams, bodies
 
     def _required(self, kind: int, level: int, segment: int) -> bytes:

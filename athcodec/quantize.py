@@ -77,11 +77,6 @@ def learn_temporal_basis(rows: np.ndarray, tolerance: float) -> np.ndarray | Non
     return np.rint(basis * 2.0 ** (TEMPORAL_BITS - 1)).astype(np.int32)
 
 
-def temporal_basis(steps: np.ndarray, bits: int = TEMPORAL_BITS) -> np.ndarray:
-    """The rows that stored integers mean, float64."""
-    return steps.astype(np.float64) * 2.0 ** -(bits - 1)
-
-
 LONGEST_LAG = 40
 
 

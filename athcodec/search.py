@@ -33,6 +33,7 @@ class Search:
         relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
         step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
         self.levels = ath.height + 2
+        self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self.sample = source.positions(len(source.segments) // 2)
         self.start = Settings(
             bound=bound, limit=qz.error_limit(bound, source.seen.diagonal), step=qz.single(step),
@@ -77,6 +78,12 @@ class Search:
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, bytes per level in the sample) at these settings."""
+        varied = (settings.step, settings.rest_step, settings.omega, settings.learned, settings.sheet.tobytes())
+        if varied not in self._known:
+            self._known[varied] = self._try(settings)
+        return self._known[varied]
+
+    def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
         shape = Shape(self.source, self.ath, settings)
         try:
             coded = code_stems(shape, settings, self.sample)
@@ -93,8 +100,7 @@ class Search:
 
     def _share(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
         """Fractions of the corrections that fall on the pieces of each level."""
-        level_of_vertex = np.repeat(np.where(plan.pieces["low_level"] >= 0, plan.pieces["low_level"],
-                                             plan.pieces["level"]), plan.pieces["count"])
+        level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
         counts = np.bincount(level_of_vertex[corrections[:, 0]], minlength=self.levels)
         return counts / counts.sum()
 

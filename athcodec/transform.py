@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec._native import BRANCH, NODE, PIECE, PIECE_VERTICES, Motion, Shape, Stream, address, lib
+from athcodec._native import BRANCH, NODE, PIECE, PIECE_VERTICES, SEGMENT_FRAMES, Motion, Shape, Stream, address, lib
 
-MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128
+MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 256 << 20
 
 
@@ -30,7 +30,11 @@ def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEG
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
     while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
         limit -= 1
-    count = -(-frame_count // limit)
+    return balanced_segments(frame_count, -(-frame_count // limit))
+
+
+def balanced_segments(frame_count: int, count: int) -> list[tuple[int, int]]:
+    """`count` runs (start, stop) of frames, as long as each other but for one frame."""
     return [(frame_count * i // count, frame_count * (i + 1) // count) for i in range(count)]
 
 
@@ -39,6 +43,11 @@ def cosine_basis(frames: int) -> np.ndarray:
     basis = np.empty((frames, frames))
     lib.ath_cosine_basis(frames, basis.ctypes.data)
     return basis
+
+
+def temporal_basis(steps: np.ndarray, bits: int) -> np.ndarray:
+    """The rows over time that stored integers of `bits` bits mean, (rank, frames) float64."""
+    return steps.astype(np.float64) * 2.0 ** -(bits - 1)
 
 
 class Plan:
@@ -84,6 +93,11 @@ class Plan:
         lib.ath_basis_fill(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, self.bases.ctypes.data)
         self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
         lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
+
+    @property
+    def base_level(self) -> np.ndarray:
+        """Per piece the level whose stream holds its tracks and first modes, (P,)."""
+        return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
 
     def has_stems(self, level: int) -> bool:
         """Whether the level has a coefficient stream."""

@@ -193,11 +193,9 @@ static void analyse_piece(const ath_shape *shape, const ath_motion *motion, int3
     }
     subtract_rest(shape, T, piece, local);
     project(shape, T, piece, local, scratch->rows);
-    for (int32_t m = 0; m < piece->rank; m++) {
-        const ath_stream *stream = m < piece->low_modes ? base : motion->streams + piece->level;
-        code_track(stream, T, ath_mode_step(motion, piece, m), dead_zone, scratch->rows + (size_t)m * 3 * (size_t)T,
-                   ath_coefficients_of(motion, piece->first + m));
-    }
+    for (int32_t m = 0; m < piece->rank; m++)
+        code_track(ath_mode_stream(motion, piece, m), T, ath_mode_step(motion, piece, m), dead_zone,
+                   scratch->rows + (size_t)m * 3 * (size_t)T, ath_coefficients_of(motion, piece->first + m));
     ath_place(shape, motion, piece, scratch);
     ath_carry(shape, motion, piece, scratch);
 }

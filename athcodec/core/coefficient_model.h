@@ -97,11 +97,11 @@ static void remember_row(coefficient_model *model, int32_t slot, int32_t frames,
  * or null; `slot` names the row in the history. When decoding, `row` is zero on entry. Returns how many frequencies
  * are coded. */
 static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t frames, int32_t rank, int32_t slot,
-                        const int32_t *above, int32_t above_count, int encoding, int32_t *row)
+                        const int32_t *above, int32_t above_count, int32_t *row)
 {
     const uint32_t *history = model->history[slot];
     int32_t count = code_count(coder, model, model->history_count[slot], above_count, rank,
-                               encoding ? used_frequencies(row, frames) : 0);
+                               ENCODING ? used_frequencies(row, frames) : 0);
     for (int32_t k = 0; k < count; k++) {
         uint32_t before = 0, over = 0, beside = 0;
         for (int32_t axis = 0; axis < 3; axis++) {

@@ -142,26 +142,37 @@ void ath_move_point(int32_t T, const double *track, double *point)
     for (int32_t i = 0; i < 3 * T; i++) point[i] = point[i] + track[i];
 }
 
+/* The rotation (row-major) of the quaternion normalize(1, x, y, z) squared. */
+ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
+{
+    double n2 = x * x + y * y + z * z, scale = 1.0 / (1.0 + n2);
+    double w = (1.0 - n2) * scale;
+    x = 2.0 * x * scale;
+    y = 2.0 * y * scale;
+    z = 2.0 * z * scale;
+    q[0] = 1.0 - 2.0 * (y * y + z * z);
+    q[1] = 2.0 * (x * y - w * z);
+    q[2] = 2.0 * (x * z + w * y);
+    q[3] = 2.0 * (x * y + w * z);
+    q[4] = 1.0 - 2.0 * (x * x + z * z);
+    q[5] = 2.0 * (y * z - w * x);
+    q[6] = 2.0 * (x * z - w * y);
+    q[7] = 2.0 * (y * z + w * x);
+    q[8] = 1.0 - 2.0 * (x * x + y * y);
+}
+
 /* R := R Q(omega), Q being the rotation of the quaternion normalize(1, omega / 4) squared. */
 ATH_HOT void ath_turn(int32_t T, const double *omega, double *restrict R)
 {
     for (int32_t t = 0; t < T; t++) {
-        double x = 0.25 * omega[t], y = 0.25 * omega[T + t], z = 0.25 * omega[2 * T + t];
-        double n2 = x * x + y * y + z * z;
-        double scale = 1.0 / (1.0 + n2);
-        double w = (1.0 - n2) * scale;
-        x = 2.0 * x * scale;
-        y = 2.0 * y * scale;
-        z = 2.0 * z * scale;
-        double q0 = 1.0 - 2.0 * (y * y + z * z), q1 = 2.0 * (x * y - w * z), q2 = 2.0 * (x * z + w * y);
-        double q3 = 2.0 * (x * y + w * z), q4 = 1.0 - 2.0 * (x * x + z * z), q5 = 2.0 * (y * z - w * x);
-        double q6 = 2.0 * (x * z - w * y), q7 = 2.0 * (y * z + w * x), q8 = 1.0 - 2.0 * (x * x + y * y);
+        double q[9];
+        rational_rotation(0.25 * omega[t], 0.25 * omega[T + t], 0.25 * omega[2 * T + t], q);
         for (int32_t i = 0; i < 3; i++) {
             double *r = R + 3 * i * T;
             double r0 = r[t], r1 = r[T + t], r2 = r[2 * T + t];
-            r[t] = r0 * q0 + r1 * q3 + r2 * q6;
-            r[T + t] = r0 * q1 + r1 * q4 + r2 * q7;
-            r[2 * T + t] = r0 * q2 + r1 * q5 + r2 * q8;
+            r[t] = r0 * q[0] + r1 * q[3] + r2 * q[6];
+            r[T + t] = r0 * q[1] + r1 * q[4] + r2 * q[7];
+            r[2 * T + t] = r0 * q[2] + r1 * q[5] + r2 * q[8];
         }
     }
 }
@@ -238,14 +249,8 @@ void ath_turn_towards(const double H[9], double size2, double R[9])
         y = wy * scale;
         z = wz * scale;
     }
-    double n2 = x * x + y * y + z * z, unit = 1.0 / (1.0 + n2);
-    double w = (1.0 - n2) * unit;
-    x = 2.0 * x * unit;
-    y = 2.0 * y * unit;
-    z = 2.0 * z * unit;
-    double q[9] = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-                   2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-                   2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)};
+    double q[9];
+    rational_rotation(x, y, z, q);
     for (int32_t k = 0; k < 3; k++) {
         double r0 = R[k], r1 = R[3 + k], r2 = R[6 + k];
         for (int32_t i = 0; i < 3; i++) R[3 * i + k] = q[3 * i] * r0 + q[3 * i + 1] * r1 + q[3 * i + 2] * r2;
@@ -317,13 +322,12 @@ static void inverse_track(const ath_stream *stream, int32_t T, double step, cons
         ath_inverse_temporal(stream, T, step, quantised + axis * T, track + axis * T);
 }
 
-void ath_reconstruct_modes(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
+static void reconstruct_modes(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
 {
     const ath_piece *piece = shape->pieces + p;
     for (int32_t m = 0; m < piece->rank; m++) {
-        const ath_stream *stream = m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->level;
-        inverse_track(stream, motion->frames, ath_mode_step(motion, piece, m), ath_coefficients_of(motion, piece->first + m),
-                      scratch->rows + (size_t)m * 3 * (size_t)motion->frames);
+        inverse_track(ath_mode_stream(motion, piece, m), motion->frames, ath_mode_step(motion, piece, m),
+                      ath_coefficients_of(motion, piece->first + m), scratch->rows + (size_t)m * 3 * (size_t)motion->frames);
     }
 }
 
@@ -475,7 +479,7 @@ static void pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t
 {
     const ath_piece *piece = shape->pieces + p;
     turned_attach(shape, motion, p, scratch);
-    ath_reconstruct_modes(shape, motion, p, scratch);
+    reconstruct_modes(shape, motion, p, scratch);
     ath_place(shape, motion, piece, scratch);
     ath_carry(shape, motion, piece, scratch);
 }

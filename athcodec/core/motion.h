@@ -31,7 +31,6 @@ int32_t *ath_node_track(const ath_motion *motion, int32_t n, int32_t row);
 double ath_node_step(const ath_motion *motion, int32_t n);
 ath_stream ath_node_stream(const ath_motion *motion, double step);
 void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch);
-void ath_reconstruct_modes(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch);
 
 ATH_INLINE const double *ath_rest_of(const ath_shape *shape, int32_t vertex)
 {
@@ -50,12 +49,18 @@ ATH_INLINE const ath_stream *ath_base_stream(const ath_motion *motion, const ath
     return motion->streams + (piece->low_level >= 0 ? piece->low_level : piece->level);
 }
 
+/* The stream that holds a piece's mode. */
+ATH_INLINE const ath_stream *ath_mode_stream(const ath_motion *motion, const ath_piece *piece, int32_t m)
+{
+    return m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->level;
+}
+
 /* Modes of a cantilever are quantised finer the more of the motion they carry: what the first ones get wrong, the
  * pieces that hang on this one would have to code again. */
 ATH_INLINE double ath_mode_step(const ath_motion *motion, const ath_piece *piece, int32_t m)
 {
     static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
-    double step = m < piece->low_modes ? ath_base_stream(motion, piece)->step : motion->streams[piece->level].step;
+    double step = ath_mode_stream(motion, piece, m)->step;
     return piece->flags & ATH_SHEET ? step : step * (m < 4 ? weight[m] : 1.125);
 }
 

@@ -45,6 +45,8 @@ ATH_INLINE void context_init(ath_context *context, uint32_t one)
 
 #ifdef ATH_ENCODING
 
+enum { ENCODING = 1 };
+
 typedef struct {
     uint64_t low, range;
     uint8_t *bytes;
@@ -128,6 +130,8 @@ static int64_t coder_finish(ath_coder *coder)
 }
 
 #else
+
+enum { ENCODING = 0 };
 
 typedef struct {
     uint64_t code, range;

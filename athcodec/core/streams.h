@@ -1,4 +1,4 @@
-/* What each stream of FORMAT.md holds, in which order. Compiled once for each direction: `encoding` is a constant, and
+/* What each stream of FORMAT.md holds, in which order. Compiled once for each direction, which ENCODING tells;
  * a value handed to a coding function is ignored when decoding. Functions return 0 when what they decoded is not
  * valid. */
 #ifndef ATH_STREAMS_H
@@ -6,12 +6,6 @@
 
 #include "coefficient_model.h"
 #include "motion.h"
-
-#ifdef ATH_ENCODING
-enum { ENCODING = 1 };
-#else
-enum { ENCODING = 0 };
-#endif
 
 /* ---- hierarchy ---- */
 
@@ -255,9 +249,9 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_sha
     int32_t from = 0, to = 0, above_count = 0, frames = motion->frames, rank = rank_of(motion, level);
     if (level == (piece->low_level >= 0 ? piece->low_level : piece->level)) {
         if (ath_has_shift(piece))
-            code_row(coder, model, frames, rank, SHIFT_SLOT, 0, 0, ENCODING, ath_shift_track(motion, p));
+            code_row(coder, model, frames, rank, SHIFT_SLOT, 0, 0, ath_shift_track(motion, p));
         if (ath_omega_step(shape, piece, motion->streams + level) > 0.0)
-            code_row(coder, model, frames, rank, OMEGA_SLOT, 0, 0, ENCODING, ath_omega_track(motion, p));
+            code_row(coder, model, frames, rank, OMEGA_SLOT, 0, 0, ath_omega_track(motion, p));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
     if (piece->level == level) {
@@ -267,7 +261,7 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_sha
     const int32_t *above = 0;
     for (int32_t m = from; m < to; m++) {
         int32_t *row = ath_coefficients_of(motion, piece->first + m);
-        above_count = code_row(coder, model, frames, rank, m, above, above_count, ENCODING, row);
+        above_count = code_row(coder, model, frames, rank, m, above, above_count, row);
         above = row;
     }
 }
@@ -302,11 +296,11 @@ static int code_affines(ath_coder *coder, affine_model *model, const ath_shape *
         const int32_t *above = 0;
         for (int32_t r = 0; r < node->rank; r++) {
             int32_t *row = ath_node_track(motion, n, r);
-            above_count = code_row(coder, &model->rows, motion->frames, motion->frames, r, above, above_count, ENCODING, row);
+            above_count = code_row(coder, &model->rows, motion->frames, motion->frames, r, above, above_count, row);
             above = row;
         }
         if (ath_has_shift(shape->pieces + node->piece))
-            code_row(coder, &model->rows, motion->frames, motion->frames, SHIFT_SLOT, 0, 0, ENCODING,
+            code_row(coder, &model->rows, motion->frames, motion->frames, SHIFT_SLOT, 0, 0,
                      ath_node_track(motion, n, 3));
     }
     return !model->rows.invalid;
