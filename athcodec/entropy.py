@@ -45,6 +45,33 @@ def decode_rest(data, branches: np.ndarray, vertex_count: int, step: float) -> n
     return rest
 
 
+def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
+    """The stream of a rest pose that comes back bit for bit: (N, 3) float32 or float64, origin included."""
+    numbers = pose.astype(np.float64, order="C")
+    return encode_stream("ath_encode_exact_rest", 1024 + 10 * pose.size, address(branches, BRANCH, 1), len(branches),
+                         pose.dtype == np.float64, address(numbers, np.float64, pose.size))
+
+
+def decode_exact_rest(data, branches: np.ndarray, vertex_count: int, dtype: np.dtype) -> np.ndarray:
+    """(N, 3) of `dtype`, finite, origin included. Raises BadChunk."""
+    numbers = np.zeros((vertex_count, 3))
+    decode_stream("ath_decode_exact_rest", data, "exact rest pose", address(branches, BRANCH, 1), len(branches),
+                  dtype == np.float64, numbers.ctypes.data)
+    return numbers.astype(dtype)
+
+
+def encode_times(time: np.ndarray) -> bytes:
+    """The stream of times in seconds, (T,) float64, bit for bit."""
+    return encode_stream("ath_encode_times", 1024 + 10 * time.size, time.size, address(time, np.float64, time.size))
+
+
+def decode_times(data, frame_count: int) -> np.ndarray:
+    """(T,) float64, finite. Raises BadChunk."""
+    time = np.zeros(frame_count)
+    decode_stream("ath_decode_times", data, "times", frame_count, time.ctypes.data)
+    return time
+
+
 def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
     """A learned temporal basis as stored integers of `bits` bits, (rank, frames) int32."""
     rank, frames = steps.shape

@@ -148,6 +148,11 @@ ATH_API int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size,
                                  int32_t *vertex_source);
 ATH_API int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                             int32_t branch_count, double step, double *rest);
+/* An exact rest pose: positions as stored, the origin not taken off, floats or (wide) doubles. All are finite. */
+ATH_API int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                                  int32_t branch_count, int wide, double *rest);
+/* Times of all frames, finite; whether they increase is for the caller to see. */
+ATH_API int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
 /* rank x frames integers of a learned temporal basis; `limit` stands for 1. */
 ATH_API int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames,
                                 int32_t limit, int32_t *basis);
@@ -208,6 +213,10 @@ ATH_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacit
                                      const int32_t *vertex_source);
 ATH_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                 int32_t branch_count, double step, const double *source, double *rest);
+ATH_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                      int32_t branch_count, int wide, const double *rest);
+ATH_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
+                                 const double *times);
 ATH_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                     int32_t limit, const int32_t *basis);
 ATH_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,

@@ -5,6 +5,7 @@ size_t ath_model_size(void)
 {
     size_t size = sizeof(affine_model);
     if (size < sizeof(hierarchy_model)) size = sizeof(hierarchy_model);
+    if (size < sizeof(exact_model)) size = sizeof(exact_model);
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
     return size;
 }
@@ -56,6 +57,21 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
     coder_start(&coder, bytes, size);
     code_rest(&coder, model, branches, branch_count, step, 0, rest);
     return finished(&coder, 1);
+}
+
+int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                          int32_t branch_count, int wide, double *rest)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, wide, rest));
+}
+
+int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_times(&coder, (exact_model *)model, frame_count, times));
 }
 
 int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,

@@ -26,6 +26,21 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
     return coder_finish(&coder);
 }
 
+int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                              int32_t branch_count, int wide, const double *rest)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, capacity);
+    return written(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, wide, (double *)rest));
+}
+
+int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count, const double *times)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, capacity);
+    return written(&coder, code_times(&coder, (exact_model *)model, frame_count, (double *)times));
+}
+
 int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                             int32_t limit, const int32_t *basis)
 {

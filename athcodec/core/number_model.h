@@ -50,6 +50,20 @@ static void number_model_init(number_model *model)
         for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
+/* A number of `length` bits, 1 or more, from the bits below its leading one; the first two are modelled. */
+ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int32_t length, uint64_t value)
+{
+    uint64_t built = 1;
+    for (int32_t bit = length - 2; bit >= 0; bit--) {
+        int given = (int)(value >> bit & 1);
+        int32_t taken = length - 2 - bit;
+        int coded = taken < 2 ? coder_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given)
+                              : coder_raw_bit(coder, given);
+        built = built << 1 | (uint64_t)coded;
+    }
+    return built;
+}
+
 /* One number below 2^30 under an expected magnitude in 1/16. */
 ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
 {
@@ -57,15 +71,7 @@ ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_
     int32_t length = bit_length(value), coded = 0;
     while (coded < NUMBER_BINS && coder_bit(coder, &size[coded], coded < length)) coded++;
     if (coded == 0) return 0;
-    uint32_t built = 1;
-    for (int32_t bit = coded - 2; bit >= 0; bit--) {
-        int given = (int)(value >> bit & 1);
-        int32_t taken = coded - 2 - bit; /* bits of the mantissa so far: the first two are modelled */
-        int coded_bit = taken < 2 ? coder_bit(coder, &model->mantissa[coded - 1][taken ? 1 + (built & 1) : 0], given)
-                                  : coder_raw_bit(coder, given);
-        built = built << 1 | (uint32_t)coded_bit;
-    }
-    return built;
+    return (uint32_t)code_mantissa(coder, model->mantissa[coded - 1], coded, value);
 }
 
 ATH_INLINE int32_t code_signed(ath_coder *coder, number_model *model, uint32_t expected, int32_t value)
