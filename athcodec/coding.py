@@ -99,7 +99,7 @@ class Shape:
         head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
         if source.exact_rest:
             pose = source.clip.rest[source.hierarchy.vertex_source].astype(source.clip.rest_dtype)
-            head.exact = pose
+            head.exact, head.stream = True, entropy.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
         else:
             head.stream, decoded = entropy.encode_rest(branches, settings.rest_step, source.rest)

@@ -36,7 +36,7 @@ from athcodec.errors import (
 )
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 1
+MAJOR, MINOR = 0, 2
 NO_LEVEL = 255
 OPTIONAL = 0x8000
 
@@ -400,38 +400,30 @@ def parse_hierarchy(data: bytes) -> tuple[tuple[float, int, float, int], bytes]:
 
 @dataclass
 class Rest:
-    """Head of REST: `exact` holds the pose itself (N, 3) in file order, else `stream` and `step` do."""
+    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps."""
 
     origin: np.ndarray
     step: float
     source_dtype: np.dtype
     stream: bytes = b""
-    exact: np.ndarray | None = None
+    exact: bool = False
 
 
 def pack_rest(rest: Rest) -> bytes:
-    exact = rest.exact is not None
-    body = _compress(rest.exact) if exact else rest.stream
-    return _REST.pack(int(exact), int(rest.source_dtype == np.float64), 0, *rest.origin, rest.step) + body
+    wide = rest.source_dtype == np.float64
+    return _REST.pack(int(rest.exact), int(wide), 0, *rest.origin, rest.step) + rest.stream
 
 
-def parse_rest(data: bytes, vertex_count: int, limits: Limits) -> Rest:
+def parse_rest(data: bytes) -> Rest:
     exact, wide, reserved, x, y, z, step = _head(_REST, data, "REST")
     if exact > 1 or wide > 1 or reserved or not all(map(math.isfinite, (x, y, z))):
         raise BadChunk(f"REST: got method {exact}, type {wide}, origin {(x, y, z)}; expected 0 or 1, finite")
-    dtype, body = np.dtype("<f8" if wide else "<f4"), data[_REST.size:]
-    rest = Rest(np.array([x, y, z]), _positive(step, "REST step"), dtype)
-    if not exact:
-        rest.stream = body
-        return rest
-    rest.exact = _decompress(body, dtype, (vertex_count, 3), "REST", limits)
-    if not np.isfinite(rest.exact).all():
-        raise BadChunk("REST: got a coordinate that is not finite")
-    return rest
+    dtype = np.dtype("<f8" if wide else "<f4")
+    return Rest(np.array([x, y, z]), _positive(step, "REST step"), dtype, data[_REST.size:], bool(exact))
 
 
-def pack_time(time: np.ndarray) -> bytes:
-    """Times in seconds, (T,) float64, exactly: by a rule where one gives the very same numbers."""
+def pack_steady_time(time: np.ndarray) -> bytes | None:
+    """TIME by the rule that gives the very same times in seconds, (T,) float64; None where no rule does."""
     index, first = np.arange(len(time)), float(time[0])
     if len(time) == 1:
         return _TIME_UNIFORM.pack(0, first, 1.0)
@@ -444,24 +436,25 @@ def pack_time(time: np.ndarray) -> bytes:
             for rate in {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}:
                 if (first + index / rate == time).all():
                     return _TIME_UNIFORM.pack(1, first, rate)
-    return _TIME.pack(2) + _compress(np.asarray(time, "<f8"))
+    return None
 
 
-def parse_time(data: bytes, frame_count: int, limits: Limits) -> np.ndarray:
+def pack_time(stream: bytes) -> bytes:
+    return _TIME.pack(2) + stream
+
+
+def parse_time(data: bytes, frame_count: int) -> tuple[np.ndarray | None, bytes]:
+    """(times by a rule, (T,) float64, b""), not yet checked, or (None, stream)."""
     (method,) = _head(_TIME, data, "TIME")
     if method == 2:
-        time = _decompress(data[_TIME.size:], np.dtype("<f8"), (frame_count,), "TIME", limits)
-    elif method < 2 and len(data) == _TIME_UNIFORM.size:
-        _, first, step = _TIME_UNIFORM.unpack(data)
-        _positive(step, "TIME step")
-        index = np.arange(frame_count)
-        with np.errstate(over="ignore", invalid="ignore"):
-            time = first + index * step if method == 0 else first + index / step
-    else:
+        return None, data[_TIME.size:]
+    if method > 2 or len(data) != _TIME_UNIFORM.size:
         raise BadChunk(f"TIME: got method {method}, {len(data)} bytes; expected 0 to 2")
-    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-        raise BadChunk("TIME: got times that are not finite and increasing")
-    return time.astype(np.float64)
+    _, first, step = _TIME_UNIFORM.unpack(data)
+    _positive(step, "TIME step")
+    index = np.arange(frame_count)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return (first + index * step if method == 0 else first + index / step), b""
 
 
 @dataclass

@@ -79,6 +79,16 @@ def open(path, *, strict: bool = False, allow_partial: bool = False, limits: Lim
     return Decoder(path, strict=strict, allow_partial=allow_partial, limits=limits)
 
 
+def read_time(data: bytes, frame_count: int) -> np.ndarray:
+    """Times in seconds from the content of TIME, (T,) float64. Raises BadChunk."""
+    time, stream = ct.parse_time(data, frame_count)
+    if time is None:
+        time = entropy.decode_times(stream, frame_count)
+    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise BadChunk("TIME: got times that are not finite and increasing")
+    return time
+
+
 class Decoder:
     """An opened .ath file; a context manager. Positions come in the source's vertex order unless said otherwise."""
 
@@ -111,7 +121,7 @@ class Decoder:
                                               self._vertex_source, branch_source)
         self._check_motion_chunks()
         self._read_rest()
-        self.time = ct.parse_time(self.container.required(ct.TIME), header.frame_count, limits)
+        self.time = read_time(self.container.required(ct.TIME), header.frame_count)
         self._damaged_from = self._first_damaged_level() if allow_partial else header.level_count
 
     def _check_memory(self, header: ct.Header) -> None:
@@ -138,10 +148,12 @@ class Decoder:
                                     f"expected one of each segment")
 
     def _read_rest(self) -> None:
-        rest = ct.parse_rest(self.container.required(ct.REST), self.vertex_count, self.limits)
-        self._rest_head, self.origin = rest, rest.origin
-        if rest.exact is not None:
-            local = rest.exact.astype(np.float64) - rest.origin
+        rest = ct.parse_rest(self.container.required(ct.REST))
+        self.origin, self._rest_dtype, self._exact_rest = rest.origin, rest.source_dtype, None
+        if rest.exact:
+            self._exact_rest = entropy.decode_exact_rest(rest.stream, self.plan.branches, self.vertex_count,
+                                                         rest.source_dtype)
+            local = self._exact_rest.astype(np.float64) - rest.origin
         else:
             local = entropy.decode_rest(rest.stream, self.plan.branches, self.vertex_count, rest.step)
         if not np.isfinite(local).all():
@@ -300,9 +312,8 @@ class Decoder:
     @property
     def rest(self) -> np.ndarray:
         """Rest pose as decoded, (N, 3), float32 or what the source had."""
-        head = self._rest_head
-        pose = self.plan.rest + self.origin if head.exact is None else head.exact
-        out = np.empty((self.vertex_count, 3), head.source_dtype.newbyteorder("="))
+        pose = self.plan.rest + self.origin if self._exact_rest is None else self._exact_rest
+        out = np.empty((self.vertex_count, 3), self._rest_dtype.newbyteorder("="))
         out[self._vertex_source] = pose
         return out
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from athcodec import container as ct
+from athcodec import entropy
 from athcodec import quantize as qz
 from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
@@ -125,6 +126,12 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
+def time_chunk(time: np.ndarray) -> bytes:
+    """Content of TIME for times in seconds, (T,), exactly: by a rule where one gives the very same numbers."""
+    steady = ct.pack_steady_time(time)
+    return steady or ct.pack_time(entropy.encode_times(np.ascontiguousarray(time, np.float64)))
+
+
 def _relative_bound(fraction: float, job: _Job) -> float:
     """A fraction of the diagonal; where nothing moves nor has any extent, of that with the rest pose."""
     if job.seen.diagonal > 0:
@@ -185,7 +192,7 @@ class _Job:
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
                                                   shape.hierarchy_stream))
         store.add(ct.REST, ct.pack_rest(shape.rest_chunk))
-        store.add(ct.TIME, ct.pack_time(self.clip.time))
+        store.add(ct.TIME, time_chunk(self.clip.time))
         metadata = self.clip.metadata if self.keep_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
         if metadata:

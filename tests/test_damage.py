@@ -19,7 +19,7 @@ import zstandard
 
 import athcodec
 from athcodec import container as ct
-from athcodec import errors
+from athcodec import entropy, errors
 from athcodec._native import crc32c
 from athcodec.container import Limits
 from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, FormatError, LevelUnavailable,
@@ -203,7 +203,8 @@ def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
 
 
 @pytest.mark.parametrize("field, value, error", [
-    ("major", 1, UnsupportedVersion), ("major", 65535, UnsupportedVersion), ("minor", 65535, UnsupportedVersion),
+    ("major", 1, UnsupportedVersion), ("major", 65535, UnsupportedVersion), ("minor", 1, UnsupportedVersion),
+    ("minor", 65535, UnsupportedVersion),
     ("file_length", 0, BadChunkTable), ("file_length", 1, BadChunkTable), ("file_length", 2**64 - 1, BadChunkTable),
     ("chunk_count", 0, BadHeader), ("chunk_count", 1, FormatError), ("chunk_count", 2**32 - 1, LimitExceeded),
     ("vertex_count", 0, BadHeader), ("vertex_count", 1, BadHeader), ("vertex_count", 2**32 - 1, LimitExceeded),
@@ -386,6 +387,15 @@ def doubles(*values: float) -> bytes:
     return struct.pack(f"<{len(values)}d", *values)
 
 
+# Exact numbers (FORMAT.md) of which the first is infinite, and one that is the lowest of all
+INFINITE_FLOAT, INFINITE_DOUBLE = bytes.fromhex("0f347680f4"), bytes.fromhex("00e6eda64d5d1daeffe0")
+HUGE_DOUBLE = bytes.fromhex("00e6eda64d5d1daeffdc")
+
+
+def times(*values: float) -> bytes:
+    return ct.pack_time(entropy.encode_times(np.array(values, np.float64)))
+
+
 def zstd(data: bytes, **options) -> bytes:
     return zstandard.ZstdCompressor(**options).compress(data)
 
@@ -416,8 +426,9 @@ NESTED = "[" * 900 + "]" * 900
     (ct.REST, lambda p: p[:28] + doubles(0.0) + p[36:], BadChunk),
     (ct.REST, lambda p: p[:28] + doubles(-1.0) + p[36:], BadChunk),
     (ct.REST, lambda p: p[:28] + doubles(1e308) + p[36:], BadChunk),
-    (ct.REST, lambda p: b"\x01" + p[1:36] + zstd(bytes(4)), BadChunk),
-    (ct.REST, lambda p: b"\x01" + p[1:36] + zstd(b"\xff" * 144), BadChunk),
+    (ct.REST, lambda p: b"\x01\x00" + p[2:36] + INFINITE_FLOAT, BadChunk),
+    (ct.REST, lambda p: b"\x01\x01" + p[2:36] + INFINITE_DOUBLE, BadChunk),
+    (ct.REST, lambda p: b"\x01\x01" + p[2:4] + doubles(1e308) + p[12:36] + HUGE_DOUBLE, BadChunk),
     (ct.REST, lambda p: p[:30], BadChunk),
     (ct.REST, lambda p: p + b"\x07" * 12, BadChunk),
     (ct.TIME, lambda p: b"", BadChunk),
@@ -427,9 +438,12 @@ NESTED = "[" * 900 + "]" * 900
     (ct.TIME, lambda p: b"\x00" + doubles(1e30, 1.0), BadChunk),
     (ct.TIME, lambda p: b"\x01" + doubles(0, 1e-320), BadChunk),
     (ct.TIME, lambda p: b"\x00" + doubles(0, 1) + b"\x00", BadChunk),
-    (ct.TIME, lambda p: b"\x02" + zstd(doubles(*range(19), np.inf)), BadChunk),
-    (ct.TIME, lambda p: b"\x02" + zstd(bytes(160)), BadChunk),
-    (ct.TIME, lambda p: b"\x02" + zstd(doubles(*range(21))), BadChunk),
+    (ct.TIME, lambda p: b"\x02" + INFINITE_DOUBLE, BadChunk),
+    (ct.TIME, lambda p: times(*range(18), 30, 30), BadChunk),
+    (ct.TIME, lambda p: times(*range(18), 30, 29), BadChunk),
+    (ct.TIME, lambda p: times(*np.random.default_rng(1).random(200).cumsum()), BadChunk),
+    (ct.TIME, lambda p: p + b"\x00", BadChunk),
+    (ct.TIME, lambda p: p + b"\x01" * 12, BadChunk),
     (ct.STEMS, lambda p: floats(0.0) + p[4:], BadChunk),
     (ct.STEMS, lambda p: floats(np.inf) + p[4:], BadChunk),
     (ct.STEMS, lambda p: p[:4] + b"\x05" + p[5:], BadChunk),
@@ -504,6 +518,37 @@ def test_content_that_breaks_a_rule_is_refused(kind, spoil, error, parts):
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
 
 
+def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
+    """Cut short anywhere a stream is refused or means something else, with more behind it it is refused."""
+    assert decode(stream).tobytes() == whole.tobytes()
+    for size in range(len(stream)):
+        try:
+            assert decode(stream[:size]).tobytes() != whole.tobytes()
+        except BadChunk:
+            pass
+    for more in (b"\x00", b"\x01" * 12):
+        with pytest.raises(BadChunk):
+            decode(stream + more)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts):
+    decoder = opened(parts.file())
+    pose = np.random.default_rng(5).normal(size=(decoder.vertex_count, 3)).astype(dtype)
+
+    def decode(stream):
+        head = ct.Rest(decoder.origin, 1.0, pose.dtype, stream, exact=True)
+        return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
+
+    assert_whole_or_not_it(entropy.encode_exact_rest(decoder.plan.branches, pose), pose, decode)
+
+
+def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
+    uneven = np.random.default_rng(6).random(20).cumsum()
+    assert_whole_or_not_it(entropy.encode_times(uneven), uneven,
+                           lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time)
+
+
 @pytest.mark.parametrize("step", [1e-38, 1e38])
 def test_steps_at_the_ends_of_their_range_play(step, parts):
     """They give positions that are no plant, but numbers or infinities, in time."""
@@ -514,9 +559,9 @@ def test_steps_at_the_ends_of_their_range_play(step, parts):
 
 @pytest.mark.parametrize("size", [0, 1, 64, 4096])
 @pytest.mark.parametrize("byte", [b"\x00", b"\xff", b"\x55"])
-@pytest.mark.parametrize("name", ["HIERARCHY", "REST", "STEMS", "AFFINES", "CORRECTIONS"])
+@pytest.mark.parametrize("name", ["HIERARCHY", "REST", "TIME", "STEMS", "AFFINES", "CORRECTIONS"])
 def test_streams_of_one_byte_over_and_over_end(name, byte, size, parts):
-    head = {"HIERARCHY": 16, "REST": 36, "STEMS": 8, "AFFINES": 0, "CORRECTIONS": 4}[name]
+    head = {"HIERARCHY": 16, "REST": 36, "TIME": 1, "STEMS": 8, "AFFINES": 0, "CORRECTIONS": 4}[name]
     level = {"STEMS": 3, "AFFINES": 1, "CORRECTIONS": 3}.get(name)
     payload = parts.payload(KINDS[name], level)[:head] + byte * size
     sound = seconds_to_use(parts.chunks, parts)
@@ -585,7 +630,7 @@ def test_a_file_beyond_a_limit_is_refused_by_that_limit(limits, data):
 def test_limits_that_just_hold_the_file_accept_it(data, parts):
     longest = max(len(payload) for _, payload in parts.chunks)
     check(data, limits=Limits(chunks=len(parts.chunks), vertices=12, branches=5, frames=20, attributes=2,
-                              string_bytes=7, chunk_bytes=longest, decoded_chunk_bytes=160))
+                              string_bytes=7, chunk_bytes=longest, decoded_chunk_bytes=94))
 
 
 def test_small_chunks_that_unpack_to_much_are_refused_before_they_are_unpacked(parts):

@@ -11,6 +11,7 @@ import io
 import math
 import re
 import struct
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
@@ -61,12 +62,21 @@ def reader(code: str):
     return lambda data, at: struct.unpack_from(code, data, at)[0]
 
 
+FLOATS = {32: "<f", 64: "<d"}
+
+
+def single(x: float) -> float:
+    with np.errstate(over="ignore"):
+        return float(np.float32(x))
+
+
 @pytest.fixture(scope="module")
 def spec() -> SimpleNamespace:
     """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
     names = {"u8": reader("<B"), "u16": reader("<H"), "u32": reader("<I"), "f32": reader("<f"),
-             "f64": reader("<d"), "sqrt": math.sqrt, "single": lambda x: float(np.float32(x)),
-             "zstd": lambda data, size: zstandard.ZstdDecompressor().decompress(data, max_output_size=size)}
+             "f64": reader("<d"), "sqrt": math.sqrt, "single": single,
+             "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
+             "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0]}
     for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
         exec(block, names)
     return SimpleNamespace(**names)
@@ -78,6 +88,8 @@ def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
             expected = decoder.positions(depth=level)
             got = np.array(spec.decode(data, level), decoder.dtype)
             assert got.tobytes() == expected.tobytes(), f"level {level}"
+        times = spec.frame_times(spec.content(spec.parse_front(data)[1], container.TIME), decoder.frame_count)
+        assert np.array(times).tobytes() == decoder.time.tobytes()
 
 
 # ---- tables and dumps ----
@@ -193,7 +205,7 @@ def test_shuffle_of_the_document_restores_an_array(spec):
     array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
     data = container.pack_array(array, "numbers")
     (length,) = struct.unpack_from("<H", data)
-    assert spec.unshuffle(spec.zstd(data[2 + length:], array.nbytes), array.size, 4) == array.tobytes()
+    assert spec.unshuffle(zstandard.decompress(data[2 + length:]), array.size, 4) == array.tobytes()
 
 
 def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path):
@@ -202,7 +214,8 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
     assert_same_bits(spec, path.read_bytes())
 
 
-@pytest.mark.parametrize("seed, wide, exact", [(1, False, False), (2, True, False), (3, False, True)])
+@pytest.mark.parametrize("seed, wide, exact", [
+    (1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)])
 def test_pseudo_code_decodes_every_feature(spec, seed, wide, exact):
     assert_same_bits(spec, HandMade(seed, wide, exact).file())
 
@@ -227,10 +240,15 @@ def test_random_decisions_mean_the_same_to_the_document_and_the_code(spec, seed)
         assert outcome(spec, by_document, stream) == outcome(spec, by_code, stream)
 
 
-def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str, *arguments: int) -> bytes:
+def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str, *arguments: object) -> bytes:
     """What a function of the document reads as decisions made by chance, up to the first invalid one."""
-    made = []
     chance = random.uniform(0.15, 0.85)
+    return stream_of(spec, lambda: int(random.random() < chance), name, *arguments)
+
+
+def stream_of(spec: SimpleNamespace, decide: Callable[[], int], name: str, *arguments: object) -> bytes:
+    """What a function of the document reads as these decisions, up to the first invalid one."""
+    made = []
 
     class Deciding(spec.RangeDecoder):
         """Keeps the interval's lower end, as an encoder does, instead of reading."""
@@ -240,7 +258,7 @@ def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str,
             made.append(self)
 
         def narrow(self, bound):
-            bit = int(random.random() < chance)
+            bit = decide()
             self.low, self.range = (self.low, bound) if bit else (self.low + bound, self.range - bound)
             if self.range < 1 << 32:
                 self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
@@ -258,6 +276,111 @@ def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str,
     while last >> zeros + 1 << zeros + 1 >= made[0].low and zeros < 8 * made[0].length:
         zeros += 1
     return (last >> zeros << zeros).to_bytes(made[0].length, "big").rstrip(b"\0")
+
+
+# ---- exact numbers ----
+
+NUMBERS = {np.float32: 32, np.float64: 64}
+INFINITY = {32: 0xFF << 23, 64: 0x7FF << 52}
+
+
+def awkward_numbers(random: np.random.Generator, count: int, dtype: type) -> np.ndarray:
+    """Finite numbers of all magnitudes and both signs, zeros among them, and some close to the one before."""
+    limits = np.finfo(dtype)
+    pool = np.array([0, -0.0, 1, -1, limits.max, limits.min, limits.tiny, -limits.tiny,
+                     limits.smallest_subnormal], dtype)
+    bits = random.integers(0, 256, count * limits.bits // 8, np.uint8).view(dtype)
+    numbers = np.where(random.random(count) < 0.3, random.choice(pool, count), bits)
+    near = np.cumsum(random.normal(size=count)).astype(dtype)
+    return np.where(np.isfinite(numbers) & (random.random(count) < 0.5), numbers, near)
+
+
+def stems(spec: SimpleNamespace, branches: np.ndarray) -> list:
+    return [spec.Record(**{name: int(row[name]) for name in BRANCH.names}) for row in branches]
+
+
+@pytest.mark.parametrize("dtype", NUMBERS)
+@pytest.mark.parametrize("seed", range(5))
+def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed, dtype):
+    file = HandMade(seed, False, None)
+    pose = awkward_numbers(np.random.default_rng(seed), file.rest.size, dtype).reshape(-1, 3)
+    stream = entropy.encode_exact_rest(file.branches, pose)
+    assert entropy.decode_exact_rest(stream, file.branches, len(pose), pose.dtype).tobytes() == pose.tobytes()
+    got = spec.decode_exact_rest(stream, stems(spec, file.branches), dtype is np.float64)
+    assert np.array(got, dtype).tobytes() == pose.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_times_come_back_bit_for_bit_by_document_and_code(spec, seed):
+    random = np.random.default_rng(seed)
+    for times in awkward_numbers(random, 50, np.float64), np.logspace(-300, 300, 40 + seed):
+        stream = entropy.encode_times(times)
+        assert entropy.decode_times(stream, len(times)).tobytes() == times.tobytes()
+        assert np.array(spec.decode_times(stream, len(times))).tobytes() == times.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_the_code(spec, seed):
+    random = np.random.default_rng(seed)
+    file = HandMade(seed, False, None)
+    rows = stems(spec, file.branches)
+    assert_same_outcome(spec, random_stream(spec, random, "decode_times", 40),
+                        lambda stream: np.array(spec.decode_times(stream, 40)),
+                        lambda stream: entropy.decode_times(stream, 40))
+    for dtype, n in NUMBERS.items():
+        assert_same_outcome(
+            spec, random_stream(spec, random, "decode_exact_rest", rows, n == 64),
+            lambda stream: np.array(spec.decode_exact_rest(stream, rows, n == 64), dtype),
+            lambda stream: entropy.decode_exact_rest(stream, file.branches, file.vertex_count, dtype))
+
+
+def assert_same_outcome(spec: SimpleNamespace, stream: bytes, *decoders: Callable) -> None:
+    document, code = (outcome(spec, lambda data: decode(data).tobytes(), stream) for decode in decoders)
+    assert document == code
+
+
+def decisions(n: int, magnitude: int, negative: bool = False) -> list[int]:
+    """Those of one difference."""
+    length = magnitude.bit_length()
+    unary = [1] * length + [0] * (length < n)
+    return unary + [int(bit) for bit in f"{magnitude:b}"[1:]] + [int(negative)] * (length > 0)
+
+
+def exact_stream(spec: SimpleNamespace, n: int, *differences: tuple[int, bool]) -> bytes:
+    """An exact rest pose of one vertex, whose numbers are each 0.0 moved by a difference."""
+    made = iter(sum((decisions(n, *difference) for difference in differences), []))
+    return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64)
+
+
+def one_vertex(spec: SimpleNamespace) -> list:
+    return [spec.Record(first=0, count=1, attach=-1, lag=1)]
+
+
+@pytest.mark.parametrize("dtype, n", NUMBERS.items())
+@pytest.mark.parametrize("beyond, negative, valid", [
+    (-1, False, True), (0, False, False), (1, False, False),
+    (0, True, True), (1, True, False), (2, True, False)])
+def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, negative, valid):
+    """Downwards there is one number more: -0.0."""
+    stream = exact_stream(spec, n, (INFINITY[n] + beyond, negative))
+    branches = np.zeros(1, BRANCH)
+    branches["count"], branches["attach"] = 1, -1
+    number = float(np.finfo(dtype).min if negative else np.finfo(dtype).max)
+    for decode in (lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),
+                   lambda data: entropy.decode_exact_rest(data, branches, 1, dtype).tolist()):
+        assert outcome(spec, decode, stream) == ([[number, 0.0, 0.0]] if valid else "invalid")
+
+
+def test_differences_wrap_around(spec):
+    """From 1.0 half of all numbers away, by either sign, and by magnitudes that no encoder needs."""
+    half, one = 1 << 63, 0x3FF << 52  # less 0.0
+    opposite = math.nextafter(-4.0, 0.0)
+    for magnitude, negative, number in (
+            (half, False, opposite), (half, True, opposite), (half + 1, False, math.nextafter(opposite, 0.0)),
+            (half + 1, True, -4.0), (2 * half - 1, True, math.nextafter(1.0, 2.0))):
+        made = iter(decisions(64, one) + decisions(64, magnitude, negative))
+        stream = stream_of(spec, lambda: next(made), "decode_times", 2)
+        assert spec.decode_times(stream, 2) == entropy.decode_times(stream, 2).tolist() == [1.0, number]
 
 
 def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
@@ -281,14 +404,14 @@ def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None
 def test_a_branch_in_a_whole_subtree_may_not_be_whole(spec):
     whole = [(parent, count, flags | WHOLE if b == 6 else flags)
              for b, (parent, count, flags) in enumerate(HandMade.BRANCHES)]
-    assert_refused_alike(spec, HandMade(1, False, False, whole).file(), "BAD_CHUNK")
+    assert_refused_alike(spec, HandMade(1, False, None, whole).file(), "BAD_CHUNK")
 
 
 def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     file.bases = {1: (11, 3)}
     assert_same_bits(spec, file.file())
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     file.bases, file.excess = {1: (11, 3)}, 1
     assert_refused_alike(spec, file.file(), "BAD_CHUNK")
 
@@ -308,7 +431,7 @@ def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
 @pytest.mark.parametrize("kind, level", [(container.STEMS, 1), (container.STEMS, 4),
                                          (container.AFFINES, 0)])
 def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kind, level):
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     file.leave_out = (kind, level, 1)
     assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
 
@@ -316,13 +439,13 @@ def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kin
 @pytest.mark.parametrize("kind, level", [(container.AFFINES, -1), (container.CORRECTIONS, 0),
                                          (container.CORRECTIONS, -2)])
 def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec, kind, level):
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     file.store.add(kind, bytes(4), level % file.plan.level_count, 1)
     assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
 
 
 def test_unknown_optional_kinds_are_skipped(spec):
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     for kind, level in ((0x8000, 255), (0x800F, 255), (0x8013, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
         file.store.add(kind, b"from the future", level)
     assert_same_bits(spec, file.file())
@@ -333,7 +456,7 @@ def test_unknown_optional_kinds_are_skipped(spec):
     (0x0020, 255, "UNKNOWN_CHUNK"), (19, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
     (0x8021, 0, "BAD_CHUNK_TABLE"), (0x800F, 0, "BAD_CHUNK_TABLE")])
 def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
-    file = HandMade(1, False, False)
+    file = HandMade(1, False, None)
     file.store.add(kind, b"from the future", level)
     assert_refused_alike(spec, file.file(), error)
 
@@ -352,7 +475,7 @@ class HandMade:
                 (-1, 1, WHOLE), (12, 2, 0), (12, 3, LOOSE), (-1, 3, 0), (15, 4, LOOSE | WHOLE),
                 (16, 2, LOOSE))
 
-    def __init__(self, seed: int, wide: bool, exact: bool, parts=BRANCHES):
+    def __init__(self, seed: int, wide: bool, exact: type | None, parts=BRANCHES):
         self.random = np.random.default_rng(seed)
         self.wide, self.exact, self.parts = wide, exact, parts
         self.bases = {1: (11, 3), 2: (8, 1), 4: (16, 18)}  # Basis_Bits, Basis_Rank
@@ -395,15 +518,18 @@ class HandMade:
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
         self.store.add(container.HIERARCHY, container.pack_hierarchy(
             (0.5, 3, 0.25, 1), entropy.encode_hierarchy(self.branches, *permutations)))
-        head = container.Rest(self.origin, 0.01, np.dtype(np.float32))
+        head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
+        times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:
-            head.exact = (self.rest + self.origin).astype(np.float32)
-            self.plan.set_rest(head.exact.astype(np.float64) - self.origin)
+            pose = (self.rest + self.origin).astype(self.exact)
+            head.stream = entropy.encode_exact_rest(self.branches, pose)
+            self.plan.set_rest(pose.astype(np.float64) - self.origin)
+            times = container.pack_time(entropy.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
             head.stream, decoded = entropy.encode_rest(self.branches, 0.01, self.rest)
             self.plan.set_rest(decoded)
         self.store.add(container.REST, container.pack_rest(head))
-        self.store.add(container.TIME, container.pack_time(np.arange(self.FRAMES) / 24.0))
+        self.store.add(container.TIME, times)
 
     def _rows(self, *shape: int) -> np.ndarray:
         """Integers of all sizes, mostly small, with zeros at the high frequencies and whole rows of zeros."""
