@@ -1,18 +1,18 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/ath.h, the only declaration of the C API. Wrappers check dtypes, shapes and contiguity, so that no call can
-write outside an array; they release the GIL, and hold no state.
+Mirrors core/ath.h, the public API that players use (player.py), and core/encode.h, which encoding uses (transform.py,
+entropy.py). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an array; they release the
+GIL, and hold no state.
 """
 
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 
 from athcodec._library import load_library
-from athcodec.errors import BadChunk
 
 PIECE_VERTICES = 64
 SEGMENT_FRAMES = 256
@@ -20,9 +20,9 @@ SHEET, LOOSE, WHOLE = 1, 2, 4
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
 PIECE = np.dtype(
-    [("modes", "<i8"), ("basis", "<i8")]
-    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes "
-                                  "carrier carrier_index").split()]
+    [(name, "<i8") for name in ("modes", "basis", "carrier")]
+    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_carried "
+                                  "reserved").split()]
 )
 NODE = np.dtype(
     [("whitening", "<f8", (9,))]
@@ -33,9 +33,9 @@ NODE = np.dtype(
 class Shape(ctypes.Structure):
     """ath_shape."""
 
-    _fields_ = [(name, c_int32) for name in ("vertex_count branch_count piece_count node_count carrier_vertices "
-                                             "carrier_pieces height reserved").split()]
-    _fields_ += [(name, c_void_p) for name in "branches pieces nodes rest bases".split()]
+    _fields_ = [(name, c_int32) for name in ("vertex_count", "branch_count", "piece_count", "node_count")]
+    _fields_ += [("carrier_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
+    _fields_ += [(name, c_void_p) for name in ("branches", "pieces", "nodes", "rest", "bases")]
 
 
 class Stream(ctypes.Structure):
@@ -48,37 +48,61 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [("frames", c_int32), ("reserved", c_int32)]
-    _fields_ += [(name, c_void_p) for name in ("streams cosines coefficients tracks node_tracks node_steps carriers "
-                                               "carrier_frames work").split()]
+    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "carriers", "work")]
+    _fields_ += [("frames", c_int32), ("reserved", c_int32)]
 
 
-_SIGNATURES = {
+class Integers(ctypes.Structure):
+    """ath_integers."""
+
+    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps")]
+
+
+_PLAYING = {  # core/ath.h
+    "ath_result_name": (c_char_p, [c_int]),
+    "ath_front": (c_int, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p]),
+    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, c_void_p]),
+    "ath_build_size": (c_size_t, [c_void_p]),
+    "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
+    "ath_get_info": (None, [c_void_p, c_void_p]),
+    "ath_branches": (c_void_p, [c_void_p]),
+    "ath_vertex_source": (c_void_p, [c_void_p]),
+    "ath_branch_source": (c_void_p, [c_void_p]),
+    "ath_times": (c_void_p, [c_void_p]),
+    "ath_rest_wide": (None, [c_void_p, c_int, c_void_p, c_size_t]),
+    "ath_chunks": (c_void_p, [c_void_p]),
+    "ath_fault": (c_int32, [c_void_p]),
+    "ath_work_fault": (c_int32, [c_void_p]),
+    "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
+    "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
+    "ath_ranges": (c_int32, [c_void_p, c_int32, c_int32, c_int32, c_int, c_void_p, c_int32]),
+    "ath_cut_size": (None, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_cut": (None, [c_void_p, c_int32, c_void_p]),
+    "ath_work_size": (c_size_t, [c_void_p]),
+    "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
+    "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
+    "ath_positions": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
+    "ath_positions_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
+    "ath_matrices_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
+    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
+}
+_ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
-    "ath_plan": (None, [POINTER(Shape), c_void_p, c_void_p, c_void_p]),
+    "ath_plan": (None, [POINTER(Shape), c_void_p, c_void_p, c_void_p, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_basis_fill": (None, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_basis_fill": (None, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_plan_nodes": (None, [POINTER(Shape), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
+    "ath_motion_work": (c_size_t, [c_int32, c_int32]),
+    "ath_carrier_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),
-    "ath_decode_hierarchy": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_decode_rest": (c_int, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p]),
-    "ath_decode_exact_rest": (c_int, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
-    "ath_decode_times": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
-    "ath_decode_temporal": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
-    "ath_decode_stems": (c_int, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
-    "ath_decode_affines": (c_int, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
-    "ath_decode_corrections": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_double, c_int, c_void_p]),
-    "ath_motion_work": (c_size_t, [c_int32]),
-    "ath_pose": (None, [POINTER(Shape), POINTER(Motion), c_int32, c_void_p, c_int, c_void_p]),
-    "ath_node_matrices": (None, [POINTER(Shape), POINTER(Motion), c_int32, c_void_p, c_void_p]),
-    "ath_scatter": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_int32, c_int32, c_void_p]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int, c_void_p, c_void_p, c_void_p]),
-    "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
-    "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), c_void_p, c_void_p, c_double]),
+    "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_void_p, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_void_p, c_void_p, c_double]),
+    "ath_pose": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_void_p, c_int, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
         c_int64, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_double, c_double, c_void_p, c_int64]),
@@ -87,15 +111,17 @@ _SIGNATURES = {
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
-    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
-    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), c_int32]),
+    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
+                                   c_int32]),
+    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
+                                     c_int32]),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
 }
 
 
 def _bind() -> ctypes.CDLL:
     library = load_library()
-    for name, (result, arguments) in _SIGNATURES.items():
+    for name, (result, arguments) in (_PLAYING | _ENCODING).items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
     return library
@@ -144,10 +170,3 @@ def encode_stream(function_name: str, capacity: int, *arguments) -> bytes:
         if size < -1:
             raise ValueError(f"{function_name}: got integers that the stream cannot hold")
         capacity *= 4
-
-
-def decode_stream(function_name: str, data, where: str, *arguments) -> None:
-    """Runs one of the core's readers. Raises BadChunk, naming `where`, when the stream is not valid."""
-    model, array = new_model(), as_bytes(data)
-    if getattr(lib, function_name)(model.ctypes.data, array.ctypes.data, array.size, *arguments) != 0:
-        raise BadChunk(f"{where}: got a stream of {array.size} bytes that does not decode; expected a valid one")

@@ -265,6 +265,7 @@ class Container:
         if crc32c(blank + table) != self._checksum:
             raise BadChecksum(f"header and chunk table: got checksum {crc32c(blank + table):#010x}; "
                               f"expected {self._checksum:#010x}")
+        self._front = front + table
         errors = np.frombuffer(table, "<f4", offset=table_size).reshape(header.level_count, header.segment_count, 2)
         if not np.isfinite(errors).all() or (errors < 0).any():
             raise BadChunkTable("error table: got a value that is negative or not finite")
@@ -333,6 +334,14 @@ class Container:
             raise BadChecksum(f"{chunk}: got checksum {crc32c(data):#010x}; expected {chunk.checksum:#010x}")
         return data
 
+    def read(self, offset: int, length: int) -> bytes:
+        """Bytes of the file as they are. Raises Truncated."""
+        return self._read(offset, length, f"bytes from {offset} on")
+
+    def prelude(self) -> bytes:
+        """Everything in front of the first motion chunk. Raises Truncated."""
+        return self._front + self._read(len(self._front), self.prelude_length - len(self._front), "prelude")
+
     def required(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> bytes:
         """The bytes of a chunk that must be there. Raises BadChunkTable where the table has none."""
         chunk = self.find(kind, level, segment)
@@ -390,14 +399,6 @@ def pack_hierarchy(thresholds, stream: bytes) -> bytes:
     return _HIERARCHY.pack(min(epsilon, clip), min(xi, clip), int(eta), int(lam)) + stream
 
 
-def parse_hierarchy(data: bytes) -> tuple[tuple[float, int, float, int], bytes]:
-    """((epsilon, eta, xi, lam), stream)."""
-    epsilon, xi, eta, lam = _head(_HIERARCHY, data, "HIERARCHY")
-    if not (math.isfinite(epsilon) and math.isfinite(xi) and epsilon >= 0 and xi >= 0):
-        raise BadChunk(f"HIERARCHY: got thresholds {epsilon}, {xi}; expected finite numbers")
-    return (epsilon, eta, xi, lam), data[_HIERARCHY.size:]
-
-
 @dataclass
 class Rest:
     """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps."""
@@ -412,14 +413,6 @@ class Rest:
 def pack_rest(rest: Rest) -> bytes:
     wide = rest.source_dtype == np.float64
     return _REST.pack(int(rest.exact), int(wide), 0, *rest.origin, rest.step) + rest.stream
-
-
-def parse_rest(data: bytes) -> Rest:
-    exact, wide, reserved, x, y, z, step = _head(_REST, data, "REST")
-    if exact > 1 or wide > 1 or reserved or not all(map(math.isfinite, (x, y, z))):
-        raise BadChunk(f"REST: got method {exact}, type {wide}, origin {(x, y, z)}; expected 0 or 1, finite")
-    dtype = np.dtype("<f8" if wide else "<f4")
-    return Rest(np.array([x, y, z]), _positive(step, "REST step"), dtype, data[_REST.size:], bool(exact))
 
 
 def pack_steady_time(time: np.ndarray) -> bytes | None:
@@ -443,20 +436,6 @@ def pack_time(stream: bytes) -> bytes:
     return _TIME.pack(2) + stream
 
 
-def parse_time(data: bytes, frame_count: int) -> tuple[np.ndarray | None, bytes]:
-    """(times by a rule, (T,) float64, b""), not yet checked, or (None, stream)."""
-    (method,) = _head(_TIME, data, "TIME")
-    if method == 2:
-        return None, data[_TIME.size:]
-    if method > 2 or len(data) != _TIME_UNIFORM.size:
-        raise BadChunk(f"TIME: got method {method}, {len(data)} bytes; expected 0 to 2")
-    _, first, step = _TIME_UNIFORM.unpack(data)
-    _positive(step, "TIME step")
-    index = np.arange(frame_count)
-    with np.errstate(over="ignore", invalid="ignore"):
-        return (first + index * step if method == 0 else first + index / step), b""
-
-
 @dataclass
 class StemsHead:
     """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any."""
@@ -475,28 +454,8 @@ def pack_stems(head: StemsHead, stream: bytes) -> bytes:
     return data + stream
 
 
-def parse_stems(data: bytes, frames: int, where: str) -> tuple[StemsHead, bytes]:
-    step, omega, bits, rank = _head(_STEMS, data, where)
-    if omega > 4 or (bits != 0 and not 8 <= bits <= 16) or not (1 <= rank <= frames if bits else rank == 0):
-        raise BadChunk(f"{where}: got rotation {omega}, bits {bits}, rank {rank}; expected 0 to 4, 0 or 8 to 16, "
-                       f"1 to {frames}")
-    head, body = StemsHead(_positive(step, f"{where}: step"), 1 << omega >> 1, bits, rank), data[_STEMS.size:]
-    if bits:
-        (length,) = _head(_BASIS_LENGTH, body, where)
-        if length > len(body) - _BASIS_LENGTH.size:
-            raise BadChunk(f"{where}: got a basis of {length} bytes; expected at most what the chunk holds")
-        head.basis = body[_BASIS_LENGTH.size: _BASIS_LENGTH.size + length]
-        body = body[_BASIS_LENGTH.size + length:]
-    return head, body
-
-
 def pack_corrections(step: float, stream: bytes) -> bytes:
     return _CORRECTIONS.pack(step) + stream
-
-
-def parse_corrections(data: bytes, where: str) -> tuple[float, bytes]:
-    (step,) = _head(_CORRECTIONS, data, where)
-    return _positive(step, f"{where}: step"), data[_CORRECTIONS.size:]
 
 
 # ---- static data --------------------------------------------------------------------------------------------------

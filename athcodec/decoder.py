@@ -1,24 +1,26 @@
 """From an .ath file back to motion: any depth, any frames, any part that is there.
 
 `open` reads the prelude; a segment's chunks are read when one of its frames is asked for, and only those of the levels
-that the depth needs. The arithmetic is the C core's (transform.py); this module decides what to read and checks that
-streams fit the hierarchy. It never imports the encoder.
+that the depth needs. Decoding is the C core's (player.py); this module feeds it bytes, says in words what it refuses,
+and reads the static data. It never imports the encoder.
 """
 
 from __future__ import annotations
 
 import builtins
 import os
+import threading
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from athcodec import container as ct
-from athcodec import entropy
-from athcodec._native import WHOLE
+from athcodec import player
+from athcodec._native import WHOLE, as_bytes
 from athcodec.ath import stem_maps
 from athcodec.clip import check_stem_index
 from athcodec.container import Container, Limits
@@ -31,19 +33,13 @@ from athcodec.errors import (
     LevelUnavailable,
     LimitExceeded,
     Truncated,
+    error_class,
 )
 from athcodec.hierarchy import Hierarchy, derived_edges
-from athcodec.transform import (
-    LevelStream,
-    Plan,
-    SegmentMotion,
-    balanced_segments,
-    decoding_bytes,
-    scatter,
-    temporal_basis,
-)
+from athcodec.transform import balanced_segments
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
+SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
 TABLE_KEYS = ("epsilon", "eta", "xi", "lam")
 
 
@@ -79,16 +75,6 @@ def open(path, *, strict: bool = False, allow_partial: bool = False, limits: Lim
     return Decoder(path, strict=strict, allow_partial=allow_partial, limits=limits)
 
 
-def read_time(data: bytes, frame_count: int) -> np.ndarray:
-    """Times in seconds from the content of TIME, (T,) float64. Raises BadChunk."""
-    time, stream = ct.parse_time(data, frame_count)
-    if time is None:
-        time = entropy.decode_times(stream, frame_count)
-    if not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-        raise BadChunk("TIME: got times that are not finite and increasing")
-    return time
-
-
 class Decoder:
     """An opened .ath file; a context manager. Positions come in the source's vertex order unless said otherwise."""
 
@@ -104,61 +90,52 @@ class Decoder:
     def _open(self, strict: bool, allow_partial: bool, limits: Limits) -> None:
         self.limits = limits
         self.container = Container(self._file, strict=strict, limits=limits)
-        header = self.container.header
-        self._check_memory(header)
-        data = self.container.required(ct.HIERARCHY)
-        self.thresholds, stream = ct.parse_hierarchy(data)
-        branches, branch_source, self._vertex_source = entropy.decode_hierarchy(stream, header.branch_count,
-                                                                                header.vertex_count)
-        if branches["depth"].max() >= limits.hierarchy_depth:
-            raise LimitExceeded(f"HIERARCHY: got a depth of {branches['depth'].max() + 1}; the limit is "
-                                f"{limits.hierarchy_depth}")
-        self.plan = Plan(branches, header.vertex_count)
-        if self.plan.level_count != header.full_level_count:
-            raise BadHeader(f"header: got Full_Level_Count {header.full_level_count}; expected "
-                            f"{self.plan.level_count}, as the hierarchy has it")
+        self._read_prelude()
+        self.branches = branches = self._player.branches()  # in file order, _native.BRANCH
+        self._vertex_source = self._player.vertex_source()
         self.hierarchy = Hierarchy.from_parts(branches["parent"], branches["count"], branches["attach"],
-                                              self._vertex_source, branch_source)
-        self._check_motion_chunks()
-        self._read_rest()
-        self.time = read_time(self.container.required(ct.TIME), header.frame_count)
-        self._damaged_from = self._first_damaged_level() if allow_partial else header.level_count
+                                              self._vertex_source, self._player.branch_source())
+        self.time = self._player.times()
+        self._damaged_from = self._first_damaged_level() if allow_partial else self.container.header.level_count
+        self._lock = threading.Lock()
+        self._ready: dict[tuple[int, int], player.Segment] = {}  # the segment shown last, by (segment, depth)
 
-    def _check_memory(self, header: ct.Header) -> None:
+    def _read_prelude(self) -> None:
+        try:
+            self._player = player.File(self.container.prelude(), player.Limits.of(self.limits))
+        except player.PlayError as error:
+            raise self._refusal(error, "header") from None
+        self._player.build()
+
+    def _refusal(self, error: player.PlayError, where: str) -> Exception:
+        """What the core refused, in words."""
+        refused = error_class(error.code)
+        if error.chunk is not None:
+            chunk = self.container.find(error.chunk.kind, error.chunk.level, error.chunk.segment)
+            if refused is BadChecksum:
+                self.container.payload(chunk)
+            where = str(chunk)
+        header, limits = self.container.header, self.limits
         frames = -(-header.frame_count // header.segment_count)
-        needed = decoding_bytes(header.vertex_count, frames)
-        if needed > self.limits.memory_bytes:
-            raise LimitExceeded(f"header: got {header.vertex_count} vertices in segments of {frames} frames, about "
-                                f"{needed} bytes; the limit is {self.limits.memory_bytes}")
+        reasons = {
+            BadHeader: f"got Full_Level_Count {header.full_level_count}; expected what the hierarchy has",
+            BadChunkTable: f"got {self._absent_chunk()}; expected those of every segment that the hierarchy asks for",
+            LimitExceeded: f"got branches too deep; the limit is {limits.hierarchy_depth}" if error.chunk else
+                           f"got {header.vertex_count} vertices in segments of {frames} frames, more than memory is "
+                           f"allowed for; the limit is {limits.memory_bytes}",
+        }
+        return refused(f"{where}: {reasons.get(refused, 'got content that does not decode; expected a valid stream')}")
 
-    def _check_motion_chunks(self) -> None:
-        """Every stream that the hierarchy asks for is in the table, and no other. Raises BadChunkTable."""
-        segments, last = self.container.header.segment_count, self.full_level_count - 1
-        wanted = {(kind, level) for level in range(self.level_count) for kind, present in
-                  ((ct.STEMS, self.plan.has_stems(level)), (ct.AFFINES, self.plan.has_affines(level))) if present}
-        there = Counter((c.kind, c.level) for c in self.container.chunks if c.is_motion)  # a segment once: container.py
-        del there[ct.CORRECTIONS, last]
-        for kind, level in sorted(there.keys() | wanted):
-            if (kind, level) not in wanted:
-                raise BadChunkTable(f"chunk table: got {ct.KIND_NAMES[kind]} of level {level}; expected none, as the "
-                                    f"hierarchy has it")
-            if there[kind, level] != segments:
-                absent = next(i for i in range(segments) if self.container.find(kind, level, i) is None)
-                raise BadChunkTable(f"chunk table: got no {ct.KIND_NAMES[kind]} of level {level}, segment {absent}; "
-                                    f"expected one of each segment")
-
-    def _read_rest(self) -> None:
-        rest = ct.parse_rest(self.container.required(ct.REST))
-        self.origin, self._rest_dtype, self._exact_rest = rest.origin, rest.source_dtype, None
-        if rest.exact:
-            self._exact_rest = entropy.decode_exact_rest(rest.stream, self.plan.branches, self.vertex_count,
-                                                         rest.source_dtype)
-            local = self._exact_rest.astype(np.float64) - rest.origin
-        else:
-            local = entropy.decode_rest(rest.stream, self.plan.branches, self.vertex_count, rest.step)
-        if not np.isfinite(local).all():
-            raise BadChunk("REST: got a coordinate that is not finite")
-        self.plan.set_rest(local)
+    def _absent_chunk(self) -> str:
+        """The first chunk that the table lacks as far as it tells by itself."""
+        for kind in (ct.HIERARCHY, ct.REST, ct.TIME):
+            if self.container.find(kind) is None:
+                return f"no {ct.KIND_NAMES[kind]}"
+        for (kind, level), count in Counter((c.kind, c.level) for c in self.container.chunks if c.is_motion).items():
+            if kind != ct.CORRECTIONS and count < len(self.segments):
+                segment = next(i for i in range(len(self.segments)) if self.container.find(kind, level, i) is None)
+                return f"no {ct.KIND_NAMES[kind]} of level {level}, segment {segment}"
+        return "other chunks"
 
     def _first_damaged_level(self) -> int:
         for chunk in self.container.chunks:
@@ -271,9 +248,17 @@ class Decoder:
             parts.append("attributes behind the motion")
         return "; ".join(parts)
 
+    def _exact_branches(self, parts: np.ndarray) -> np.ndarray:
+        """Branches whose stems are exact in a cut, ascending."""
+        runs = parts[parts["branch"] < 0]
+        run = np.searchsorted(runs["first"], self.branches["first"], "right") - 1
+        ends = np.append(runs["first"] + runs["count"], 0)  # -1: before the first run
+        return np.flatnonzero(self.branches["first"] < ends[run])
+
     def nodes_at(self, depth: int) -> int:
         """Parts that the plant is made of at `depth`: exact stems, and subtrees that move as one."""
-        return len(self.plan.exact_branches(depth)) + len(self.plan.shown_nodes(depth))
+        parts = self._player.cut(depth)
+        return len(self._exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     @property
     def depths(self) -> list[Depth]:
@@ -287,19 +272,27 @@ class Decoder:
                                 float(errors[:, 0].max()), rms, self.available(depth)))
         return result
 
+    def depth_for(self, distance: float, fov: float, height: float, pixels: float = 1.0) -> int:
+        """The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of
+        view of `fov` (radians) on a screen of `height` pixels, is at most `pixels`; the deepest where none is.
+        """
+        return self._player.depth_for(distance, fov, height, pixels)
+
     def table1(self) -> dict:
         """The paper's table 1: depth, nodes, leaves and the four parameters of the ATH."""
-        nodes = self.plan.nodes
-        leaf = (self.plan.branches["flags"][nodes["branch"]] & WHOLE > 0) | (
-            self.plan.branches["subtree"][nodes["branch"]] == 1)
-        return {"depth": self.plan.height + 1, "nodes": len(nodes), "leaves": int(leaf.sum())} | dict(
+        branches, info = self.branches, self._player.info
+        whole, inside = branches["flags"] & WHOLE > 0, np.zeros(len(branches) + 1, np.int64)
+        np.add.at(inside, np.flatnonzero(whole) + 1, 1)
+        np.add.at(inside, (np.arange(len(branches)) + branches["subtree"])[whole], -1)
+        leaf = (np.cumsum(inside)[:-1] == 0) & (whole | (branches["subtree"] == 1))
+        return {"depth": self.full_level_count - 1, "nodes": info.node_count, "leaves": int(leaf.sum())} | dict(
             zip(TABLE_KEYS, self.thresholds))
 
     def info(self) -> dict:
         """What `athcodec info --json` prints."""
         return {
             "vertices": self.vertex_count, "frames": self.frame_count, "fps": self.fps, "branches": self.branch_count,
-            "segments": len(self.segments), "nodes": len(self.plan.nodes), "bytes": self.file_length,
+            "segments": len(self.segments), "nodes": self._player.info.node_count, "bytes": self.file_length,
             "available_bytes": self.container.available_length, "max_error_bound": self.max_error_bound,
             "complete": self.complete, "levels": self.level_count, "full_levels": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
@@ -312,10 +305,19 @@ class Decoder:
     @property
     def rest(self) -> np.ndarray:
         """Rest pose as decoded, (N, 3), float32 or what the source had."""
-        pose = self.plan.rest + self.origin if self._exact_rest is None else self._exact_rest
-        out = np.empty((self.vertex_count, 3), self._rest_dtype.newbyteorder("="))
-        out[self._vertex_source] = pose
-        return out
+        dtype = np.float64 if self._player.info.rest_wide else np.float32
+        return self._player.rest(player.SOURCE_ORDER).astype(dtype, copy=False)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """The point that the file's arithmetic is relative to, (3,) float64."""
+        return np.array(self._player.info.origin)
+
+    @property
+    def thresholds(self) -> tuple[float, int, float, int]:
+        """epsilon, eta, xi and lambda by which nodes were accepted."""
+        info = self._player.info
+        return info.epsilon, info.eta, info.xi, info.lam
 
     @cached_property
     def _source_branches(self) -> tuple:
@@ -335,11 +337,16 @@ class Decoder:
         vertex_branch, _, places = self._source_branches
         return check_stem_index(places, vertex_branch)
 
+    def _payload(self, chunk: ct.Chunk) -> bytes:
+        """A chunk's bytes, while no other thread reads the file. Raises Truncated, BadChecksum."""
+        with self._lock:
+            return self.container.payload(chunk)
+
     def _static(self, kind: int) -> tuple[dict, np.ndarray | None] | None:
         chunk = self.container.find(kind)
         if chunk is None:
             return None
-        return ct.parse_array(self.container.payload(chunk), str(chunk), self.limits)
+        return ct.parse_array(self._payload(chunk), str(chunk), self.limits)
 
     def _indices(self, kind: int, name: str) -> np.ndarray | None:
         found = self._static(kind)
@@ -371,7 +378,7 @@ class Decoder:
     def metadata(self) -> dict:
         """Unit, up axis and whatever else the source said of itself."""
         chunk = self.container.find(ct.METADATA)
-        return ct.parse_metadata(self.container.payload(chunk), self.limits) if chunk else {}
+        return ct.parse_metadata(self._payload(chunk), self.limits) if chunk else {}
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
@@ -382,7 +389,7 @@ class Decoder:
                 continue
             if len(result) >= self.limits.attributes:
                 raise LimitExceeded(f"{chunk}: got more than {self.limits.attributes} attributes")
-            data = self.container.payload(chunk)
+            data = self._payload(chunk)
             name = ct.array_name(data, str(chunk), self.limits)
             _, array = ct.parse_array(data, str(chunk), self.limits)
             if array is None or name in result:
@@ -416,78 +423,75 @@ class Decoder:
             raise LevelUnavailable(f"frame: got {frames}; expected 0 to {self.frame_count - 1}")
         return index, index + 1
 
-    def _streams(self, segment: int, level: int) -> tuple[list[LevelStream], dict[int, bytes]]:
-        """How to read each level, and the stem streams of those up to `level`."""
-        start, stop = self.segments[segment]
-        streams, bodies = [], {}
-        for d in range(self.full_level_count):
-            streams.append(LevelStream(1.0))
-            if d > level or not self.plan.has_stems(d):
-                continue
-            where = f"STEMS of level {d}, segment {segment}"
-            head, bodies[d] = ct.parse_stems(self._required(ct.STEMS, d, segment), stop - start, where)
-            streams[d] = LevelStream(head.step, float(head.omega))
-            if head.bits:
-                steps = entropy.decode_temporal(head.basis, head.rank, stop - start, head.bits, where)
-                streams[d].temporal = temporal_basis(steps, head.bits)
-        return streams, bodies
+    @cached_property
+    def _work(self) -> player.Work:
+        return player.Work(self._player.work_size())
 
-    def _required(self, kind: int, level: int, segment: int) -> bytes:
-        if segment in self._missing_segments[level]:
-            raise LevelUnavailable(f"level {level}, segment {segment}: not in the file; it is cut off at "
+    @contextmanager
+    def _prepared(self, segment: int, depth: int) -> Iterator[player.Segment]:
+        """A segment ready to be shown, for the caller alone. Raises a FormatError, or LevelUnavailable."""
+        with self._lock:
+            ready = self._ready.pop((segment, depth), None)
+            if ready is None:
+                spare = self._ready.popitem()[1] if self._ready else None
+                ready = self._prepare(segment, depth, spare)
+        try:
+            yield ready
+        finally:
+            with self._lock:
+                self._ready = {(segment, depth): ready}
+
+    def _prepare(self, segment: int, depth: int, spare: player.Segment | None) -> player.Segment:
+        """Decodes a segment, into spare memory where that is large enough."""
+        size = self._player.segment_size(depth)
+        needed, limit = size + self._player.work_size(), self.limits.memory_bytes
+        if needed > limit:
+            raise LimitExceeded(f"level {depth}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
+        ready = spare if spare is not None and len(spare.memory) >= size else player.Segment(size)
+        missing = self._player.missing(depth, segment)
+        if any(offset + size > self.container.available_length for offset, size in missing):
+            raise LevelUnavailable(f"level {depth}, segment {segment}: not in the file; it is cut off at "
                                    f"{self.container.available_length} of {self.file_length} bytes")
-        return self.container.required(kind, level, segment)
+        bytes_there = [as_bytes(self.container.read(offset, size)) for offset, size in missing]
+        try:
+            for (offset, _), data in zip(missing, bytes_there):
+                self._player.feed(data, offset)
+            self._player.prepare(self._work, segment, depth, ready)
+        except player.PlayError as error:
+            raise self._refusal(error, f"segment {segment}") from None
+        finally:
+            for offset, size in missing:
+                self._player.drop(offset, size)
+        return ready
 
-    def read_segment(self, segment: int, depth: int) -> SegmentMotion:
-        """The integers of one segment for playback at `depth`. Raises a FormatError, or LevelUnavailable."""
-        start, stop = self.segments[segment]
-        streams, bodies = self._streams(segment, depth)
-        motion = SegmentMotion(self.plan, stop - start, streams)
-        for level, body in bodies.items():
-            entropy.decode_stems(body, motion, level, f"STEMS of level {level}, segment {segment}")
-        for level in self.plan.affine_levels(depth):
-            entropy.decode_affines(self._required(ct.AFFINES, level, segment), motion, level,
-                                   f"AFFINES of level {level}, segment {segment}")
-        return motion
-
-    def segment_positions(self, segment: int, depth: int, dtype=None) -> np.ndarray:
-        """(N, 3, frames) positions of one segment in file order."""
-        motion = self.read_segment(segment, depth)
-        return self._finish(motion, segment, depth, np.dtype(dtype or self.dtype))
-
-    def _finish(self, motion: SegmentMotion, segment: int, depth: int, dtype: np.dtype) -> np.ndarray:
-        # corrections belong to the file's own type; another type is had by a cast, so that it stays within the bound
-        positions = motion.pose(depth, self.origin, self.dtype)
-        if self.container.find(ct.CORRECTIONS, depth, segment) is not None:
-            where = f"CORRECTIONS of segment {segment}"
-            step, stream = ct.parse_corrections(self._required(ct.CORRECTIONS, depth, segment), where)
-            entropy.decode_corrections(stream, step, positions, where)
-        return positions.astype(dtype, copy=False)
+    def _show(self, segment: int, depth: int, start: int, out: np.ndarray) -> None:
+        """Fills `out`, (k, N, 3) float32 or float64, with the frames from `start` on, in the source's order."""
+        with self._prepared(segment, depth) as ready:
+            for i, frame in enumerate(out):
+                self._player.positions(ready, start + i, frame)
 
     def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
-        for index, (start, stop) in enumerate(self.segments):
+        for start, stop in self.segments:
             low, high = max(start, first), min(stop, last)
             if low < high:
-                positions = self.segment_positions(index, depth, dtype)
-                yield low, scatter(positions, self._vertex_source, low - start, high - start)
+                yield low, self.positions(slice(low, high), depth, dtype)
 
     def positions(self, frames=None, depth: int | None = None, dtype=None) -> np.ndarray:
         """Positions in the source's vertex order: (N, 3) for one frame, (T, N, 3) for a slice or None (all).
 
         depth: level of detail, by default the deepest that is complete. Raises LevelUnavailable, or a FormatError.
         """
-        first, last = self._check_frames(frames)
+        depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
-        out = np.empty((last - first, self.vertex_count, 3), dtype)
-        for start, block in self.blocks(depth, dtype, slice(first, last)):
-            out[start - first: start - first + len(block)] = block
+        shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
+        for index, (start, stop) in enumerate(self.segments):
+            low, high = max(start, first), min(stop, last)
+            if low < high:
+                self._show(index, depth, low, shown[low - first: high - first])
+        out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
-
-    def _segment_of(self, frame: int) -> tuple[int, int]:
-        index = next(i for i, (start, stop) in enumerate(self.segments) if start <= frame < stop)
-        return index, frame - self.segments[index][0]
 
     def affines(self, frame: int, depth: int | None = None) -> Affines:
         """The cut at `depth` as matrices: nodes that move as one, and the least-squares maps of exact stems.
@@ -495,23 +499,25 @@ class Decoder:
         Matrices take absolute rest positions (self.rest) to absolute positions (paper, eq. 2). Raises as `positions`.
         """
         depth, (frame, _) = self._check_depth(depth), self._check_frames(frame)
-        segment, at = self._segment_of(frame)
-        motion = self.read_segment(segment, depth)
-        positions = self._finish(motion, segment, depth, np.dtype(np.float64))[:, :, at]
-        nodes, stems = self.plan.nodes[self.plan.shown_nodes(depth)], self.plan.exact_branches(depth)
-        first = np.concatenate([nodes["first"], self.plan.branches["first"][stems]])
-        count = np.concatenate([nodes["count"], self.plan.branches["count"][stems]])
-        is_stem = np.arange(len(first)) >= len(nodes)
-        matrices = np.empty((len(first), 3, 4))
-        matrices[: len(nodes)] = motion.node_matrices(depth, self.origin)[at]
+        parts = self._player.cut(depth)
+        nodes, stems = parts[parts["branch"] >= 0], self._exact_branches(parts)
+        positions = np.empty((self.vertex_count, 3))
+        with self._prepared(self._segment_of(frame), depth) as ready:
+            node_matrices = self._player.matrices(ready, frame, len(nodes))
+            self._player.positions(ready, frame, positions, player.FILE_ORDER)
         try:
-            maps = stem_maps(self.hierarchy, self.plan.rest + self.origin, positions[None])
+            maps = stem_maps(self.hierarchy, self._player.rest(), positions[None])
         except np.linalg.LinAlgError:
             raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant") from None
-        matrices[len(nodes):] = maps[0, stems]
+        first = np.concatenate([nodes["first"], self.branches["first"][stems]])
+        count = np.concatenate([nodes["count"], self.branches["count"][stems]])
         branch = self.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
+        is_stem, matrices = np.arange(len(first)) >= len(nodes), np.concatenate([node_matrices, maps[0, stems]])
         order = np.argsort(first, kind="stable")
         return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
+
+    def _segment_of(self, frame: int) -> int:
+        return next(i for i, (_, stop) in enumerate(self.segments) if frame < stop)
 
     def residual(self, frame: int, depth: int | None = None) -> np.ndarray:
         """What the matrices of `affines` leave, in the space of the rest pose (paper, eq. 3): (N, 3), source order.
@@ -538,14 +544,12 @@ class Decoder:
             raise Truncated(f"file: got {self.container.available_length} bytes; expected {self.file_length}; "
                             f"{self.missing}")
         for chunk in self.container.chunks:
-            self.container.payload(chunk)
+            self._payload(chunk)
         try:
             _ = self.metadata, self.faces, self.edges, self.attributes
         except ClipError as error:
             raise BadChunk(f"static data: {error}") from None
         for segment in range(len(self.segments)):
             for depth in range(self.level_count):
-                self.segment_positions(segment, depth)
-
-
-
+                with self._prepared(segment, depth):
+                    pass

@@ -1,14 +1,14 @@
-"""Between integers and the bytes of a stream: one pair of functions per kind of stream of FORMAT.md.
+"""From integers to the bytes of a stream: one function per kind of stream of FORMAT.md.
 
 The models run in the C core; this module knows which arrays each takes. What the bytes are wrapped in (steps, flags) is
-the container's business.
+the container's business. Reading streams is the player's (player.py).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from athcodec._native import BRANCH, address, decode_stream, encode_stream, lib
+from athcodec._native import BRANCH, address, encode_stream, lib
 from athcodec.transform import SegmentMotion
 
 
@@ -20,29 +20,12 @@ def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_sou
                          address(vertex_source, np.int32, len(vertex_source)))
 
 
-def decode_hierarchy(data, branch_count: int, vertex_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(branches, branch_source, vertex_source). Raises BadChunk."""
-    branches = np.zeros(branch_count, BRANCH)
-    branch_source, vertex_source = np.zeros(branch_count, np.int32), np.zeros(vertex_count, np.int32)
-    decode_stream("ath_decode_hierarchy", data, "hierarchy", branch_count, vertex_count, branches.ctypes.data,
-                  branch_source.ctypes.data, vertex_source.ctypes.data)
-    return branches, branch_source, vertex_source
-
-
 def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray) -> tuple[bytes, np.ndarray]:
     """The stream of a rest pose, (N, 3) float64 less the origin, and the pose that it decodes to."""
     decoded = np.zeros_like(rest)
     data = encode_stream("ath_encode_rest", 1024 + 8 * rest.size, address(branches, BRANCH, 1), len(branches), step,
                          address(rest, np.float64, rest.size), address(decoded, np.float64, rest.size))
     return data, decoded
-
-
-def decode_rest(data, branches: np.ndarray, vertex_count: int, step: float) -> np.ndarray:
-    """(N, 3) float64 less the origin. Raises BadChunk."""
-    rest = np.zeros((vertex_count, 3))
-    decode_stream("ath_decode_rest", data, "rest pose", address(branches, BRANCH, 1), len(branches), step,
-                  rest.ctypes.data)
-    return rest
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
@@ -52,24 +35,9 @@ def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
                          pose.dtype == np.float64, address(numbers, np.float64, pose.size))
 
 
-def decode_exact_rest(data, branches: np.ndarray, vertex_count: int, dtype: np.dtype) -> np.ndarray:
-    """(N, 3) of `dtype`, finite, origin included. Raises BadChunk."""
-    numbers = np.zeros((vertex_count, 3))
-    decode_stream("ath_decode_exact_rest", data, "exact rest pose", address(branches, BRANCH, 1), len(branches),
-                  dtype == np.float64, numbers.ctypes.data)
-    return numbers.astype(dtype)
-
-
 def encode_times(time: np.ndarray) -> bytes:
     """The stream of times in seconds, (T,) float64, bit for bit."""
     return encode_stream("ath_encode_times", 1024 + 10 * time.size, time.size, address(time, np.float64, time.size))
-
-
-def decode_times(data, frame_count: int) -> np.ndarray:
-    """(T,) float64, finite. Raises BadChunk."""
-    time = np.zeros(frame_count)
-    decode_stream("ath_decode_times", data, "times", frame_count, time.ctypes.data)
-    return time
 
 
 def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
@@ -79,46 +47,22 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
                          address(steps, np.int32, steps.size))
 
 
-def decode_temporal(data, rank: int, frames: int, bits: int, where: str) -> np.ndarray:
-    """(rank, frames) int32. Raises BadChunk."""
-    steps = np.zeros((rank, frames), np.int32)
-    decode_stream("ath_decode_temporal", data, where, rank, frames, 1 << bits - 1, steps.ctypes.data)
-    return steps
-
-
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
     """Coefficients and tracks of one level."""
     return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.shape, segment.motion,
-                         level)
-
-
-def decode_stems(data, segment: SegmentMotion, level: int, where: str) -> None:
-    """Fills the segment's coefficients and tracks of one level. Raises BadChunk."""
-    decode_stream("ath_decode_stems", data, where, segment.plan.shape, segment.motion, level)
+                         segment.integers, level)
 
 
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:
     """Maps of the nodes of one level."""
     return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.shape, segment.motion,
-                         level)
-
-
-def decode_affines(data, segment: SegmentMotion, level: int, where: str) -> None:
-    """Fills the segment's node maps of one level. Raises BadChunk."""
-    decode_stream("ath_decode_affines", data, where, segment.plan.shape, segment.motion, level)
+                         segment.integers, level)
 
 
 def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) -> bytes:
     """corrections: (K, 5) int32 rows of (vertex, frame, x, y, z), sorted by vertex, then frame."""
     return encode_stream("ath_encode_corrections", 4096 + 16 * len(corrections), vertex_count, frames,
                          address(corrections, np.int32, 5 * len(corrections)), len(corrections))
-
-
-def decode_corrections(data, step: float, positions: np.ndarray, where: str) -> None:
-    """Adds corrections to (N, 3, T) positions in place. Raises BadChunk."""
-    vertices, _, frames = positions.shape
-    decode_stream("ath_decode_corrections", data, where, vertices, frames, step, positions.dtype == np.float64,
-                  address(positions, positions.dtype, positions.size))
 
 
 def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float,

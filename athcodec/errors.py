@@ -68,3 +68,8 @@ class TrailingBytes(FormatError):
 
 class LevelUnavailable(AthError, LookupError):
     """A level or frame was asked for that the file, or what is there of it, does not hold."""
+
+
+def error_class(code: int) -> type[FormatError]:
+    """The class of a code of FORMAT.md's table. KeyError: none of a file's."""
+    return {each.code: each for each in (FormatError, *FormatError.__subclasses__())}[code]

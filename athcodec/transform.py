@@ -1,8 +1,8 @@
-"""The motion model, forward and back: the plan of a plant (pieces, nodes, bases) and the motion of one segment.
+"""The motion model as an encoder runs it: the plan of a plant (pieces, nodes, bases) and the motion of one segment.
 
 Follows FORMAT.md, "Plan" and "Reconstruction"; the arithmetic itself runs in the C core. `Plan` is what all segments
-share. `SegmentMotion` owns the integers of one segment and turns positions into them (`analyse`) or them into positions
-(`pose`). Arrays over a segment are vertex-major, (vertices, 3, frames), in file order.
+share. `SegmentMotion` owns the integers of one segment and turns positions into them (`analyse`), and them into what a
+decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3, frames), in file order.
 """
 
 from __future__ import annotations
@@ -12,7 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec._native import BRANCH, NODE, PIECE, PIECE_VERTICES, SEGMENT_FRAMES, Motion, Shape, Stream, address, lib
+from athcodec._native import (
+    BRANCH,
+    NODE,
+    PIECE,
+    PIECE_VERTICES,
+    SEGMENT_FRAMES,
+    Integers,
+    Motion,
+    Shape,
+    Stream,
+    address,
+    lib,
+)
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 256 << 20
@@ -68,8 +80,8 @@ class Plan:
         self.shape = Shape(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
                            node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
                            nodes=self.nodes.ctypes.data)
-        piece_of_vertex = np.empty(vertex_count, np.int32)
-        lib.ath_plan(self.shape, self.pieces.ctypes.data, self.nodes.ctypes.data, piece_of_vertex.ctypes.data)
+        memory = np.empty(vertex_count, np.int32)
+        lib.ath_plan(self.shape, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         self.rest = self.bases = None
 
     @property
@@ -89,8 +101,9 @@ class Plan:
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         at = address(self.rest, np.float64, 3 * vertices)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
-        self.bases = np.empty(size)
-        lib.ath_basis_fill(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, self.bases.ctypes.data)
+        self.bases, work = np.empty(size), np.empty(2 * PIECE_VERTICES ** 2)
+        lib.ath_basis_fill(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, work.ctypes.data,
+                           self.bases.ctypes.data)
         self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
         lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
 
@@ -143,10 +156,9 @@ class SegmentMotion:
         self.tracks = np.zeros((shape.piece_count, 2, 3, frames), np.int32)
         self.node_tracks = np.zeros((shape.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(shape.node_count, np.int32)
-        self._carriers = np.empty((max(shape.carrier_vertices, 1), 3, frames))
-        self._carrier_frames = np.empty((max(shape.carrier_pieces, 1), 12, frames))
+        self._carriers = np.empty(lib.ath_carrier_size(shape.carrier_rows, frames))
         self.cosines = cosine_basis(frames)
-        self._work = np.empty(lib.ath_motion_work(frames))
+        self._work = np.empty(lib.ath_motion_work(shape.longest, frames))
         self._bind()
 
     def _bind(self) -> None:
@@ -157,12 +169,10 @@ class SegmentMotion:
             self._temporal.append(temporal)
             c_stream.step, c_stream.omega = stream.step, stream.omega
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
-        self.motion = Motion(
-            frames=self.frames, streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-            coefficients=self.coefficients.ctypes.data, tracks=self.tracks.ctypes.data,
-            node_tracks=self.node_tracks.ctypes.data, node_steps=self.node_steps.ctypes.data,
-            carriers=self._carriers.ctypes.data, carrier_frames=self._carrier_frames.ctypes.data,
-            work=self._work.ctypes.data)
+        self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
+                             carriers=self._carriers.ctypes.data, work=self._work.ctypes.data, frames=self.frames)
+        self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
+                                 self.node_steps.ctypes.data)
 
     def restream(self, streams: list[LevelStream]) -> None:
         """Clears the integers and sets how the next ones are to be read."""
@@ -173,14 +183,14 @@ class SegmentMotion:
 
     def analyse(self, source: np.ndarray, dead_zone: float) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
-        lib.ath_analyse(self.plan.shape, self.motion, self._source(source), dead_zone)
+        lib.ath_analyse(self.plan.shape, self.motion, self.integers, self._source(source), dead_zone)
 
     def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
 
         A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
-        lib.ath_analyse_nodes(self.plan.shape, self.motion, self._source(source),
+        lib.ath_analyse_nodes(self.plan.shape, self.motion, self.integers, self._source(source),
                               address(level_steps, np.float64, self.plan.level_count), dead_zone)
 
     def clear_nodes(self) -> None:
@@ -194,19 +204,9 @@ class SegmentMotion:
     def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
         """Positions at `level`, corrections not included: (N, 3, frames) float32 or float64, origin added."""
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
-        lib.ath_pose(self.plan.shape, self.motion, level, address(origin, np.float64, 3),
+        lib.ath_pose(self.plan.shape, self.motion, self.integers, level, address(origin, np.float64, 3),
                      positions.dtype == np.float64, positions.ctypes.data)
         return positions
-
-    def node_matrices(self, level: int, origin: np.ndarray) -> np.ndarray:
-        """Maps of the nodes shown at `level` from absolute rest to absolute positions, (frames, nodes, 3, 4) float64.
-
-        Needs the carriers of a `pose` at that level or deeper.
-        """
-        matrices = np.empty((max(len(self.plan.nodes), 1), 3, 4, self.frames))
-        lib.ath_node_matrices(self.plan.shape, self.motion, level, address(origin, np.float64, 3),
-                              matrices.ctypes.data)
-        return matrices[self.plan.shown_nodes(level)].transpose(3, 0, 1, 2)
 
 
 def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray) -> np.ndarray:
@@ -216,15 +216,6 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray) -> 
     out = np.empty((vertices, 3, frames))
     lib.ath_gather(vertices, frames, address(vertex_source, np.int32, vertices), block.dtype == np.float64,
                    block.ctypes.data, address(origin, np.float64, 3), out.ctypes.data)
-    return out
-
-
-def scatter(positions: np.ndarray, vertex_source: np.ndarray, start: int, stop: int) -> np.ndarray:
-    """Frames start..stop-1 of (N, 3, T) positions as (stop - start, N, 3) in the source's order."""
-    vertices, _, frames = positions.shape
-    out = np.empty((stop - start, vertices, 3), positions.dtype)
-    lib.ath_scatter(vertices, frames, address(vertex_source, np.int32, vertices), positions.dtype == np.float64,
-                    address(positions, positions.dtype, 0), start, stop, out.ctypes.data)
     return out
 
 

@@ -141,7 +141,7 @@ class _Joints:
     @property
     def loose(self) -> int:
         """How many of the measured ones carry a translation of their own."""
-        return int((self.decoder.plan.branches["flags"][self.measured] & LOOSE > 0).sum())
+        return int((self.decoder.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
         """Largest and RMS gap over these frames and all joints."""

@@ -1,32 +1,657 @@
-"""What an engine that takes the C core relies on: decoding compiles alone, and needs nothing but memory functions."""
+"""What an engine that calls the C core relies on (ath.h): sizes that are enough and checked, bytes in any order,
+levels and times that mean what the header says, and the same bits whichever way a frame is come by.
+
+The functions are declared here from the header alone, as a program would, apart from the package's own binding.
+"""
 
 from __future__ import annotations
 
-import re
-import shutil
-import subprocess
-from pathlib import Path
+import ctypes
+import threading
+from ctypes import (POINTER, byref, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint8, c_uint16,
+                    c_uint32, c_uint64, c_void_p)
 
+import numpy as np
 import pytest
 
-CORE = Path(__file__).resolve().parent.parent / "athcodec" / "core"
-COMPILERS = [name for name in ("gcc", "clang", "cc") if shutil.which(name)]
+import athcodec
+from athcodec import errors
+from athcodec._library import load_library
+
+OK, BAD_CHECKSUM, LIMIT_EXCEEDED = 0, 5, 10
+MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
+FILE_ORDER, SOURCE_ORDER = 0, 1
+CLAMP, LOOP, PING_PONG = 0, 1, 2
+GUARD = 0xA5
 
 
-def decoder_sources():
-    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    return [CORE / name for name in names.split()]
+class Info(ctypes.Structure):
+    _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
+                ("origin", c_double * 3), ("duration", c_double)]
+    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count "
+                                              "level_count full_level_count node_count chunk_count wide").split()]
+    _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lambda_", c_uint32),
+                 ("rest_wide", c_int32)]
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_functions(compiler, tmp_path):
-    strict = ["-std=c11", "-O2", "-ffreestanding", "-fno-math-errno", "-ffp-contract=off", "-Wall",
-              "-Wextra", "-Wconversion", "-Werror"]
-    objects = []
-    for source in decoder_sources():
-        objects.append(tmp_path / f"{source.stem}.o")
-        subprocess.run([compiler, *strict, "-c", source, "-o", objects[-1]], check=True)
-    whole = tmp_path / "decoder.o"
-    subprocess.run([compiler, "-nostdlib", "-r", *objects, "-o", whole], check=True)
-    undefined = subprocess.run(["nm", "-u", whole], check=True, capture_output=True, text=True).stdout.split()
-    assert set(undefined) - {"U"} <= {"memcpy", "memset", "memmove"}
+class Limits(ctypes.Structure):
+    _fields_ = [(name, c_uint32) for name in ("chunks table_bytes vertices branches frames hierarchy_depth "
+                                              "chunk_bytes reserved").split()] + [("memory_bytes", c_uint64)]
+
+
+class Range(ctypes.Structure):
+    _fields_ = [("offset", c_uint64), ("size", c_uint64)]
+
+
+class Part(ctypes.Structure):
+    _fields_ = [(name, c_int32) for name in ("first", "count", "branch", "index")]
+
+
+class Chunk(ctypes.Structure):
+    _fields_ = [("bytes", c_void_p), ("offset", c_uint64), ("length", c_uint32), ("checksum", c_uint32),
+                ("segment", c_uint32), ("kind", c_uint16), ("level", c_uint8), ("reserved", c_uint8)]
+
+
+class Blend(ctypes.Structure):
+    _fields_ = [("frame", c_int32 * 2), ("segment", c_int32 * 2), ("weight", c_double)]
+
+
+_SHOW = [c_void_p, POINTER(c_void_p), c_int32, c_double]
+_SIGNATURES = {
+    "ath_result_name": (c_char_p, [c_int]),
+    "ath_default_limits": (None, [POINTER(Limits)]),
+    "ath_front": (c_int, [c_void_p, c_size_t, POINTER(Limits), POINTER(c_size_t), POINTER(c_size_t)]),
+    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(Limits)]),
+    "ath_build_size": (c_size_t, [c_void_p]),
+    "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
+    "ath_get_info": (None, [c_void_p, POINTER(Info)]),
+    "ath_vertex_source": (POINTER(c_int32), [c_void_p]),
+    "ath_times": (POINTER(c_double), [c_void_p]),
+    "ath_rest": (None, [c_void_p, c_int, c_void_p, c_size_t]),
+    "ath_level_error": (None, [c_void_p, c_int32, c_int32, POINTER(c_double), POINTER(c_double)]),
+    "ath_segment_start": (c_int32, [c_void_p, c_int32]),
+    "ath_segment_of": (c_int32, [c_void_p, c_int32]),
+    "ath_chunks": (POINTER(Chunk), [c_void_p]),
+    "ath_work_fault": (c_int32, [c_void_p]),
+    "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
+    "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
+    "ath_ranges": (c_int32, [c_void_p, c_int32, c_int32, c_int32, c_int, c_void_p, c_int32]),
+    "ath_ready_level": (c_int32, [c_void_p, c_int32]),
+    "ath_cut_size": (None, [c_void_p, c_int32, *[POINTER(c_int32)] * 3]),
+    "ath_cut": (None, [c_void_p, c_int32, POINTER(Part)]),
+    "ath_work_size": (c_size_t, [c_void_p]),
+    "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
+    "ath_prepare_start": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
+    "ath_prepare_step": (c_int, [c_void_p, c_int32]),
+    "ath_prepare_steps": (c_int32, [c_void_p, c_int32, c_int32]),
+    "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
+    "ath_segment_index": (c_int32, [c_void_p]),
+    "ath_segment_level": (c_int32, [c_void_p]),
+    "ath_frame_at": (c_double, [c_void_p, c_double, c_int]),
+    "ath_blend_at": (Blend, [c_void_p, c_double]),
+    "ath_positions": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
+    "ath_positions_wide": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
+    "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
+    "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
+    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_double, c_double, c_double, c_double]),
+}
+
+
+def _declared() -> ctypes.CDLL:
+    library = load_library()
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+core = _declared()
+
+
+class Memory:
+    """Bytes for the core, aligned to 16 or `off` by some, and guarded: a write behind the end is noticed."""
+
+    def __init__(self, size: int, off: int = 0):
+        self.size = size
+        self._block = np.full(size + 64, GUARD, np.uint8)
+        self._start = -self._block.ctypes.data % 16 + off
+        self.bytes[:] = 0
+
+    @property
+    def bytes(self) -> np.ndarray:
+        return self._block[self._start: self._start + self.size]
+
+    @property
+    def address(self) -> int:
+        return self._block.ctypes.data + self._start
+
+    def check(self) -> None:
+        assert (self._block[: self._start] == GUARD).all(), "written in front of the memory"
+        assert (self._block[self._start + self.size:] == GUARD).all(), "written behind the memory"
+
+
+def front(data: bytes, limits: Limits | None = None) -> tuple[int, int, int]:
+    """Result, bytes that are needed, memory that ath_open needs."""
+    needed, memory = c_size_t(), c_size_t()
+    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory))
+    return result, needed.value, memory.value
+
+
+class Player:
+    """An opened file; only its prelude is fed unless `whole`."""
+
+    def __init__(self, data: bytes, whole: bool = True, build: bool = True):
+        self.data = data
+        self.kept: list = []
+        result, prelude, size = front(data)
+        assert result == OK
+        self.prelude = data[:prelude]
+        self.memory = self.file = Memory(size)
+        fed = data if whole else self.prelude
+        self.kept.append(fed)
+        assert core.ath_open(self.memory.address, size, fed, len(fed), None) == OK
+        self.info = Info()
+        core.ath_get_info(self.address, byref(self.info))
+        if build:
+            self.bases = Memory(core.ath_build_size(self.address))
+            assert core.ath_build(self.address, self.bases.address, self.bases.size) == OK
+        self.memory.check()
+
+    @property
+    def address(self) -> int:
+        return self.memory.address
+
+    @property
+    def levels(self) -> range:
+        return range(self.info.level_count)
+
+    @property
+    def segments(self) -> range:
+        return range(self.info.segment_count)
+
+    def start_of(self, segment: int) -> int:
+        return core.ath_segment_start(self.address, segment)
+
+    def work(self) -> Memory:
+        return Memory(core.ath_work_size(self.address))
+
+    def room(self, level: int) -> Memory:
+        """For a segment."""
+        return Memory(core.ath_segment_size(self.address, level))
+
+    def try_to_prepare(self, segment: int, level: int, work: Memory, into: Memory, call=core.ath_prepare) -> int:
+        return call(work.address, work.size, self.address, segment, level, into.address, into.size)
+
+    def start(self, segment: int, level: int, work: Memory, into: Memory) -> int:
+        return self.try_to_prepare(segment, level, work, into, core.ath_prepare_start)
+
+    def prepare(self, segment: int, level: int, work: Memory | None = None, into: Memory | None = None) -> Memory:
+        work, into = work or self.work(), into or self.room(level)
+        assert self.try_to_prepare(segment, level, work, into) == OK
+        work.check()
+        into.check()
+        return into
+
+    def prepare_all(self, level: int) -> list[Memory]:
+        return [self.prepare(segment, level) for segment in self.segments]
+
+    def result_of_preparing(self, segment: int, level: int) -> int:
+        return self.try_to_prepare(segment, level, self.work(), self.room(level))
+
+    def at(self, prepared: list[Memory], frame: float) -> tuple:
+        """The first arguments of the functions that show a frame."""
+        return self.address, pointers(prepared), len(prepared), frame
+
+    def show(self, prepared: list[Memory], frame: float, order: int = SOURCE_ORDER) -> tuple[int, np.ndarray]:
+        """What ath_positions returns, and the positions."""
+        xyz = np.full((self.info.vertex_count, 3), np.nan, np.float32)
+        return core.ath_positions(*self.at(prepared, frame), order, xyz.ctypes.data, 12), xyz
+
+    def frame(self, prepared: list[Memory], frame: float) -> np.ndarray:
+        result, xyz = self.show(prepared, frame)
+        assert result == OK
+        return xyz
+
+    def ranges(self, level: int, first: int, last: int, fed_too: bool = False) -> list[tuple[int, int]]:
+        buffer = (Range * 1000)()
+        count = core.ath_ranges(self.address, level, first, last, fed_too, buffer, 1000)
+        return [(r.offset, r.size) for r in buffer[:count]]
+
+    def feed(self, offset: int, size: int) -> None:
+        piece = bytes(bytearray(self.data[offset: offset + size]))
+        self.kept.append(piece)
+        core.ath_feed(self.address, piece, offset, size)
+
+
+def pointers(prepared: list[Memory]):
+    return (c_void_p * max(len(prepared), 1))(*[memory and memory.address for memory in prepared])
+
+
+@pytest.fixture(scope="module", params=["sample", "bushy", "full"])
+def data(request) -> bytes:
+    """Three segments of a tree, four of a random plant on two roots, two of a plant with uneven times."""
+    return request.getfixturevalue(f"{request.param}_ath").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def player(data) -> Player:
+    return Player(data)
+
+
+@pytest.fixture(scope="module")
+def uneven(full_ath) -> Player:
+    return Player(full_ath.read_bytes())
+
+
+# ---- results and memory ----
+
+
+def test_results_have_the_names_and_numbers_of_the_format():
+    for error in vars(errors).values():
+        if isinstance(error, type) and issubclass(error, errors.FormatError):
+            assert core.ath_result_name(error.code).decode() == error.name
+    names = [core.ath_result_name(code).decode() for code in range(64, 70)]
+    assert names == ["MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"]
+    assert core.ath_result_name(0) == b"OK"
+    assert {core.ath_result_name(code) for code in (-1, 12, 63, 70, 2**31 - 1, -2**31)} == {b"UNKNOWN"}
+
+
+def too_little(size: int) -> list[tuple[int, int]]:
+    """Addresses and sizes that are not `size` bytes aligned to 16."""
+    too_little.kept = [Memory(size, off) for off in (0, 1, 4, 8)]
+    return [(0, size), (too_little.kept[0].address, size - 1), (too_little.kept[0].address, 0),
+            *((memory.address, size) for memory in too_little.kept[1:])]
+
+
+def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data):
+    player = Player(data, build=False)
+    deepest = player.levels[-1]
+    sizes = {
+        "open": front(data)[2], "build": core.ath_build_size(player.address),
+        "work": core.ath_work_size(player.address), "segment": core.ath_segment_size(player.address, deepest),
+    }
+    built, work, segment = Memory(sizes["build"]), Memory(sizes["work"]), Memory(sizes["segment"])
+    for address, size in too_little(sizes["open"]):
+        assert core.ath_open(address, size, data, len(data), None) == NO_MEMORY
+    for address, size in too_little(sizes["build"]):
+        assert core.ath_build(player.address, address, size) == NO_MEMORY
+    assert core.ath_build(player.address, built.address, built.size) == OK
+    for address, size in too_little(sizes["work"]):
+        arguments = address, size, player.address, 0, deepest, segment.address, segment.size
+        assert core.ath_prepare_start(*arguments) == NO_MEMORY
+    for address, size in too_little(sizes["segment"]):
+        arguments = work.address, work.size, player.address, 0, deepest, address, size
+        assert core.ath_prepare_start(*arguments) == NO_MEMORY
+        assert not any(memory.bytes.any() for memory in too_little.kept)
+    assert player.try_to_prepare(0, deepest, work, segment) == OK
+    for memory in (player.memory, built, work, segment):
+        memory.check()
+
+
+def test_levels_and_segments_that_a_file_does_not_have_are_bad_arguments(player):
+    work, segment = player.work(), Memory(max(player.room(level).size for level in player.levels))
+    for index, level in ((-1, 0), (player.info.segment_count, 0), (2**31 - 1, 0), (0, -1),
+                         (0, player.info.level_count), (0, 255), (-2**31, -2**31)):
+        assert player.start(index, level, work, segment) == BAD_ARGUMENT
+
+
+def test_a_file_beyond_a_limit_is_refused_before_it_is_opened(data):
+    fields = {"vertices": 5, "frames": 5, "branches": 1, "chunks": 2, "memory_bytes": 1000}
+    for field, limit in fields.items():
+        limits = Limits()
+        core.ath_default_limits(byref(limits))
+        assert front(data, limits)[0] == OK
+        setattr(limits, field, limit)
+        assert front(data, limits)[0] == LIMIT_EXCEEDED
+
+
+# ---- bytes ----
+
+
+def test_a_prefix_that_is_too_short_says_how_many_bytes_to_come_back_with(data, player):
+    prelude = player.info.prelude_length
+    for size in range(prelude):
+        result, needed, _ = front(data[:size])
+        assert result == MISSING and size < needed <= prelude
+    size, asked = 0, 0
+    while (answer := front(data[:size]))[0] == MISSING:
+        size, asked = answer[1], asked + 1
+    assert answer == front(data) == (OK, prelude, player.memory.size) and size == prelude and asked <= 4
+    memory = Memory(player.memory.size)
+    for size in (0, 1, 100, prelude - 1):
+        assert core.ath_open(memory.address, memory.size, data[:size], size, None) == MISSING
+    assert core.ath_open(memory.address, memory.size, data[:prelude], prelude, None) == OK
+
+
+def test_the_ranges_of_a_level_are_what_it_needs_fed_in_any_order(data, player):
+    rng = np.random.default_rng(1)
+    for level in player.levels:
+        stream = Player(data, whole=False)
+        ranges = stream.ranges(level, 0, player.info.segment_count - 1)
+        assert stream.ranges(level, 0, player.info.segment_count - 1, fed_too=True) == ranges
+        assert all(a + size < b for (a, size), (b, _) in zip(ranges, ranges[1:])), "ascending and joined"
+        for i in rng.permutation(len(ranges)):
+            assert MISSING in [stream.result_of_preparing(segment, level) for segment in stream.segments]
+            stream.feed(*ranges[i])
+        assert stream.ranges(level, 0, player.info.segment_count - 1) == []
+        for segment in stream.segments:
+            assert core.ath_ready_level(stream.address, segment) >= level
+            whole, streamed = [player.prepare(segment, level)], [stream.prepare(segment, level)]
+            for frame in range(player.start_of(segment), player.start_of(segment + 1)):
+                assert np.array_equal(player.frame(whole, frame), stream.frame(streamed, frame))
+
+
+def test_one_segment_plays_without_the_bytes_of_the_others(data, player):
+    level, segment = player.levels[-1], player.segments[-1]
+    stream = Player(data, whole=False)
+    ranges = stream.ranges(level, segment, segment)
+    assert sum(size for _, size in ranges) < sum(size for _, size in stream.ranges(level, 0, segment)) / 1.5
+    for piece in ranges:
+        stream.feed(*piece)
+    assert [core.ath_ready_level(stream.address, s) for s in stream.segments] == [-1] * segment + [level]
+    frame = player.start_of(segment)
+    assert np.array_equal(stream.frame([stream.prepare(segment, level)], frame),
+                          player.frame([player.prepare(segment, level)], frame))
+
+
+def test_a_growing_prefix_makes_ready_one_level_after_the_other(data, player):
+    stream = Player(data, whole=False)
+    ready = np.full(player.info.segment_count, -1)
+    for size in range(len(stream.prelude), len(data) + 1, 37):
+        stream.kept.append(data[:size])
+        core.ath_feed(stream.address, stream.kept[-1], 0, size)
+        now = np.array([core.ath_ready_level(stream.address, segment) for segment in stream.segments])
+        assert (now >= ready).all() and (np.diff(now) <= 0).all()
+        if (now > ready).any():
+            segment = int(np.argmax(now > ready))
+            stream.prepare(segment, int(now[segment]))
+        ready = now
+    stream.feed(0, len(data))
+    assert {core.ath_ready_level(stream.address, s) for s in stream.segments} == {player.levels[-1]}
+
+
+def test_half_a_chunk_is_left_alone_and_dropped_bytes_are_missing_again(data, player):
+    level = player.levels[-1]
+    stream = Player(data, whole=False)
+    (offset, size), *_ = stream.ranges(level, 0, 0)
+    stream.feed(offset, size - 1)
+    stream.feed(offset + 1, size - 1)
+    assert core.ath_ready_level(stream.address, 0) < level
+    stream.feed(0, len(data))
+    core.ath_drop(stream.address, offset + size - 1, 1)
+    missing = stream.ranges(level, 0, 0)
+    assert len(missing) == 1 and missing[0][0] >= offset and sum(missing[0]) >= offset + size
+    assert stream.result_of_preparing(0, level) == MISSING
+    stream.feed(*missing[0])
+    stream.prepare(0, level)
+
+
+def test_ranges_beyond_the_capacity_are_counted_and_not_written(data):
+    stream = Player(data, whole=False)
+    level, last = stream.levels[-1], stream.segments[-1]
+    ranges = stream.ranges(level, last, last)
+    assert len(ranges) >= 2
+    buffer = Memory(16)
+    assert core.ath_ranges(stream.address, level, last, last, 0, buffer.address, 1) == len(ranges)
+    assert tuple(buffer.bytes.view(np.uint64)) == ranges[0]
+    buffer.check()
+    assert core.ath_ranges(stream.address, level, last, last, 0, None, 0) == len(ranges)
+
+
+def test_a_damaged_chunk_is_named_and_its_segment_is_not_prepared(data, player):
+    level = player.levels[-1]
+    offset, size = player.ranges(level, 0, 0, fed_too=True)[-1]
+    broken = Player(data[: offset + size - 1] + bytes([data[offset + size - 1] ^ 1]) + data[offset + size:])
+    work, segment = broken.work(), broken.room(level)
+    assert broken.try_to_prepare(0, level, work, segment) == BAD_CHECKSUM
+    chunk = core.ath_chunks(broken.address)[core.ath_work_fault(work.address)]
+    assert (chunk.offset + chunk.length, chunk.segment) == (offset + size, 0)
+    assert core.ath_segment_index(segment.address) == core.ath_segment_level(segment.address) == -1
+    assert broken.show([segment], 0)[0] == NOT_PREPARED
+
+
+# ---- preparing ----
+
+
+def test_single_steps_prepare_the_same_memory_as_one_go(player):
+    work = player.work()
+    for level in player.levels:
+        into = player.room(level)
+        player.prepare(0, level, work, into)
+        whole = into.bytes.copy()
+        into.bytes[:] = 0
+        work.bytes[:] = GUARD
+        assert player.start(0, level, work, into) == OK and core.ath_prepare_step(work.address, 0) == MORE
+        steps = 1
+        while core.ath_prepare_step(work.address, 1) == MORE:
+            assert core.ath_segment_level(into.address) == -1, "not to be played before it is done"
+            steps += 1
+        assert core.ath_segment_level(into.address) == level
+        assert core.ath_prepare_step(work.address, 1) == OK, "once more does no harm"
+        assert np.array_equal(into.bytes, whole) and steps > player.info.branch_count
+
+
+def test_the_number_of_steps_is_known_before(player):
+    """So a player can spread a preparation over the frames that it has until then, as examples/play.c does."""
+    work = player.work()
+    for level in player.levels:
+        into = player.room(level)
+        assert player.start(0, level, work, into) == OK
+        steps = core.ath_prepare_steps(player.address, 0, level)
+        assert core.ath_prepare_step(work.address, steps - 1) == MORE
+        assert core.ath_prepare_step(work.address, 1) == OK
+
+
+def test_threads_prepare_from_one_file_at_the_same_time(player):
+    jobs = [(segment, level) for level in player.levels for segment in player.segments]
+    alone = {job: player.prepare(*job) for job in jobs}
+    together: list[dict] = [{}, {}]
+
+    def prepare(results, order):
+        work = player.work()
+        for job in order:
+            results[job] = player.prepare(*job, work)
+
+    threads = [threading.Thread(target=prepare, args=(together[i], jobs[::1 - 2 * i])) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for segment, level in jobs:
+        for frame in range(player.start_of(segment), player.start_of(segment + 1)):
+            one, *others = [player.frame([done[segment, level]], frame) for done in (alone, *together)]
+            assert all(np.array_equal(one, other) for other in others)
+
+
+# ---- what is shown ----
+
+
+def test_frames_are_those_of_python_bit_for_bit_in_any_order_of_play(data, player, scratch):
+    (scratch / "core.ath").write_bytes(data)
+    with athcodec.open(scratch / "core.ath") as decoder:
+        for level in player.levels:
+            expected = decoder.positions(depth=level)
+            prepared = player.prepare_all(level)
+            order = list(range(len(expected)))
+            at_random = np.random.default_rng(level).permutation(len(expected))
+            for frame in [*order, *order[::-1], *at_random]:
+                assert np.array_equal(player.frame(prepared[::-1], float(frame)), expected[frame])
+
+
+def test_between_two_frames_is_their_blend_forwards_and_backwards(player):
+    for level in player.levels:
+        prepared = player.prepare_all(level)
+        places = np.linspace(0, player.info.frame_count, 60, endpoint=False)
+        forwards = [player.frame(prepared, place) for place in places]
+        backwards = [player.frame(prepared, place) for place in places[::-1]][::-1]
+        assert np.array_equal(forwards, backwards)
+        whole = np.array([player.frame(prepared, t) for t in range(player.info.frame_count)], np.float64)
+        scale = np.abs(whole).max()
+        for place, shown in zip(places, forwards):
+            i = int(place)
+            j = (i + 1) % player.info.frame_count
+            blended = whole[i] + (whole[j] - whole[i]) * (place - i)
+            assert np.allclose(shown, blended, rtol=0, atol=1e-6 * scale)
+
+
+def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
+    """The vertex shader of examples/play.c."""
+    rest = np.zeros((player.info.vertex_count, 3), np.float32)
+    core.ath_rest(player.address, FILE_ORDER, rest.ctypes.data, 12)
+    for level in player.levels:
+        parts, nodes, exact = cut(player, level)
+        assert [v for p in parts for v in range(p.first, p.first + p.count)] == list(range(len(rest)))
+        assert (nodes == 0) == (level == player.info.full_level_count - 1) and (exact == 0) == (level == 0)
+        prepared = player.prepare_all(level)
+        for frame in (0.0, 1.5, player.info.frame_count - 1.0, player.info.frame_count - 0.25):
+            matrices, points = Memory(48 * nodes), Memory(12 * exact)
+            show = player.at(prepared, frame)
+            assert core.ath_matrices(*show, matrices.address, 48) == OK
+            assert core.ath_exact(*show, points.address, 12) == OK
+            matrices.check()
+            points.check()
+            shaded = np.zeros_like(rest)
+            for p in parts:
+                own = slice(p.first, p.first + p.count)
+                if p.branch < 0:
+                    shaded[own] = points.bytes.view(np.float32).reshape(-1, 3)[p.index: p.index + p.count]
+                else:
+                    m = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index]
+                    shaded[own] = rest[own] @ m[:, :3].T + m[:, 3]
+            result, xyz = player.show(prepared, frame, FILE_ORDER)
+            assert result == OK and np.allclose(shaded, xyz, rtol=0, atol=4e-6 * np.abs(rest).max())
+
+
+def cut(player: Player, level: int) -> tuple[list[Part], int, int]:
+    """Parts, number of nodes, number of exact vertices."""
+    parts, nodes, exact = c_int32(), c_int32(), c_int32()
+    core.ath_cut_size(player.address, level, byref(parts), byref(nodes), byref(exact))
+    buffer = (Part * parts.value)()
+    core.ath_cut(player.address, level, buffer)
+    return list(buffer), nodes.value, exact.value
+
+
+def test_orders_strides_and_widths_hold_the_same_positions(player):
+    count = player.info.vertex_count
+    source = np.ctypeslib.as_array(core.ath_vertex_source(player.address), (count,))
+    for level in (0, player.levels[-1]):
+        prepared = player.prepare_all(level)
+        _, in_file_order = player.show(prepared, 3.25, FILE_ORDER)
+        in_source_order = player.frame(prepared, 3.25)
+        assert np.array_equal(in_source_order[source], in_file_order)
+        show = player.at(prepared, 3.25)
+        vertices, wide = Memory(20 * count), Memory(32 * count)
+        assert core.ath_positions(*show, SOURCE_ORDER, vertices.address, 20) == OK
+        assert core.ath_positions_wide(*show, SOURCE_ORDER, wide.address, 32) == OK
+        for memory in (vertices, wide):
+            memory.check()
+        for table in (vertices.bytes.view(np.float32).reshape(-1, 5), wide.bytes.view(np.float64).reshape(-1, 4)):
+            assert np.array_equal(table[:, :3].astype(np.float32), in_source_order) and not table[:, 3:].any()
+
+
+def test_between_segments_the_nearer_frame_that_is_there_is_held(player):
+    last, first = player.start_of(1) - 1, player.start_of(1)
+    fine, coarse = player.levels[-1], player.levels[-2]
+    before, after, other = player.prepare(0, fine), player.prepare(1, fine), player.prepare(1, coarse)
+    at = {frame: player.frame([before, after], frame) for frame in (last, first)}
+    coarse_first = player.frame([other], first)
+    for weight in (0.25, 0.75):
+        result, blended = player.show([None, after, before], last + weight)
+        assert result == OK and not any(np.array_equal(blended, xyz) for xyz in at.values())
+        for prepared, shown in (([before], at[last]), ([None, after], at[first]),
+                                ([before, other], at[last] if weight < 0.5 else coarse_first)):
+            result, xyz = player.show(prepared, last + weight)
+            assert result == HELD and np.array_equal(xyz, shown)
+        result, xyz = player.show([other, before, after], last + weight)
+        assert result == OK and np.array_equal(xyz, blended), "two of one level are there"
+
+
+def test_without_a_segment_that_has_the_frame_nothing_is_written(player):
+    first, unprepared, work = player.prepare(0, 0), player.room(0), player.work()
+    assert player.start(1, 0, work, unprepared) == OK
+    for prepared in ([], [None], [first], [first, unprepared]):
+        result, xyz = player.show(prepared, player.start_of(1))
+        assert result == NOT_PREPARED and np.isnan(xyz).all()
+
+
+# ---- time ----
+
+
+def frame_at(player: Player, seconds: float, wrap: int) -> float:
+    return core.ath_frame_at(player.address, seconds, wrap)
+
+
+def expected_frame(times: np.ndarray, seconds: float, wrap: int) -> float:
+    """The same in other words: unrolled tracks of frames over time, looked up by interpolation."""
+    last = len(times) - 1
+    length, step = times[-1], times[-1] / last
+    if wrap == CLAMP:
+        return np.interp(seconds, times, np.arange(last + 1))
+    if wrap == LOOP:
+        return np.interp(seconds % (length + step), [*times, length + step], np.arange(last + 2))
+    track = [*times, *(2 * length - times[-2::-1])], [*range(last + 1), *range(last - 1, -1, -1)]
+    return np.interp(seconds % (2 * length), *track)
+
+
+@pytest.mark.parametrize("wrap", [CLAMP, LOOP, PING_PONG], ids=["clamp", "loop", "ping-pong"])
+def test_time_is_clamped_looped_or_turned_back_with_uneven_steps_too(wrap, player):
+    times = np.ctypeslib.as_array(core.ath_times(player.address), (player.info.frame_count,))
+    times = times - times[0]
+    assert player.info.duration == times[-1]
+    for i in range(player.info.frame_count - 1):
+        assert frame_at(player, times[i], wrap) == i, "frames are hit exactly"
+    for seconds in np.linspace(-3.3, 4.1, 500) * times[-1]:
+        expected = expected_frame(times, seconds, wrap)
+        assert frame_at(player, seconds, wrap) == pytest.approx(expected, abs=1e-6)
+    for seconds in (float("nan"), float("inf"), float("-inf"), 1e300, -1e300):
+        assert 0 <= frame_at(player, seconds, wrap) <= player.info.frame_count - 1
+
+
+def test_the_times_of_the_uneven_clip_are_uneven(uneven):
+    times = np.ctypeslib.as_array(core.ath_times(uneven.address), (uneven.info.frame_count,))
+    assert np.ptp(np.diff(times)) > 1e-4
+
+
+def test_a_loop_blends_the_last_frame_into_the_first(player):
+    last = player.info.frame_count - 1
+    step = player.info.duration / last
+    place = frame_at(player, player.info.duration + step / 4, LOOP)
+    blend = core.ath_blend_at(player.address, place)
+    assert tuple(blend.frame) == (last, 0) and blend.weight == pytest.approx(0.25)
+    assert tuple(blend.segment) == (player.segments[-1], 0)
+    assert frame_at(player, player.info.duration + step / 4, CLAMP) == last
+
+
+def test_a_blend_names_the_segments_of_its_frames(player):
+    for frame in range(player.info.frame_count):
+        segment = core.ath_segment_of(player.address, frame)
+        assert player.start_of(segment) <= frame < player.start_of(segment + 1)
+        blend = core.ath_blend_at(player.address, float(frame))
+        assert (*blend.frame, *blend.segment, blend.weight) == (frame, frame, segment, segment, 0.0)
+    border = core.ath_blend_at(player.address, player.start_of(1) - 0.25)
+    assert tuple(border.segment) == (0, 1) and border.weight == 0.75
+
+
+# ---- level of detail ----
+
+
+def test_a_distance_asks_for_the_coarsest_level_whose_error_is_not_seen(player):
+    def depth_for(segment, distance, pixels=1.0):
+        return core.ath_depth_for(player.address, segment, distance, 1.0, 1080.0, pixels)
+
+    for segment in (-1, *player.segments):
+        error = c_double()
+        worst = []
+        for level in player.levels:
+            core.ath_level_error(player.address, level, segment, byref(error), None)
+            worst.append(error.value)
+        unit = 1080 / (2 * np.tan(0.5))
+        distances = np.geomspace(worst[-1] * unit / 10, worst[0] * unit * 10, 200)
+        depths = [depth_for(segment, distance) for distance in distances]
+        for distance, depth in zip(distances, depths):
+            under = [level for level in player.levels if worst[level] * unit / distance <= 1.0]
+            assert depth == (under[0] if under else player.levels[-1])
+            assert depth_for(segment, distance, 0.5) >= depth
+        assert (np.diff(depths) <= 0).all() and (depths[0], depths[-1]) == (player.levels[-1], 0)
+        for nowhere in (0.0, -1.0, float("nan")):
+            assert depth_for(segment, nowhere) == player.levels[-1]

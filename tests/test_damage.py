@@ -1,16 +1,18 @@
 """Damaged and hostile files: an error of errors.py or a played level, never a crash, a hang or a flood of memory.
 
-Damage by accident is met by the checksums. Malice repairs them: `Parts` takes a file to pieces and puts it together
-again with whatever a test has changed, checksums included.
+Damage by accident is met by the checksums. Malice repairs them: `Parts` takes a file to pieces and puts it
+together again with whatever a test has changed, checksums included. Whatever its front has become, the two that
+read it must agree: container.py, which says what is wrong, and the core.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import struct
 import time
 import tracemalloc
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 from io import BytesIO
 
 import numpy as np
@@ -19,61 +21,13 @@ import zstandard
 
 import athcodec
 from athcodec import container as ct
-from athcodec import entropy, errors
-from athcodec._native import crc32c
-from athcodec.container import Limits
+from athcodec import entropy, errors, player
+from athcodec.container import Container, Limits
 from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, FormatError, LevelUnavailable,
                              LimitExceeded, NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
+from files import Parts, header_fields, opened, with_checksum, with_header
 
 REFUSED = (FormatError, LevelUnavailable)
-HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-                 "segment_count level_count full_level_count clip_count flags max_error reserved").split()
-
-
-@dataclass
-class Parts:
-    """An .ath file in pieces."""
-
-    header: ct.Header
-    errors: np.ndarray
-    chunks: list[tuple[ct.Chunk, bytes]]
-
-    @classmethod
-    def of(cls, data: bytes) -> Parts:
-        container = ct.Container(BytesIO(data), strict=True)
-        return cls(container.header, container.errors, [(c, container.payload(c)) for c in container.chunks])
-
-    def file(self) -> bytes:
-        """The bytes of a file whose table and checksums fit its chunks."""
-        chunks = [ct.Chunk(c.kind, c.level, c.segment, len(data), crc32c(data), 0, c.clip) for c, data in self.chunks]
-        return ct.pack_front(replace(self.header), chunks, self.errors) + b"".join(data for _, data in self.chunks)
-
-    def index(self, kind: int, level: int | None = None, segment: int = 0) -> int:
-        return next(i for i, (c, _) in enumerate(self.chunks)
-                    if c.kind == kind and (level is None or (c.level, c.segment) == (level, segment)))
-
-    def payload(self, kind: int, level: int | None = None) -> bytes:
-        return self.chunks[self.index(kind, level)][1]
-
-    def with_payload(self, kind: int, data: bytes, level: int | None = None) -> bytes:
-        """The file with another content of one chunk."""
-        i = self.index(kind, level)
-        chunks = list(self.chunks)
-        chunks[i] = chunks[i][0], data
-        return Parts(self.header, self.errors, chunks).file()
-
-    def with_chunks(self, chunks: list) -> bytes:
-        return Parts(self.header, self.errors, chunks).file()
-
-
-def with_header(data: bytes, **fields) -> bytes:
-    """The file with other values in its header and a checksum that fits."""
-    values = dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data))) | fields
-    table = data[ct._HEADER.size: Parts.of(data).chunks[0][0].offset]
-    blank = ct._HEADER.pack(*(values | {"checksum": 0}).values())
-    values["checksum"] = crc32c(blank + table)
-    return ct._HEADER.pack(*values.values()) + data[ct._HEADER.size:]
-
 
 @pytest.fixture(scope="module")
 def data(full_ath) -> bytes:
@@ -90,10 +44,6 @@ def played(data) -> list[np.ndarray]:
     """Positions of every level."""
     decoder = athcodec.open(BytesIO(data))
     return [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
-
-
-def opened(data: bytes, **options) -> athcodec.Decoder:
-    return athcodec.open(BytesIO(data), **options)
 
 
 def check(data: bytes, **options) -> None:
@@ -193,6 +143,20 @@ def test_damaged_static_data_do_not_keep_the_motion_from_playing(parts, data, pl
             getattr(decoder, ask)
 
 
+def test_a_segment_that_was_refused_leaves_the_others_as_they_are(parts, data, played):
+    """Whatever was shown before, and however often it is asked for."""
+    last = len(played) - 1
+    for kind in (ct.STEMS, ct.AFFINES, ct.CORRECTIONS):
+        chunk = next(c for c, _ in parts.chunks if c.kind == kind and c.segment == 1)
+        decoder = opened(flipped(data, chunk.offset + chunk.length - 1))
+        (first, stop), depth = decoder.segments[0], last if kind != ct.AFFINES else chunk.level
+        for _ in range(2):
+            assert np.array_equal(decoder.positions(slice(first, stop), depth), played[depth][first:stop])
+            with pytest.raises(BadChecksum, match=f"{ct.KIND_NAMES[kind]} of level {chunk.level}, segment 1"):
+                decoder.positions(stop, depth)
+            assert np.array_equal(decoder.positions(0, 0), played[0][0])
+
+
 def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
     with pytest.raises(TrailingBytes, match=f"got {len(data) + 1} bytes; expected {len(data)}"):
         opened(data + b"\0", strict=True)
@@ -230,7 +194,7 @@ def test_a_header_field_out_of_range_is_refused(field, value, error, data):
                                    "full_level_count", "chunk_count", "flags"])
 def test_header_counts_that_are_off_by_a_little_are_refused_or_play(field, data):
     """Frame_Count 20 may become 21 without a contradiction; what comes out then is not the plant, but it comes out."""
-    value = dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data)))[field]
+    value = header_fields(data)[field]
     for other in {max(value + d, 0) for d in (-7, -2, -1, 1, 2, 100)}:
         use(with_header(data, **{field: other & (255 if "level" in field or field == "flags" else 2**32 - 1)}))
 
@@ -320,11 +284,138 @@ def test_a_chunk_that_must_be_there_is_missed_by_name(parts, played):
 def test_announced_errors_must_be_lengths(value, parts, data):
     errors_at = parts.chunks[0][0].offset - 8
     broken = data[:errors_at] + struct.pack("<f", value) + data[errors_at + 4:]
-    front = bytearray(broken[: errors_at + 8])
-    front[12:16] = bytes(4)
-    front[12:16] = struct.pack("<I", crc32c(bytes(front)))
     with pytest.raises(BadChunkTable, match="error table"):
-        opened(bytes(front) + broken[errors_at + 8:])
+        opened(with_checksum(broken[: errors_at + 8]) + broken[errors_at + 8:])
+
+
+# ---- fronts, read twice ----
+
+
+def struct_fields(form: struct.Struct) -> list[tuple[int, str]]:
+    """(offset, type) of each field."""
+    codes = re.findall(r"\d*[a-zA-Z]", form.format.lstrip("<"))
+    return [(struct.calcsize("<" + "".join(codes[:i])), "<" + code) for i, code in enumerate(codes)]
+
+
+def change_a_field(rng: np.random.Generator, record: bytearray, form: struct.Struct) -> None:
+    at, code = struct_fields(form)[rng.integers(len(struct_fields(form)))]
+    (value,) = struct.unpack_from(code, record, at)
+    size = struct.calcsize(code)
+    if code[-1] in "fd":
+        value = [np.nan, np.inf, -1.0, -0.0, 5e-324, value * 2][rng.integers(6)]
+    elif code[-1] == "s":
+        value = flipped(value, rng.integers(size))
+    else:
+        flip, largest = 1 << int(rng.integers(8 * size)), 256**size - 1
+        near = [0, 1, 2, value - 1, value + 1, value ^ flip, largest, largest // 2 + 1]
+        value = near[rng.integers(len(near))] % (largest + 1)
+    struct.pack_into(code, record, at, value)
+
+
+def spoilt_front(rng: np.random.Generator, data: bytes) -> bytes:
+    """The file with fields and entries of its front changed, mostly so that sums and counts still fit."""
+    tables_end = Parts.of(data).chunks[0][0].offset
+    header, count = bytearray(data[:64]), header_fields(data)["chunk_count"]
+    entries = [bytearray(data[at: at + 16]) for at in range(64, 64 + 16 * count, 16)]
+    announced = bytearray(data[64 + 16 * count: tables_end])
+    for _ in range(rng.integers(1, 4)):
+        way, i, j = rng.integers(6), *rng.integers(len(entries), size=2)
+        if way == 0:
+            change_a_field(rng, header, ct._HEADER)
+        elif way == 1:
+            change_a_field(rng, entries[i], ct._CHUNK)
+        elif way == 2:
+            at = 8 * int(rng.integers(len(announced) // 8))
+            entry = announced[at: at + 8]
+            change_a_field(rng, entry, ct._ERRORS)
+            announced[at: at + 8] = entry
+        elif way == 3:
+            entries[i], entries[j] = entries[j], entries[i]
+        elif way == 4:
+            entries.insert(i, bytearray(entries[j]))
+        else:
+            kind = rng.choice([0x8009, 0x8013, 0x801F, 0x8021, 0x0009, 0x8001])
+            place = (0, 0) if 16 <= kind & 0x7FFF < 32 else (255, 0)
+            entries.insert(i, bytearray(ct._CHUNK.pack(kind, 0, *place, 0, 0)))
+    lengths = sum(struct.unpack_from("<I", entry, 8)[0] for entry in entries)
+    if rng.random() < 0.9:
+        struct.pack_into("<I", header, 24, len(entries))
+    if rng.random() < 0.9:
+        struct.pack_into("<Q", header, 16, 64 + 16 * len(entries) + len(announced) + lengths)
+    front = bytes(header) + b"".join(entries) + bytes(announced)
+    return (with_checksum(front) if rng.random() < 0.95 else front) + data[tables_end:]
+
+
+def some_limits(rng: np.random.Generator) -> Limits:
+    """Mostly those by default; else one of the core's that may be too narrow, or wide."""
+    if rng.random() < 0.8:
+        return Limits()
+    names = [each.name for each in fields(Limits) if hasattr(player.Limits, each.name)]
+    return Limits(**{rng.choice(names): int(rng.choice([5, 12, 20, 200])) << int(rng.choice([0, 0, 20]))})
+
+
+def both_readings(data: bytes, limits: Limits) -> str:
+    """What container.py says of a front, once the core has said the same."""
+    core = player.Limits.of(limits)
+    try:
+        container = Container(BytesIO(data), limits=limits)
+    except FormatError as error:
+        with pytest.raises(player.PlayError) as caught:
+            player.File(data, core)
+        assert caught.value.code == (player.MISSING if type(error) is Truncated else error.code), error
+        return error.name
+    try:
+        file = player.File(container.prelude(), core)
+    except player.PlayError as error:
+        with pytest.raises(errors.error_class(error.code)):
+            opened(data, limits=limits)
+        return "refused for what is behind the front"
+    header, info = container.header, file.info
+    for name in (each.name for each in fields(ct.Header)):
+        assert getattr(info, name) == getattr(header, name)
+    assert info.prelude_length == container.prelude_length
+    names = ("kind", "level", "segment", "length", "checksum", "offset")
+    entries = [tuple(getattr(file._chunk(i), name) for name in names) for i in range(info.chunk_count)]
+    known = [entry for entry in entries if entry[0] in ct.KIND_NAMES]
+    assert known == [tuple(getattr(chunk, name) for name in names) for chunk in container.chunks]
+    return "opened"
+
+
+def read_spoilt_fronts(data: bytes, count: int, seed: int) -> set[str]:
+    rng = np.random.default_rng(seed)
+    seen = set()
+    for _ in range(count):
+        spoilt = spoilt_front(rng, data)
+        if rng.random() < 0.1:
+            spoilt = spoilt[: rng.integers(1, len(spoilt))]
+        seen.add(both_readings(spoilt, some_limits(rng)))
+    return seen
+
+
+ALL_READINGS = {"opened", "refused for what is behind the front", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION",
+                "TRUNCATED", "BAD_CHECKSUM", "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK",
+                "LIMIT_EXCEEDED"}
+
+
+def test_the_core_reads_a_front_as_the_container_does(data, parts):
+    assert both_readings(data, Limits()) == "opened"
+    still = parts.with_chunks([entry for entry in parts.chunks if not entry[0].is_motion])
+    assert both_readings(still, Limits()) == "refused for what is behind the front"
+    assert read_spoilt_fronts(data, 1500, seed=1) == ALL_READINGS
+
+
+@pytest.mark.slow
+def test_the_core_reads_many_fronts_as_the_container_does(data):
+    assert read_spoilt_fronts(data, 30_000, seed=2) == ALL_READINGS
+
+
+def test_the_core_asks_for_more_of_any_front_that_is_not_whole(data):
+    prelude = Container(BytesIO(data)).prelude_length
+    for size in range(prelude):
+        with pytest.raises(player.PlayError, match="MISSING") as caught:
+            player.File(data[:size], player.Limits.of(Limits()))
+        assert caught.value.code == player.MISSING == 66
+    assert player.File(data[:prelude], player.Limits.of(Limits())).info.file_length == len(data)
 
 
 # ---- hostile chunks ----
@@ -540,7 +631,7 @@ def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts
         head = ct.Rest(decoder.origin, 1.0, pose.dtype, stream, exact=True)
         return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
 
-    assert_whole_or_not_it(entropy.encode_exact_rest(decoder.plan.branches, pose), pose, decode)
+    assert_whole_or_not_it(entropy.encode_exact_rest(decoder.branches, pose), pose, decode)
 
 
 def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
@@ -631,6 +722,23 @@ def test_limits_that_just_hold_the_file_accept_it(data, parts):
     longest = max(len(payload) for _, payload in parts.chunks)
     check(data, limits=Limits(chunks=len(parts.chunks), vertices=12, branches=5, frames=20, attributes=2,
                               string_bytes=7, chunk_bytes=longest, decoded_chunk_bytes=94))
+
+
+def test_limits_that_no_file_reaches_accept_it(data):
+    check(data, limits=Limits(**{each.name: 1 << 80 for each in fields(Limits)}))
+
+
+def test_a_segment_that_takes_more_memory_than_the_limit_is_not_decoded(data):
+    """Though the file could be opened, which depends on its counts alone."""
+    header = header_fields(data)
+    frames = -(-header["frame_count"] // header["segment_count"])
+    least = header["vertex_count"] * (60 * frames + 512)
+    with pytest.raises(LimitExceeded, match=f"limit is {least - 1}"):
+        opened(data, limits=Limits(memory_bytes=least - 1))
+    decoder = opened(data, limits=Limits(memory_bytes=least))
+    assert decoder.rest.shape == (header["vertex_count"], 3)
+    with pytest.raises(LimitExceeded, match=f"level 0, segment 0.*limit is {least}"):
+        decoder.positions(0, 0)
 
 
 def test_small_chunks_that_unpack_to_much_are_refused_before_they_are_unpacked(parts):

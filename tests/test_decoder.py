@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 
 import numpy as np
@@ -10,10 +12,12 @@ import pytest
 from hypothesis import given, settings
 
 import athcodec
-from athcodec import Thresholds
-from athcodec._native import LOOSE
+from athcodec import Thresholds, player
 from athcodec import container as ct
+from athcodec._native import LOOSE
 from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
+from athcodec.transform import Plan
+from files import Parts, opened
 from plants import STEADY, awkward_plants, chain_plant, plant, tube
 
 
@@ -50,7 +54,7 @@ def size_of(source: np.ndarray) -> float:
 
 def base_pose(decoder) -> np.ndarray:
     """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
-    return decoder.plan.rest + decoder.origin
+    return decoder._player.rest()
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -115,14 +119,22 @@ def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants
             assert np.abs(homogeneous @ fit - shown).max() < 1e-6 * size_of(source)
 
 
-def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(played):
-    decoder, _ = played
-    last = decoder.level_count - 1
-    final = decoder.read_segment(1, last).pose(last, decoder.origin, decoder.dtype)
-    branch = decoder.hierarchy.vertex_branch()
-    for depth in range(1, last):
-        exact = np.isin(branch, decoder.plan.exact_branches(depth))
-        assert exact.any() and np.array_equal(decoder.segment_positions(1, depth)[exact], final[exact])
+@pytest.mark.parametrize("name", NAMES)
+def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name, plants):
+    parts = Parts.of(plants[name][0].read_bytes())
+    bare = opened(parts.without(ct.CORRECTIONS), strict=True)
+    with athcodec.open(plants[name][0]) as decoder:
+        last, order = decoder.level_count - 1, decoder.hierarchy.vertex_source
+        final = bare.positions(depth=last)[:, order]
+        assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
+        assert not np.array_equal(final, decoder.positions(depth=last)[:, order])
+        branch = decoder.hierarchy.vertex_branch()
+        for depth in range(1, last):
+            exact = np.isin(branch, Plan(decoder.branches, decoder.vertex_count).exact_branches(depth))
+            shown = decoder.affines(0, depth)
+            assert np.array_equal(exact, np.repeat(shown.is_stem, shown.vertex_count))
+            positions = decoder.positions(depth=depth)[:, order]
+            assert exact.any() and np.array_equal(positions[:, exact], final[:, exact])
 
 
 # ---- maps ----
@@ -155,7 +167,7 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
-    assert not (decoder.plan.branches["flags"] & LOOSE).any()
+    assert not (decoder.branches["flags"] & LOOSE).any()
     pose, hierarchy = base_pose(decoder), decoder.hierarchy
     attached = 0
     for depth in range(decoder.level_count - 1):
@@ -234,10 +246,24 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         before = decoder.bytes_read
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
-        allowed = {(c.offset, c.offset + c.length) for c in decoder.container.chunks
-                   if c.is_motion and c.level <= level and c.segment == 1}
-        assert file.ranges and set(file.ranges) <= allowed
-        assert decoder.bytes_read - before == sum(stop - start for start, stop in file.ranges)
+        allowed = {c for c in decoder.container.chunks if c.is_motion and c.level <= level and c.segment == 1}
+        read = chunks_read(file, decoder)
+        needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}
+        assert needed and needed <= read <= allowed
+        assert decoder.bytes_read - before == sum(chunk.length for chunk in read)
+
+
+def chunks_read(file: Recorder, decoder) -> set:
+    """Those whose bytes were all read, each once, where nothing else was read."""
+    times = np.zeros(decoder.file_length, int)
+    for start, stop in file.ranges:
+        times[start:stop] += 1
+    read = {c for c in decoder.container.chunks if c.length and times[c.offset: c.offset + c.length].any()}
+    expected = np.zeros(decoder.file_length, int)
+    for chunk in read:
+        expected[chunk.offset: chunk.offset + chunk.length] = 1
+    assert np.array_equal(times, expected)
+    return read
 
 
 def test_the_last_level_reads_no_maps_of_subtrees(plants):
@@ -245,8 +271,93 @@ def test_the_last_level_reads_no_maps_of_subtrees(plants):
     decoder = athcodec.open(file)
     file.ranges.clear()
     decoder.positions(0)
-    kinds = {c.kind for c in decoder.container.chunks if (c.offset, c.offset + c.length) in file.ranges}
+    kinds = {chunk.kind for chunk in chunks_read(file, decoder)}
     assert ct.STEMS in kinds and ct.AFFINES not in kinds
+
+
+def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeypatch):
+    """Forwards, backwards, as maps, in any type of numbers; another segment, or level, is prepared anew."""
+    decoder, _ = played
+    prepared = []
+    prepare = player.File.prepare
+    monkeypatch.setattr(player.File, "prepare", lambda file, work, segment, level, into: (
+        prepared.append((segment, level)), prepare(file, work, segment, level, into)))
+    (first, stop), last = decoder.segments[1], decoder.level_count - 1
+    decoder.positions(first, last)
+    before = decoder.bytes_read
+    for frame in (*range(first, stop), *reversed(range(first, stop))):
+        decoder.positions(frame, last)
+        decoder.positions(frame, last, np.float64)
+    decoder.positions(slice(first, stop), last)
+    decoder.affines(first, last)
+    list(decoder.blocks(last, frames=slice(first, stop)))
+    assert prepared == [(1, last)] and decoder.bytes_read == before
+    decoder.positions(0, last)
+    decoder.positions(first, 0)
+    decoder.positions(stop - 1, last)
+    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.bytes_read > before
+
+
+def test_several_threads_at_once_see_what_one_alone_does(played):
+    decoder, _ = played
+    alone = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+    maps = [decoder.affines(5, depth).matrices for depth in range(decoder.level_count)]
+
+    def watch(seed: int) -> int:
+        """Frames, runs of frames and maps of any level, at random; how many were looked at."""
+        rng = np.random.default_rng(seed)
+        for _ in range(40):
+            depth, frame = int(rng.integers(decoder.level_count)), int(rng.integers(decoder.frame_count))
+            run = slice(frame, frame + int(rng.integers(1, 20)))
+            assert np.array_equal(decoder.positions(frame, depth), alone[depth][frame])
+            assert np.array_equal(decoder.positions(run, depth), alone[depth][run])
+            assert np.array_equal(decoder.affines(5, depth).matrices, maps[depth])
+        return 40
+
+    with ThreadPoolExecutor(6) as threads:
+        assert list(threads.map(watch, range(6))) == [40] * 6
+
+
+class Sluggish(BytesIO):
+    """A file that lets other threads in between a seek and the read that it is for."""
+
+    def seek(self, *place):
+        result = super().seek(*place)
+        time.sleep(1e-5)
+        return result
+
+
+def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip, full_ath):
+    decoder = athcodec.open(Sluggish(full_ath.read_bytes()))
+    frames = decoder.positions()
+
+    def watch(seed: int) -> None:
+        for frame in np.random.default_rng(seed).integers(decoder.frame_count, size=100):
+            assert np.array_equal(decoder.positions(frame), frames[frame])
+
+    def read(_) -> None:
+        for _ in range(10):
+            decoder.check()
+            for name in ("attributes", "metadata", "faces", "edges"):
+                vars(decoder).pop(name)   # remembered otherwise
+            assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
+            assert decoder.metadata == full_clip.metadata
+
+    with ThreadPoolExecutor(3) as threads:
+        for done in [threads.submit(do, seed) for seed, do in enumerate((watch, read, watch))]:
+            done.result()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_positions_of_another_type_are_the_files_own_in_that_type(dtype, tmp_path):
+    athcodec.encode(plant(seed=3, branches=8, frames=12, dtype=dtype), tmp_path / "p.ath", effort="fast")
+    with athcodec.open(tmp_path / "p.ath") as decoder:
+        for depth in range(decoder.level_count):
+            own = decoder.positions(depth=depth)
+            assert own.dtype == decoder.dtype == dtype
+            for other in (np.float16, np.float32, np.float64, ">f4", ">f8"):
+                shown = decoder.positions(depth=depth, dtype=other)
+                assert shown.dtype == np.dtype(other) and np.array_equal(shown, own.astype(other))
 
 
 def test_attributes_are_read_when_asked_for(full_ath):
@@ -367,7 +478,7 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
             residual = decoder.residual(17, depth)[hierarchy.vertex_source]
             assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < 1e-9 * size
             branch = hierarchy.vertex_branch()[parts.first_vertex]
-            loose = decoder.plan.branches["flags"][branch] & LOOSE > 0
+            loose = decoder.branches["flags"][branch] & LOOSE > 0
             hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]

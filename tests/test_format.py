@@ -1,8 +1,8 @@
 """FORMAT.md against the code: its tables, its dumps, and its pseudo-code, which is run.
 
 The Python blocks of FORMAT.md form a decoder. Executed as they stand, they have to give every bit that the
-package gives, on files that use all features. Claims about limits, names and offsets are read from the
-document's tables.
+package gives, on files that use all features; what they make of a single stream, the package makes of a file
+around it. Claims about limits, names and offsets are read from the document's tables.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import io
 import math
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,6 +25,7 @@ import athcodec
 from athcodec import MotionClip, container, entropy, errors
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, crc32c
 from athcodec.transform import LevelStream, Plan, SegmentMotion
+from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 TEXT = FORMAT.read_text(encoding="utf-8")
@@ -194,11 +196,12 @@ def test_worked_example_decodes_step_by_step(spec):
 
 @pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
 def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
-    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32), 8) + change
+    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32), 8)
+    assert spec.decode_temporal(stream, 1, 3, 8) == [read_basis(stream, 3)] == [[0, 3, -20]]
     with pytest.raises(spec.Invalid):
-        spec.decode_temporal(stream, 1, 3, 8)
+        spec.decode_temporal(stream + change, 1, 3, 8)
     with pytest.raises(errors.BadChunk):
-        entropy.decode_temporal(stream, 1, 3, 8, "here")
+        read_basis(stream + change, 3)
 
 
 def test_shuffle_of_the_document_restores_an_array(spec):
@@ -231,13 +234,107 @@ def test_random_decisions_mean_the_same_to_the_document_and_the_code(spec, seed)
         rows, *sources = spec.decode_hierarchy(stream, branches, vertices)
         return [[getattr(row, name) for name in fields] for row in rows], *sources
 
-    def by_code(stream):
-        rows, *sources = entropy.decode_hierarchy(stream, branches, vertices)
-        return [[int(row[name]) for name in fields] for row in rows], *(x.tolist() for x in sources)
-
     for _ in range(20):
         stream = random_stream(spec, random, "decode_hierarchy", branches, vertices)
-        assert outcome(spec, by_document, stream) == outcome(spec, by_code, stream)
+        document = outcome(spec, by_document, stream)
+        like = roots(vertices + 1 - branches, *[1] * (branches - 1))
+        if document != "invalid":
+            for name, column in zip(fields, zip(*document[0])):
+                like[name] = column
+        assert document == outcome(spec, lambda stream: read_hierarchy(stream, like, fields), stream)
+
+
+# ---- single streams in the least file around them ----
+
+
+@contextmanager
+def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
+    """A file that plays to its end, or raises BadChunk for the one chunk that a test is about."""
+    try:
+        with opened(data, strict=True) as decoder:
+            decoder.check()
+            yield decoder
+    except errors.BadChunk as error:
+        assert str(error).startswith(f"chunk {container.KIND_NAMES[kind]} ")
+        raise
+
+
+def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
+    """Fields of the branches, and both permutations, in a file that else fits branches `like` those."""
+    with played(still_file(branches=like, hierarchy=hierarchy_chunk(stream)), container.HIERARCHY) as decoder:
+        numbers = decoder.hierarchy
+        assert not decoder.positions().any()
+        rows = [[int(row[name]) for name in fields] for row in decoder.branches]
+        return rows, numbers.branch_source.tolist(), numbers.vertex_source.tolist()
+
+
+def read_exact_rest(stream: bytes, branches: np.ndarray, dtype: type) -> np.ndarray:
+    """From a file that is opened and not played: what its motion has to hold depends on the rest pose."""
+    data = still_file(branches=branches, rest=exact_rest_chunk(stream, dtype))
+    try:
+        with opened(data, strict=True) as decoder:
+            return decoder.rest
+    except errors.BadChunk as error:
+        assert str(error).startswith("chunk REST ")
+        raise
+
+
+def read_times(stream: bytes, frame_count: int) -> np.ndarray:
+    with played(still_file(frame_count, time=container.pack_time(stream)), container.TIME) as decoder:
+        return decoder.time
+
+
+def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
+    """A learned basis of one row, which moves a vertex along x."""
+    with played(still_file(frames, stems=basis_chunk(stream, frames, bits)), container.STEMS) as decoder:
+        return decoder.positions()[:, 0, 0].tolist()
+
+
+# ---- decisions made by chance ----
+
+
+
+@pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS])
+@pytest.mark.parametrize("seed", range(6))
+def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
+    """On every level: the positions that they give, or that they are invalid."""
+    parts = Parts.of(Sapling(seed).file())
+    random = np.random.default_rng(seed)
+    for i, (chunk, payload) in enumerate(parts.chunks):
+        if chunk.kind != kind:
+            continue
+        head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4}[kind]
+        stream = random_stream(spec, random, *motion_function(spec, parts, chunk))
+        data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1:]])
+        for level in range(chunk.level, parts.header.level_count):
+            document = outcome(spec, lambda data: spec.decode(data, level), data)
+            code = outcome(spec, lambda data: opened(data).positions(depth=level), data)
+            assert_same_numbers(document, code)
+
+
+def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk) -> tuple:
+    """The name of the document's function that reads a chunk's stream, and its other arguments."""
+    frames = parts.header.frame_count
+    if chunk.kind == container.CORRECTIONS:
+        return "decode_corrections", parts.header.vertex_count, frames
+    _, chunks = spec.parse_front(parts.file())
+    branches, *_ = spec.decode_hierarchy(spec.content(chunks, 1)[16:], parts.header.branch_count,
+                                         parts.header.vertex_count)
+    rest = spec.content(chunks, 2)
+    plan = spec.make_plan(branches, spec.decode_rest(rest[36:], branches, spec.f64(rest, 28)))
+    motion = spec.decode_motion(chunks, plan, 0, frames, chunk.level)
+    name = "decode_stems" if chunk.kind == container.STEMS else "decode_affines"
+    return name, plan, motion, chunk.level
+
+
+def assert_same_numbers(document: object, code: object) -> None:
+    """The same bits, but for those of a NaN, or both "invalid"."""
+    if isinstance(document, str) or isinstance(code, str):
+        assert isinstance(document, str) and isinstance(code, str)
+    else:
+        expected = np.array(document, code.dtype)
+        assert np.array_equal(np.isnan(expected), np.isnan(code))
+        assert np.nan_to_num(expected, nan=0.0).tobytes() == np.nan_to_num(code, nan=0.0).tobytes()
 
 
 def random_stream(spec: SimpleNamespace, random: np.random.Generator, name: str, *arguments: object) -> bytes:
@@ -305,7 +402,8 @@ def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed,
     file = HandMade(seed, False, None)
     pose = awkward_numbers(np.random.default_rng(seed), file.rest.size, dtype).reshape(-1, 3)
     stream = entropy.encode_exact_rest(file.branches, pose)
-    assert entropy.decode_exact_rest(stream, file.branches, len(pose), pose.dtype).tobytes() == pose.tobytes()
+    read = read_exact_rest(stream, file.branches, dtype)
+    assert read.dtype == dtype and read.tobytes() == pose.tobytes()
     got = spec.decode_exact_rest(stream, stems(spec, file.branches), dtype is np.float64)
     assert np.array(got, dtype).tobytes() == pose.tobytes()
 
@@ -313,25 +411,31 @@ def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed,
 @pytest.mark.parametrize("seed", range(5))
 def test_times_come_back_bit_for_bit_by_document_and_code(spec, seed):
     random = np.random.default_rng(seed)
-    for times in awkward_numbers(random, 50, np.float64), np.logspace(-300, 300, 40 + seed):
+    numbers = awkward_numbers(random, 50, np.float64)
+    stream = entropy.encode_times(numbers)
+    assert np.array(spec.decode_times(stream, 50)).tobytes() == numbers.tobytes()
+    assert outcome(spec, lambda data: read_times(data, 50), stream) == "invalid", "they do not ascend"
+    for times in np.unique(numbers), np.logspace(-300, 300, 40 + seed):
         stream = entropy.encode_times(times)
-        assert entropy.decode_times(stream, len(times)).tobytes() == times.tobytes()
+        assert read_times(stream, len(times)).tobytes() == times.tobytes()
         assert np.array(spec.decode_times(stream, len(times))).tobytes() == times.tobytes()
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_the_code(spec, seed):
+    """Times of a few frames now and then ascend, those of 40 never do."""
     random = np.random.default_rng(seed)
     file = HandMade(seed, False, None)
     rows = stems(spec, file.branches)
-    assert_same_outcome(spec, random_stream(spec, random, "decode_times", 40),
-                        lambda stream: np.array(spec.decode_times(stream, 40)),
-                        lambda stream: entropy.decode_times(stream, 40))
+    for count in (1, 1, 2, 2, 2, 3, 3, 3, 40):
+        assert_same_outcome(spec, random_stream(spec, random, "decode_times", count),
+                            lambda stream: np.array(spec.frame_times(container.pack_time(stream), count)),
+                            lambda stream: read_times(stream, count))
     for dtype, n in NUMBERS.items():
         assert_same_outcome(
             spec, random_stream(spec, random, "decode_exact_rest", rows, n == 64),
             lambda stream: np.array(spec.decode_exact_rest(stream, rows, n == 64), dtype),
-            lambda stream: entropy.decode_exact_rest(stream, file.branches, file.vertex_count, dtype))
+            lambda stream: read_exact_rest(stream, file.branches, dtype))
 
 
 def assert_same_outcome(spec: SimpleNamespace, stream: bytes, *decoders: Callable) -> None:
@@ -363,24 +467,43 @@ def one_vertex(spec: SimpleNamespace) -> list:
 def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, negative, valid):
     """Downwards there is one number more: -0.0."""
     stream = exact_stream(spec, n, (INFINITY[n] + beyond, negative))
-    branches = np.zeros(1, BRANCH)
-    branches["count"], branches["attach"] = 1, -1
     number = float(np.finfo(dtype).min if negative else np.finfo(dtype).max)
     for decode in (lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),
-                   lambda data: entropy.decode_exact_rest(data, branches, 1, dtype).tolist()):
+                   lambda data: read_exact_rest(data, roots(1), dtype).tolist()):
         assert outcome(spec, decode, stream) == ([[number, 0.0, 0.0]] if valid else "invalid")
 
 
 def test_differences_wrap_around(spec):
     """From 1.0 half of all numbers away, by either sign, and by magnitudes that no encoder needs."""
-    half, one = 1 << 63, 0x3FF << 52  # less 0.0
+    half = 1 << 63
     opposite = math.nextafter(-4.0, 0.0)
     for magnitude, negative, number in (
             (half, False, opposite), (half, True, opposite), (half + 1, False, math.nextafter(opposite, 0.0)),
             (half + 1, True, -4.0), (2 * half - 1, True, math.nextafter(1.0, 2.0))):
-        made = iter(decisions(64, one) + decisions(64, magnitude, negative))
-        stream = stream_of(spec, lambda: next(made), "decode_times", 2)
-        assert spec.decode_times(stream, 2) == entropy.decode_times(stream, 2).tolist() == [1.0, number]
+        there, back = decisions(64, magnitude, negative), decisions(64, magnitude, not negative)
+        assert two_numbers(spec, from_zero(spec, 1.0), there) == [1.0, number]
+        assert two_numbers(spec, from_zero(spec, number), back) == [number, 1.0]
+
+
+def from_zero(spec: SimpleNamespace, number: float) -> list[int]:
+    """Decisions of a number where 0.0 is expected."""
+    at, zero = (spec.ordered(spec.to_bits(x, 64), 64) for x in (number, 0.0))
+    return decisions(64, abs(at - zero), at < zero)
+
+
+def two_numbers(spec: SimpleNamespace, first: list[int], second: list[int]) -> list[float]:
+    """What document and code make of these decisions: x of a stem's two vertices, and times that ascend."""
+    made = iter(first + second)
+    stream = stream_of(spec, lambda: next(made), "decode_times", 2)
+    numbers = spec.decode_times(stream, 2)
+    if numbers[0] < numbers[1]:
+        assert read_times(stream, 2).tolist() == numbers
+    stem, zeros = roots(2), 2 * decisions(64, 0)
+    made = iter(first + zeros + second + zeros)
+    stream = stream_of(spec, lambda: next(made), "decode_exact_rest", stems(spec, stem), True)
+    rest = spec.decode_exact_rest(stream, stems(spec, stem), True)
+    assert rest == read_exact_rest(stream, stem, np.float64).tolist() == [[x, 0.0, 0.0] for x in numbers]
+    return numbers
 
 
 def outcome(spec: SimpleNamespace, decode, stream: bytes) -> object:
@@ -420,11 +543,7 @@ def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
                                            ([0, -129], False), ([0, 1 << 20], False)])
 def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
     stream = entropy.encode_temporal(np.array([values], np.int32), 30)
-
-    def by_code(data):
-        return entropy.decode_temporal(data, 1, 2, 8, "here").tolist()
-
-    for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), by_code:
+    for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), lambda data: [read_basis(data, 2)]:
         assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
 
 
@@ -594,3 +713,14 @@ class HandMade:
         vertex, frame = np.nonzero(vectors.any(axis=2))
         rows = np.column_stack([vertex, frame, vectors[vertex, frame]]).astype(np.int32)
         return entropy.encode_corrections(rows, self.vertex_count, frames)
+
+
+class Sapling(HandMade):
+    """A small one in one segment, cosines alone."""
+
+    SEGMENTS, FRAMES = 1, 9
+    BRANCHES = ((-1, 3, 0), (0, 4, SHEET), (1, 2, 0), (0, 2, LOOSE), (3, 1, WHOLE), (4, 2, 0))
+
+    def __init__(self, seed: int):
+        super().__init__(seed, bool(seed % 2), None, self.BRANCHES)
+        self.bases = {}

@@ -13,11 +13,12 @@ import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec import container as ct
 from athcodec import entropy
-from athcodec.decoder import read_time
 from athcodec.encoder import time_chunk
 from athcodec.hierarchy import derived_edges, hierarchy_of
 from athcodec.quantize import least_bound
+from files import opened, still_file
 from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bush, chain_plant, clip_of, plant, tube
+
 
 def largest_error(decoded: np.ndarray, clip: MotionClip) -> float:
     source = clip.block(0, clip.frame_count).astype(np.float64)
@@ -194,8 +195,9 @@ def test_vertices_and_branches_numbered_at_random_come_back_in_their_order(scrat
 @example([i * 0.04 for i in range(12)]).via("frame number times step")
 def test_times_come_back_exactly(times):
     time = np.unique(times)
-    assert np.array_equal(read_time(time_chunk(time), len(time)), time)
-    assert entropy.decode_times(entropy.encode_times(time), len(time)).tobytes() == time.tobytes()
+    assert np.array_equal(opened(still_file(len(time), time=time_chunk(time))).time, time)
+    number_by_number = ct.pack_time(entropy.encode_times(time))
+    assert opened(still_file(len(time), time=number_by_number)).time.tobytes() == time.tobytes()
 
 
 @pytest.mark.parametrize("origin", [0.0, 3.5])

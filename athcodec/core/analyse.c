@@ -1,6 +1,6 @@
 /* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
  * decoder will have of its parent. Encoder only. */
-#include "motion.h"
+#include "encode.h"
 
 enum { ROTATION_STEPS = 5 };
 
@@ -73,11 +73,11 @@ static void code_track(const ath_stream *stream, int32_t T, double step, double 
                 quantised[axis * T + k] = quantise(units[axis][k], dead_zone);
     drop_lone_ones(T, stream->temporal_rank, units, quantised);
     for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, step, quantised + axis * T, track + axis * T);
+        ath_inverse_temporal(stream, T, stream->temporal_rank, step, quantised + axis * T, track + axis * T);
 }
 
 /* out = R^T (x - c) */
-ATH_HOT static void into_rest_space(int32_t T, const ath_frames *at, const double *x, double *restrict out)
+ATH_HOT static void into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
 {
     const double *R = at->rotation, *c = at->point;
     for (int32_t t = 0; t < T; t++) {
@@ -134,7 +134,7 @@ static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece,
 }
 
 ATH_HOT static void project(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local,
-                            double *restrict rows)
+                            double *ATH_RESTRICT rows)
 {
     for (int32_t m = 0; m < piece->rank; m++) {
         const double *mode = shape->bases + piece->basis + (size_t)m * (size_t)piece->count;
@@ -167,43 +167,53 @@ static void subtract_rest(const ath_shape *shape, int32_t T, const ath_piece *pi
     }
 }
 
-static void analyse_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch,
-                          const double *source, double dead_zone)
+/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. */
+static void analyse_tracks(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+                           const ath_piece_rows *rows, const ath_scratch *scratch, const double *source,
+                           double dead_zone, double *local)
 {
-    const ath_piece *piece = shape->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
+    double omega_step = ath_omega_step(shape, piece, base);
     ath_attach(shape, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
         const double *a = ath_rest_attach(shape, piece), *x0 = ath_rest_of(shape, piece->first);
         for (int32_t i = 0; i < 3 * T; i++)
             scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
-        code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, ath_shift_track(motion, p));
+        code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->shift);
         ath_move_point(T, scratch->track, scratch->at.point);
     }
-    double *local = scratch->placed;
-    double omega_step = ath_omega_step(shape, piece, base);
     to_local(T, piece, &scratch->at, source, local);
     if (omega_step > 0.0) {
         fit_omega(shape, T, piece, local, scratch->track);
-        code_track(base, T, omega_step, dead_zone, scratch->track, ath_omega_track(motion, p));
+        code_track(base, T, omega_step, dead_zone, scratch->track, rows->omega);
         ath_turn(T, scratch->track, scratch->at.rotation);
         to_local(T, piece, &scratch->at, source, local);
     }
-    subtract_rest(shape, T, piece, local);
-    project(shape, T, piece, local, scratch->rows);
-    for (int32_t m = 0; m < piece->rank; m++)
-        code_track(ath_mode_stream(motion, piece, m), T, ath_mode_step(motion, piece, m), dead_zone,
-                   scratch->rows + (size_t)m * 3 * (size_t)T, ath_coefficients_of(motion, piece->first + m));
-    ath_place(shape, motion, piece, scratch);
-    ath_carry(shape, motion, piece, scratch);
 }
 
-void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double *source, double dead_zone)
+static void analyse_piece(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t p,
+                          const ath_scratch *scratch, const double *source, double dead_zone)
 {
-    ath_scratch scratch = ath_motion_scratch(motion);
-    for (int32_t p = 0; p < shape->piece_count; p++) analyse_piece(shape, motion, p, &scratch, source, dead_zone);
+    const ath_piece *piece = shape->pieces + p;
+    ath_piece_rows rows = ath_rows_of_piece(shape, integers, motion->frames, p);
+    int32_t T = motion->frames;
+    analyse_tracks(shape, motion, piece, &rows, scratch, source, dead_zone, scratch->placed);
+    subtract_rest(shape, T, piece, scratch->placed);
+    project(shape, T, piece, scratch->placed, scratch->rows);
+    for (int32_t m = 0; m < piece->rank; m++)
+        code_track(ath_mode_stream(motion, piece, m), T, ath_mode_step(motion, piece, m), dead_zone,
+                   scratch->rows + (size_t)m * 3 * (size_t)T, ath_row(rows.modes, m, T));
+    ath_pose_rows(shape, motion, p, scratch);
+}
+
+void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, const double *source,
+                 double dead_zone)
+{
+    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    for (int32_t p = 0; p < shape->piece_count; p++)
+        analyse_piece(shape, motion, integers, p, &scratch, source, dead_zone);
 }
 
 /* Means over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of
@@ -258,10 +268,10 @@ static int32_t half_octaves(double step)
     return step >= 1.4142135623730951 ? exponent + 1 : exponent;
 }
 
-static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch,
-                         const double *source, double level_step, double dead_zone)
+static void analyse_node(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
+                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source,
+                         double level_step, double dead_zone)
 {
-    const ath_node *node = shape->nodes + n;
     const ath_piece *piece = shape->pieces + node->piece;
     int32_t T = motion->frames;
     double *tracks = scratch->rows, centre[3];
@@ -269,19 +279,21 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, int32
     ath_attach(shape, motion, piece, scratch->at);
     node_moments(shape, node, T, scratch, source, tracks, centre);
     fit_node(node, free_base, T, tracks, centre);
-    motion->node_steps[n] = half_octaves(level_step / ath_sqrt((double)node->count));
-    double step = ath_node_step(motion, n);
+    *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
+    double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, ath_node_track(motion, n, r));
-    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_node_track(motion, n, 3));
+        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, ath_row(rows->rows, r, T));
+    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_row(rows->rows, 3, T));
 }
 
-void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source,
-                       const double *level_steps, double dead_zone)
+void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+                       const double *source, const double *level_steps, double dead_zone)
 {
-    ath_scratch scratch = ath_motion_scratch(motion);
-    for (int32_t n = 0; n < shape->node_count; n++)
-        if (shape->nodes[n].coded)
-            analyse_node(shape, motion, n, &scratch, source, level_steps[shape->nodes[n].level], dead_zone);
+    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    for (int32_t n = 0; n < shape->node_count; n++) {
+        const ath_node *node = shape->nodes + n;
+        ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
+        if (node->coded) analyse_node(shape, motion, node, &rows, &scratch, source, level_steps[node->level], dead_zone);
+    }
 }

@@ -1,14 +1,31 @@
-/* athcodec: the C API.
+/* athcodec: plays .ath files. This header is the whole public C API; FORMAT.md describes the files.
  *
- * Decoding runs the stages of FORMAT.md one by one: the hierarchy and the rest pose make a plan (pieces, nodes, bases)
- * that every segment shares; a segment's streams make integers; the integers make positions. Nothing here allocates,
- * recurses or keeps state: the caller owns every buffer, sizes come from the functions that say so, and functions on
- * different buffers may run in parallel. Functions that read bytes return ATH_OK or a code of ath_result; they never
- * read beyond `size` nor write beyond what the counts given say. Units are those of the scene; lengths of time are
- * frames; matrices are row-major.
+ *     ath_front -> ath_open -> ath_build        once per file: header, hierarchy, rest pose
+ *     ath_ranges, ath_feed                      which bytes a level needs; here they are
+ *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
+ *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
+ *     ath_depth_for                             which level to draw at a distance
  *
- * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at
- * (v * 3 + axis) * T + t. Vertices are in file order. */
+ * Memory. Nothing here allocates, and there are no globals: the caller asks for a size, provides that many bytes,
+ * aligned to 16, and keeps them while they are in use. Objects are freed by freeing their memory. An ath_file holds
+ * pointers into the bytes that it was fed: these stay where they are until they are fed anew or dropped.
+ *
+ * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time;
+ * any number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop need the ath_file
+ * to themselves.
+ *
+ * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need
+ * no more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over
+ * are trusted, unless a function says what it returns for bad ones.
+ *
+ * Units and layout. Positions and errors are in the file's scene units, time is in seconds, frames count from 0.
+ * Matrices are 3x4, row-major: x' = m[0] x + m[1] y + m[2] z + m[3] and so on. Vertices, branches and nodes come in
+ * file order unless an ath_order says otherwise: every subtree is one range of vertices there.
+ *
+ * Exactness. Decoded positions have the same bits on every machine, in WebAssembly and in Python, at whole frames and
+ * between them. Compile without contraction to FMA (-ffp-contract=off), without -ffast-math.
+ *
+ * Needs memcpy, memmove and memset, and sqrt as an instruction (-fno-math-errno); nothing else. C11 or C++17. */
 #ifndef ATH_H
 #define ATH_H
 
@@ -19,212 +36,266 @@
 extern "C" {
 #endif
 
-#if defined(_WIN32)
+#if defined(ATH_STATIC)
+#define ATH_API
+#elif defined(_WIN32) && defined(ATH_BUILDING)
 #define ATH_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define ATH_API __declspec(dllimport)
 #elif defined(__GNUC__)
 #define ATH_API __attribute__((visibility("default")))
 #else
 #define ATH_API
 #endif
 
-enum {
-    ATH_PIECE_VERTICES = 64,   /* longest piece of a stem */
-    ATH_SEGMENT_FRAMES = 256   /* longest segment */
-};
+/* ---- results ---------------------------------------------------------------------------------------------------- */
 
+/* Codes below 64 are errors of a file: the table of FORMAT.md, "Errors", and of errors.py. They never change. Those
+ * from 64 on are about a call. */
 typedef enum ath_result {
     ATH_OK = 0,
-    ATH_BAD_STREAM = 1    /* a stream's content is not valid */
+    ATH_INVALID = 1,
+    ATH_NOT_AN_ATH_FILE = 2,
+    ATH_UNSUPPORTED_VERSION = 3,
+    ATH_TRUNCATED = 4,
+    ATH_BAD_CHECKSUM = 5,
+    ATH_BAD_HEADER = 6,
+    ATH_BAD_CHUNK_TABLE = 7,
+    ATH_UNKNOWN_CHUNK = 8,
+    ATH_BAD_CHUNK = 9,
+    ATH_LIMIT_EXCEEDED = 10,
+    ATH_TRAILING_BYTES = 11,
+    ATH_MORE = 64,         /* not an error: there is more to do, call again */
+    ATH_HELD = 65,         /* not an error: the frame to blend with is not prepared, the nearer one is shown */
+    ATH_MISSING = 66,      /* bytes that this needs have not been fed */
+    ATH_NOT_PREPARED = 67, /* no segment that was handed over has this frame, or what there is at two levels */
+    ATH_NO_MEMORY = 68,    /* the memory is smaller than was asked for, or not aligned to 16 */
+    ATH_BAD_ARGUMENT = 69  /* a level or segment that the file does not have */
 } ath_result;
+
+/* The code's name in FORMAT.md, such as "BAD_CHUNK"; "UNKNOWN" for no code. */
+ATH_API const char *ath_result_name(int result);
+
+/* ---- opening ---------------------------------------------------------------------------------------------------- */
+
+typedef struct ath_file ath_file;       /* an opened file */
+typedef struct ath_work ath_work;       /* scratch memory and state of one preparation at a time */
+typedef struct ath_segment ath_segment; /* one prepared segment at one level */
+
+/* What a file may ask for; FORMAT.md, "Limits", gives the defaults. */
+typedef struct ath_limits {
+    uint32_t chunks, table_bytes, vertices, branches, frames, hierarchy_depth, chunk_bytes;
+    uint32_t reserved;
+    uint64_t memory_bytes;
+} ath_limits;
+
+ATH_API void ath_default_limits(ath_limits *limits);
+
+/* Looks at the front of a file, of which `available` bytes are there.
+ * ATH_MISSING: at least *front_bytes are needed to go on. ATH_OK: *front_bytes are the prelude, up to the first motion
+ * chunk, and ath_open needs *memory_bytes. Else an error of the file. limits: null for the defaults. */
+ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, size_t *front_bytes,
+                      size_t *memory_bytes);
+
+/* Opens a file in `memory`, from at least its prelude; feeds it all of `bytes`. The ath_file is the memory: cast it.
+ * Checks what FORMAT.md, "Opening", lists for a stream, in its order. Errors of the file; ATH_MISSING, ATH_NO_MEMORY.
+ * On BAD_CHECKSUM and BAD_CHUNK, ath_fault tells the chunk. */
+ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                     const ath_limits *limits);
+
+/* Computes the bases that all segments share, in memory of their own, whose size depends on the plant. Once, before
+ * anything is prepared. ATH_NO_MEMORY. */
+ATH_API size_t ath_build_size(const ath_file *file);
+ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
+
+/* ---- what a file holds ------------------------------------------------------------------------------------------- */
+
+typedef struct ath_info {
+    uint64_t file_length, prelude_length;
+    double max_error;        /* of the deepest stored level, promised */
+    double origin[3];
+    double duration;         /* time of the last frame less that of the first */
+    int32_t vertex_count, branch_count, frame_count, segment_count;
+    int32_t level_count;     /* stored levels: 0 to level_count - 1 */
+    int32_t full_level_count;
+    int32_t node_count, chunk_count;
+    int32_t wide;            /* 1: positions are double in the file's own arithmetic, else float */
+    float epsilon, xi;       /* the thresholds by which nodes were accepted */
+    uint32_t eta, lambda;
+    int32_t rest_wide;       /* 1: the rest pose is double, else float */
+} ath_info;
+
+ATH_API void ath_get_info(const ath_file *file, ath_info *info);
 
 enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };
 
-/* A branch in file order: depth-first, parents before children. */
+/* A branch; parents come before children, a subtree is the branches b to b + subtree - 1. */
 typedef struct ath_branch {
     int32_t parent;       /* branch, below its own index; -1 for a root */
     int32_t count;        /* vertices of its stem, at least 1 */
-    int32_t attach;       /* vertex of the parent's stem, -1 for a root */
-    int32_t flags;        /* ATH_SHEET: affine basis first; ATH_LOOSE: carries a translation; ATH_WHOLE: its subtree is a leaf of the ATH */
+    int32_t attach;       /* vertex of the parent's stem that it hangs on, -1 for a root */
+    int32_t flags;        /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one */
     int32_t lag;          /* of the rest pose's predictor */
     int32_t first;        /* its first vertex */
     int32_t subtree;      /* branches in its subtree, itself included */
     int32_t depth;
 } ath_branch;
 
-/* A run of at most ATH_PIECE_VERTICES vertices of one stem, with one spatial basis. The first piece of a branch hangs
- * on the parent's stem, the others on the last vertex of the piece before. */
-typedef struct ath_piece {
-    int64_t modes;        /* its cantilever modes in the bases */
-    int64_t basis;        /* its basis: `rank` rows of `count` */
+ATH_API const ath_branch *ath_branches(const ath_file *file);
+/* File vertex i is vertex vertex_source[i] of the source; branches likewise. */
+ATH_API const int32_t *ath_vertex_source(const ath_file *file);
+ATH_API const int32_t *ath_branch_source(const ath_file *file);
+/* Seconds, frame_count of them, increasing. */
+ATH_API const double *ath_times(const ath_file *file);
+
+typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
+
+/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_wide is 0 the source's numbers were floats:
+ * what the file's arithmetic has as doubles is rounded to them. */
+ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
+ATH_API void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t stride);
+
+/* Largest and RMS error of showing `level`, measured by the encoder, scene units; segment -1: over all of them.
+ * Either result may be null. */
+ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t segment, double *max_error,
+                             double *rms_error);
+
+/* First frame of a segment (for segment_count: frame_count), and the segment that a frame is in. */
+ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
+ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);
+
+/* The chunk table, in file order. Kinds and payloads: FORMAT.md. Static data (METADATA, FACES, EDGES, ATTRIBUTE) is
+ * handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
+typedef struct ath_chunk {
+    const uint8_t *bytes; /* null: not fed */
+    uint64_t offset;
+    uint32_t length, checksum;
+    uint32_t segment;
+    uint16_t kind;
+    uint8_t level;        /* 255: not of a level */
+    uint8_t reserved;
+} ath_chunk;
+
+ATH_API const ath_chunk *ath_chunks(const ath_file *file);
+/* ATH_OK, ATH_MISSING or ATH_BAD_CHECKSUM. */
+ATH_API int ath_check_chunk(const ath_file *file, int32_t index);
+/* The chunk that the last error was about, or -1: of ath_open and ath_build, of a preparation. */
+ATH_API int32_t ath_fault(const ath_file *file);
+ATH_API int32_t ath_work_fault(const ath_work *work);
+
+/* ---- bytes ------------------------------------------------------------------------------------------------------- */
+
+/* `bytes` are the file's from `offset` on, `size` of them. Chunks that lie wholly inside can be used from now on, others
+ * are left alone: for a download that grows or arrives in pieces, feed the joined piece again. Any order. */
+ATH_API void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size);
+/* Forgets chunks that touch this range, so that their bytes can go: not those that a preparation has begun to read. */
+ATH_API void ath_drop(ath_file *file, uint64_t offset, uint64_t size);
+
+typedef struct ath_range { uint64_t offset, size; } ath_range;
+
+/* Bytes that the segments first to last need for `level` and that have not been fed; with `all` those that have been,
+ * too. Ascending, neighbours joined. Returns their number, of which at most `capacity` are written. */
+ATH_API int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
+                           ath_range *ranges, int32_t capacity);
+
+/* The deepest level that a segment can be prepared at with what has been fed; -1: none. */
+ATH_API int32_t ath_ready_level(const ath_file *file, int32_t segment);
+
+/* ---- levels ------------------------------------------------------------------------------------------------------ */
+
+/* A level cuts the plant into parts: nodes, subtrees that move by one matrix, and exact runs, stems whose vertices
+ * have positions of their own. Parts ascend and hold every vertex once. The last level is exact throughout. */
+typedef struct ath_part {
     int32_t first, count; /* vertices */
-    int32_t parent;       /* piece, -1 for a root */
-    int32_t attach;       /* vertex, -1 for a root */
-    int32_t branch;
-    int32_t flags;
-    int32_t rank;
-    int32_t level;        /* whose stream completes it */
-    int32_t low_level;    /* whose stream holds its tracks and first modes, -1 when `level` does */
-    int32_t low_modes;
-    int32_t carrier;      /* first of its vertices among the carriers', -1 when nothing hangs on it */
-    int32_t carrier_index;
-} ath_piece;
+    int32_t branch;       /* of a node; -1 for an exact run */
+    int32_t index;        /* of a node's matrix, or of a run's first vertex among the exact ones */
+} ath_part;
 
-/* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */
-typedef struct ath_node {
-    double whitening[9];  /* rows: functionals that are orthonormal over the subtree's rest vertices */
-    int32_t branch, piece;
-    int32_t first, count; /* vertices of the subtree */
-    int32_t level, last;
-    int32_t coded;        /* 1: its map has a stream of its own; 0: it follows from the stem's first modes */
-    int32_t rank;         /* of the rest vertices about the attach point */
-} ath_node;
+/* Numbers of parts, of nodes (matrices) and of exact vertices at a level. Any result may be null. */
+ATH_API void ath_cut_size(const ath_file *file, int32_t level, int32_t *parts, int32_t *nodes,
+                          int32_t *exact_vertices);
+/* Fills ath_cut_size's number of parts. */
+ATH_API void ath_cut(const ath_file *file, int32_t level, ath_part *parts);
 
-/* What all segments share. */
-typedef struct ath_shape {
-    int32_t vertex_count, branch_count, piece_count, node_count;
-    int32_t carrier_vertices, carrier_pieces;
-    int32_t height;       /* deepest node: levels run from 0 to height + 1 */
-    int32_t reserved;
-    const ath_branch *branches;
-    const ath_piece *pieces;
-    const ath_node *nodes;
-    const double *rest;   /* vertex_count x 3, relative to the origin */
-    const double *bases;
-} ath_shape;
+/* ---- preparing --------------------------------------------------------------------------------------------------- */
 
-/* How the integers of one level and segment are to be read. */
-typedef struct ath_stream {
-    double step;             /* quantisation step, scene units */
-    double omega;            /* step factor of rotation tracks, 0: none are coded */
-    const double *temporal;  /* temporal_rank x frames, orthonormal rows */
-    int32_t temporal_rank;
-    int32_t reserved;
-} ath_stream;
+/* Bytes that an ath_work needs to prepare any segment of the file, and that a prepared segment at a level takes. */
+ATH_API size_t ath_work_size(const ath_file *file);
+ATH_API size_t ath_segment_size(const ath_file *file, int32_t level);
 
-/* One segment. `streams` has one entry per level, 0 to height + 1. */
-typedef struct ath_motion {
-    int32_t frames;
-    int32_t reserved;
-    const ath_stream *streams;
-    const double *cosines;   /* frames x frames */
-    int32_t *coefficients;   /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
-    int32_t *tracks;         /* piece_count x 2 x 3 x frames: rotation, translation */
-    int32_t *node_tracks;    /* node_count x 4 x 3 x frames: columns of the map, translation */
-    int32_t *node_steps;     /* node_count: exponents of half-octave steps */
-    double *carriers;        /* carrier_vertices x 3 x frames */
-    double *carrier_frames;  /* carrier_pieces x 12 x frames: rotation, attach point */
-    double *work;            /* ath_motion_work(frames) doubles */
-} ath_motion;
+/* Begins to prepare a segment at a level, once ath_build has run; the ath_work and the ath_segment are their memories.
+ * Only bytes of this segment and of levels up to this one are read. ATH_OK, ATH_MISSING, ATH_NO_MEMORY,
+ * ATH_BAD_ARGUMENT. */
+ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
+                              void *memory, size_t memory_bytes);
+/* Goes on for `steps` steps, each a bounded piece of work: at most 64 vertices, or one matrix, over the segment's frames.
+ * ATH_MORE until it is done: ATH_OK, and the segment can be played. ATH_BAD_CHECKSUM, ATH_BAD_CHUNK: it cannot be, and
+ * further steps are an ATH_BAD_ARGUMENT. */
+ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
+/* How many steps that takes in all. */
+ATH_API int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level);
+/* Both at once. */
+ATH_API int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
+                        void *memory, size_t memory_bytes);
 
-/* ---- the plan ------------------------------------------------------------------------------------------------- */
+/* Of a prepared segment; -1 where it is not (not yet, or damaged). */
+ATH_API int32_t ath_segment_index(const ath_segment *segment);
+ATH_API int32_t ath_segment_level(const ath_segment *segment);
 
-/* Completes first, subtree and depth of the branches and counts; 0 when they are not a valid hierarchy. */
-ATH_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
-ATH_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
+/* ---- playing ----------------------------------------------------------------------------------------------------- */
 
-/* Fills pieces and nodes and the counts of `shape`, whose branches and counts of pieces and nodes are set.
- * `piece_of_vertex`: scratch, vertex_count. */
-ATH_API void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *piece_of_vertex);
+typedef enum ath_wrap { ATH_CLAMP = 0, ATH_LOOP = 1, ATH_PING_PONG = 2 } ath_wrap;
 
-/* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */
-ATH_API size_t ath_basis_table_size(int32_t piece_count);
-ATH_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
-                                 int32_t *table);
-ATH_API void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
-                            double *bases);
-/* Completes the nodes, once the rest pose is known. */
-ATH_API void ath_plan_nodes(const ath_shape *shape, ath_node *nodes);
+/* Where on the frames a time, in seconds since the first frame, is: 0 to frame_count - 1 and, for a loop, on to
+ * frame_count, as the last frame blends into the first over the mean frame time. */
+ATH_API double ath_frame_at(const ath_file *file, double seconds, ath_wrap wrap);
 
-/* frames x frames: row k is the k-th function of the orthonormal DCT-II. */
-ATH_API void ath_cosine_basis(int32_t frames, double *basis);
+/* The frames that a place on the frames lies between, and the weight of the second; the same one twice where that is 0. */
+typedef struct ath_blend {
+    int32_t frame[2], segment[2];
+    double weight;
+} ath_blend;
 
-/* ---- streams to integers --------------------------------------------------------------------------------------- */
+ATH_API ath_blend ath_blend_at(const ath_file *file, double frame);
 
-/* Bytes of scratch memory that any of the coding functions needs as `model`. */
-ATH_API size_t ath_model_size(void);
+/* What follows shows a place on the frames from prepared segments, of which any number may be handed over; nulls and
+ * unprepared ones are passed over. Between two frames it is their blend. Where they are in two segments of which one
+ * is there, or both at different levels, the nearer frame that is there is shown (ATH_HELD). ATH_OK, ATH_HELD,
+ * ATH_NOT_PREPARED: nothing was written. Playing backwards or at random costs the same as forwards. */
 
-ATH_API int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count,
-                                 int32_t vertex_count, ath_branch *branches, int32_t *branch_source,
-                                 int32_t *vertex_source);
-ATH_API int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
-                            int32_t branch_count, double step, double *rest);
-/* An exact rest pose: positions as stored, the origin not taken off, floats or (wide) doubles. All are finite. */
-ATH_API int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
-                                  int32_t branch_count, int wide, double *rest);
-/* Times of all frames, finite; whether they increase is for the caller to see. */
-ATH_API int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
-/* rank x frames integers of a learned temporal basis; `limit` stands for 1. */
-ATH_API int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames,
-                                int32_t limit, int32_t *basis);
-/* Coefficients and tracks of the pieces of one level; the arrays are zero on entry there. */
-ATH_API int ath_decode_stems(void *model, const uint8_t *bytes, size_t size, const ath_shape *shape,
-                             const ath_motion *motion, int32_t level);
-ATH_API int ath_decode_affines(void *model, const uint8_t *bytes, size_t size, const ath_shape *shape,
-                               const ath_motion *motion, int32_t level);
-/* Adds corrections to `positions` (float, or double when `wide`), vertex-major. */
-ATH_API int ath_decode_corrections(void *model, const uint8_t *bytes, size_t size, int32_t vertex_count,
-                                   int32_t frames, double step, int wide, void *positions);
+/* All vertices, `stride` bytes apart; those of nodes are moved by their matrices. */
+ATH_API int ath_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                          ath_order order, float *xyz, size_t stride);
+ATH_API int ath_positions_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                               double frame, ath_order order, double *xyz, size_t stride);
 
-/* ---- integers to positions ------------------------------------------------------------------------------------- */
+/* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
+ * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level
+ * there are no matrices, at level 0 nothing but. */
+ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                         float *matrices, size_t stride);
+ATH_API int ath_matrices_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                              double frame, double *matrices, size_t stride);
+ATH_API int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                      float *xyz, size_t stride);
+ATH_API int ath_exact_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                           double frame, double *xyz, size_t stride);
+/* The level that these show, which says how many matrices and exact vertices there are; -1: none has the frame. */
+ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                                double frame);
 
-ATH_API size_t ath_motion_work(int32_t frames);
+/* ---- level of detail --------------------------------------------------------------------------------------------- */
 
-/* Positions of the segment at `level`, origin added, vertex-major, float or (wide) double. */
-ATH_API void ath_pose(const ath_shape *shape, const ath_motion *motion, int32_t level, const double origin[3],
-                      int wide, void *positions);
-
-/* The nodes' maps at the levels they are shown: node_count x 12 x frames, 3x4 matrices that take absolute rest
- * positions to absolute positions; those of nodes not shown at `level` are left alone. ath_pose must have run. */
-ATH_API void ath_node_matrices(const ath_shape *shape, const ath_motion *motion, int32_t level,
-                               const double origin[3], double *matrices);
-
-/* Vertex-major file order to frame-major source order (frames from..to-1), and back to doubles less the origin. */
-ATH_API void ath_scatter(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide,
-                         const void *positions, int32_t from, int32_t to, void *out);
-ATH_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide,
-                        const void *source, const double origin[3], double *out);
+/* The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of view of
+ * `fov` (radians) on a screen of `height` pixels, is at most `pixels`; the deepest level where none is. segment -1:
+ * over all segments. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than
+ * the one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang and
+ * Peng 2011: the view-dependent choice.) */
+ATH_API int32_t ath_depth_for(const ath_file *file, int32_t segment, double distance, double fov, double height,
+                              double pixels);
 
 /* CRC-32C (Castagnoli) of `size` bytes, continuing from `crc` (0 to start). */
 ATH_API uint32_t ath_crc32c(uint32_t crc, const uint8_t *bytes, size_t size);
-
-/* ---- encoding --------------------------------------------------------------------------------------------------- */
-
-/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
- * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
- * its number of vertices: the same error in all of them together costs the same everywhere. */
-ATH_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const double *source, double dead_zone);
-ATH_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const double *source,
-                               const double *level_steps, double dead_zone);
-
-/* Largest distance and sum of squared distances between positions and source (plus origin). */
-ATH_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
-                       const double origin[3], double *max_error, double *sum_squares);
-
-/* Finds the corrections that bring every vertex within `limit`, applies them to `positions` and fills rows of
- * (vertex, frame, x, y, z). Returns their number; when it is above `capacity` nothing was applied. */
-ATH_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions,
-                                     const double *source, const double origin[3], double limit, double step,
-                                     int32_t *corrections, int64_t capacity);
-
-/* Writers of the streams above: the size written, -1 when `capacity` is too small, -2 when the input cannot be
- * expressed. */
-ATH_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                     int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
-                                     const int32_t *vertex_source);
-ATH_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                int32_t branch_count, double step, const double *source, double *rest);
-ATH_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                      int32_t branch_count, int wide, const double *rest);
-ATH_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
-                                 const double *times);
-ATH_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                                    int32_t limit, const int32_t *basis);
-ATH_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
-                                 const ath_motion *motion, int32_t level);
-ATH_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
-                                   const ath_motion *motion, int32_t level);
-ATH_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
-                                       int32_t frames, const int32_t *corrections, int64_t count);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 /* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, cosines in
  * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
-#include "internal.h"
+#include "plan.h"
 
 #define PI 3.14159265358979323846
 
@@ -256,9 +256,9 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *bases)
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
+                    double *bases)
 {
-    double work[2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES];
     int64_t filled = 0;
     for (int32_t p = 0; p < piece_count; p++) {
         ath_piece *piece = pieces + p;
@@ -309,4 +309,12 @@ void ath_cosine_basis(int32_t frames, double *basis)
     for (int32_t k = 0; k < frames; k++)
         for (int32_t t = 0; t < frames; t++)
             basis[k * frames + t] = (k == 0 ? first : other) * cos_of_fraction((int64_t)(2 * t + 1) * k, frames);
+}
+
+double ath_tan_of_half(double x)
+{
+    double half = 0.5 * x;
+    if (half <= 0.25 * PI) return sin_series(half) / cos_series(half);
+    double rest = 0.5 * PI - half;
+    return cos_series(rest) / sin_series(rest);
 }

@@ -7,15 +7,13 @@
 #ifndef ATH_COEFFICIENT_MODEL_H
 #define ATH_COEFFICIENT_MODEL_H
 
+#include "motion.h"
 #include "number_model.h"
 
 enum {
     COUNT_CLASSES = 6,
     COUNT_BINS = 10,
-    SHIFT_SLOT = ATH_PIECE_VERTICES,
-    OMEGA_SLOT,
-    HISTORY_ROWS,
-    MAGNITUDE_CLIP = 1 << 20
+    SUMS_BEFORE = 2
 };
 
 typedef struct {
@@ -23,14 +21,22 @@ typedef struct {
     ath_context empty[COUNT_CLASSES][COUNT_CLASSES];
     ath_context count_size[COUNT_CLASSES][COUNT_BINS];
     ath_context count_mantissa[COUNT_BINS][4];
-    uint32_t history[HISTORY_ROWS][ATH_SEGMENT_FRAMES]; /* running mean magnitude of a row's frequency, in 1/16 */
-    int32_t history_count[HISTORY_ROWS];
+    uint32_t *history; /* ATH_SLOTS x frames: running mean magnitude of a row's frequency, in 1/16 */
+    int32_t history_count[ATH_SLOTS];
+    /* magnitudes of the last row and of this one, summed over the axes; zeros before the first and behind the last */
+    uint32_t sums[2][SUMS_BEFORE + ATH_SEGMENT_FRAMES + 1];
+    int32_t turn;
     int invalid; /* a row said that it codes more frequencies than there are */
 } coefficient_model;
 
-static void coefficient_model_init(coefficient_model *model)
+ATH_INLINE size_t history_size(int32_t frames) { return ATH_SLOTS * (size_t)frames * sizeof(uint32_t); }
+
+/* `history`: history_size(frames) bytes. */
+static void coefficient_model_init(coefficient_model *model, int32_t frames, uint32_t *history)
 {
     memset(model, 0, sizeof *model);
+    memset(history, 0, history_size(frames));
+    model->history = history;
     number_model_init(&model->number);
     for (int32_t i = 0; i < COUNT_CLASSES; i++) {
         for (int32_t j = 0; j < COUNT_CLASSES; j++) context_init(&model->empty[i][j], 32768);
@@ -63,17 +69,6 @@ static int32_t code_count(ath_coder *coder, coefficient_model *model, int32_t hi
     return ath_min(built, limit);
 }
 
-ATH_INLINE uint32_t clipped(int32_t value)
-{
-    uint32_t magnitude = magnitude_of(value);
-    return magnitude < MAGNITUDE_CLIP ? magnitude : MAGNITUDE_CLIP;
-}
-
-ATH_INLINE uint32_t magnitude_at(const int32_t *axis, int32_t frames, int32_t k)
-{
-    return k < 0 || k >= frames ? 0 : clipped(axis[k]);
-}
-
 static int32_t used_frequencies(const int32_t *row, int32_t frames)
 {
     int32_t count = 0;
@@ -83,45 +78,41 @@ static int32_t used_frequencies(const int32_t *row, int32_t frames)
     return count;
 }
 
-static void remember_row(coefficient_model *model, int32_t slot, int32_t frames, int32_t count, const int32_t *row)
+static void remember_row(coefficient_model *model, int32_t slot, int32_t frames, int32_t count, const uint32_t *sums)
 {
-    uint32_t *history = model->history[slot];
+    uint32_t *history = model->history + (size_t)slot * (size_t)frames;
     model->history_count[slot] = count;
-    for (int32_t k = 0; k < frames; k++) {
-        uint32_t sum = k < count ? clipped(row[k]) + clipped(row[frames + k]) + clipped(row[2 * frames + k]) : 0;
-        history[k] = history[k] - (history[k] + 3) / 4 + sum * 4 / 3;
-    }
+    for (int32_t k = 0; k < frames; k++) history[k] = history[k] - (history[k] + 3) / 4 + sums[k] * 4 / 3;
 }
 
-/* One row: three axes of `frames` integers, of which the first `rank` may be coded; `above` is the unit's row before,
- * or null; `slot` names the row in the history. When decoding, `row` is zero on entry. Returns how many frequencies
- * are coded. */
+/* One row: three axes of `frames` integers, of which the first `rank` may be coded. `above_count`: frequencies of the
+ * unit's row before, which was the last to be coded, or -1 where this is its first. `slot` names the row in the
+ * history. When decoding, `row` is zero on entry. Returns how many frequencies are coded. */
 static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t frames, int32_t rank, int32_t slot,
-                        const int32_t *above, int32_t above_count, int32_t *row)
+                        int32_t above_count, int32_t *row)
 {
-    const uint32_t *history = model->history[slot];
-    int32_t count = code_count(coder, model, model->history_count[slot], above_count, rank,
+    const uint32_t *history = model->history + (size_t)slot * (size_t)frames;
+    const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE;
+    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}}; /* the last magnitudes of each axis */
+    int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? used_frequencies(row, frames) : 0);
     for (int32_t k = 0; k < count; k++) {
-        uint32_t before = 0, over = 0, beside = 0;
+        uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
+        uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over, beside = 0;
         for (int32_t axis = 0; axis < 3; axis++) {
-            const int32_t *own = row + axis * frames;
-            before += 2 * magnitude_at(own, frames, k - 1) + magnitude_at(own, frames, k - 2);
-            if (!above) continue;
-            const int32_t *other = above + axis * frames;
-            over += 2 * magnitude_at(other, frames, k) + magnitude_at(other, frames, k - 1)
-                    + magnitude_at(other, frames, k + 1);
-        }
-        for (int32_t axis = 0; axis < 3; axis++) {
-            int32_t *own = row + axis * frames;
-            uint32_t near = 2 * magnitude_at(own, frames, k - 1) + magnitude_at(own, frames, k - 2)
-                            + magnitude_at(own, frames, k - 3);
+            int32_t *own = row + axis * frames + k;
+            uint32_t *near = last[axis];
             uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
-            own[k] = code_signed(coder, &model->number, (near * 16 + before * 2 + over + around * 8) / 16, own[k]);
-            beside += clipped(own[k]);
+            *own = code_signed(coder, &model->number, ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16, *own);
+            near[2] = near[1];
+            near[1] = near[0];
+            near[0] = clipped(*own);
+            beside += near[0];
         }
+        sums[k] = beside;
     }
-    remember_row(model, slot, frames, count, row);
+    memset(sums + count, 0, (size_t)(frames + 1 - count) * sizeof *sums);
+    remember_row(model, slot, frames, count, sums);
     return count;
 }
 

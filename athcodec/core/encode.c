@@ -1,5 +1,7 @@
 /* Streams, written: streams.h compiled for encoding. */
 #define ATH_ENCODING
+#include "encode.h"
+#include "motion_streams.h"
 #include "streams.h"
 
 /* The size written; -1: no space, -2: the input is not something that the stream can hold. */
@@ -11,7 +13,7 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    int valid = code_hierarchy(&coder, model, branch_count, vertex_count, (ath_branch *)branches,
+    int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, (ath_branch *)branches,
                                (int32_t *)branch_source, (int32_t *)vertex_source);
     ath_count_pieces((ath_branch *)branches, branch_count, vertex_count); /* `subtree` served as memory */
     return written(&coder, valid);
@@ -22,7 +24,7 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_rest(&coder, model, branches, branch_count, step, source, rest);
+    code_rest(&coder, (rest_model *)model, branches, branch_count, step, source, rest);
     return coder_finish(&coder);
 }
 
@@ -46,43 +48,62 @@ int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_temporal(&coder, model, rank, frames, limit, (int32_t *)basis));
+    return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
 }
 
 int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape, const ath_motion *motion,
-                         int32_t level)
+                         const ath_integers *integers, int32_t level)
 {
     ath_coder coder;
+    coefficient_model *rows = (coefficient_model *)model;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_stems(&coder, model, shape, motion, level));
+    coefficient_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
+    for (int32_t p = 0; p < shape->piece_count; p++) {
+        ath_piece_rows piece = ath_rows_of_piece(shape, integers, motion->frames, p);
+        code_piece(&coder, rows, shape, motion->streams + level, motion->frames, p, level, &piece);
+    }
+    return written(&coder, !rows->invalid);
 }
 
 int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
-                           const ath_motion *motion, int32_t level)
+                           const ath_motion *motion, const ath_integers *integers, int32_t level)
 {
     ath_coder coder;
+    affine_model *maps = (affine_model *)model;
+    int valid = 1;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_affines(&coder, model, shape, motion, level));
+    affine_model_init(maps, motion->frames, (uint32_t *)(maps + 1));
+    for (int32_t n = 0; n < shape->node_count && valid; n++) {
+        ath_node_rows node = ath_rows_of_node(integers, motion->frames, n);
+        if (shape->nodes[n].coded && shape->nodes[n].level == level)
+            valid = code_node(&coder, maps, shape, motion->frames, n, &node);
+    }
+    return written(&coder, valid);
 }
 
 int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames,
                                const int32_t *corrections, int64_t count)
 {
     ath_coder coder;
-    correction_model *model = memory;
+    correction_model *model = (correction_model *)memory;
     int64_t next = 0;
-    int32_t before = 0;
     coder_start(&coder, bytes, capacity);
     correction_model_init(model);
     for (int32_t v = 0; v < vertex_count; v++) {
-        int any = next < count && corrections[5 * next] == v;
-        coder_bit(&coder, &model->vertex[before], any);
-        memset(model->row[1], 0, sizeof model->row[1]);
-        for (; next < count && corrections[5 * next] == v; next++)
-            memcpy(model->row[1][corrections[5 * next + 1]], corrections + 5 * next + 2, 3 * sizeof(int32_t));
-        if (any) code_corrected_frames(&coder, model, frames);
-        memcpy(model->row[0], model->row[1], sizeof model->row[0]);
-        before = (before << 1 | any) & 3;
+        int64_t first = next;
+        correction_row *row = next_row(model);
+        for (; next < count && corrections[5 * next] == v; next++) {
+            const int32_t *given = corrections + 5 * next;
+            memcpy(row->q[given[1]], given + 2, sizeof row->q[0]);
+            set_correction(row, given[1]);
+        }
+        code_vertex(&coder, model, frames, next > first);
     }
     return coder_finish(&coder);
+}
+
+size_t ath_model_size(void)
+{
+    size_t size = sizeof(affine_model) + history_size(ATH_SEGMENT_FRAMES);
+    return size > sizeof(correction_model) ? size : sizeof(correction_model); /* the others are smaller */
 }

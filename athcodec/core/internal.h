@@ -1,8 +1,7 @@
-/* What the files of the core share: limits, small helpers, and the layout rules of the motion arrays.
+/* What the files of the core share: helpers, and the layout rules of the motion arrays.
  *
- * Every sum below runs in the order that FORMAT.md states, over doubles, with contraction to FMA off, so that all
- * decoders agree bit for bit. Loops are written over frames: lanes are independent, and any SIMD width gives the
- * same result. */
+ * Every sum runs in the order that FORMAT.md states, over doubles, with contraction to FMA off, so that all decoders
+ * agree bit for bit. Hot loops run over frames: lanes are independent, and any SIMD width gives the same result. */
 #ifndef ATH_INTERNAL_H
 #define ATH_INTERNAL_H
 
@@ -22,17 +21,74 @@
 #define ATH_INLINE static inline
 #endif
 
-void *memcpy(void *restrict to, const void *restrict from, size_t size);
+#ifdef __cplusplus
+#define ATH_RESTRICT __restrict
+#else
+#define ATH_RESTRICT restrict
+#endif
+
+#if defined(__STDC_HOSTED__) && __STDC_HOSTED__
+#include <string.h>
+#else
+#ifdef __cplusplus
+extern "C" {
+#endif
+void *memcpy(void *ATH_RESTRICT to, const void *ATH_RESTRICT from, size_t size);
 void *memset(void *to, int value, size_t size);
+#ifdef __cplusplus
+}
+#endif
+#endif
+
+/* What an encoder calls besides ath.h: to be seen from outside only where an encoder is built in. */
+#if defined(ATH_ENCODER)
+#define ATH_ENCODER_API ATH_API
+#else
+#define ATH_ENCODER_API
+#endif
 
 #if defined(__GNUC__)
 #define ath_sqrt __builtin_sqrt
 #else
-double sqrt(double);
+#include <math.h>
 #define ath_sqrt sqrt
 #endif
 
+enum {
+    ATH_PIECE_VERTICES = 64,  /* longest piece of a stem */
+    ATH_SEGMENT_FRAMES = 256, /* longest segment */
+    ATH_LEVELS = 32           /* most levels */
+};
+
 ATH_INLINE int32_t ath_min(int32_t a, int32_t b) { return a < b ? a : b; }
 ATH_INLINE int32_t ath_max(int32_t a, int32_t b) { return a > b ? a : b; }
+
+/* Rounded to float. GCC 12 at -O2 puts two of these side by side into one vector and forgets to round; volatile keeps it
+ * from that. */
+ATH_INLINE double ath_single(double x)
+{
+    volatile float rounded = (float)x;
+    return (double)rounded;
+}
+
+ATH_INLINE size_t ath_size_or_most(uint64_t size) { return size < SIZE_MAX ? (size_t)size : SIZE_MAX; }
+
+/* Parts of one block of memory, each aligned to 16. With a null base it only counts. */
+typedef struct {
+    uint8_t *base;
+    uint64_t used;
+} ath_arena;
+
+ATH_INLINE void *ath_take(ath_arena *arena, uint64_t size)
+{
+    uint8_t *at = arena->base ? arena->base + arena->used : 0;
+    arena->used += (size + 15) & ~(uint64_t)15;
+    return at;
+}
+
+ATH_INLINE int ath_fits(const void *memory, size_t size, uint64_t needed)
+{
+    return memory && ((uintptr_t)memory & 15) == 0 && size >= needed;
+}
 
 #endif

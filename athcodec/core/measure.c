@@ -1,5 +1,68 @@
-/* What the encoder measures on decoded positions, and the corrections that keep its promise. */
-#include "motion.h"
+/* What the encoder decodes to measure, what it measures, and the corrections that keep its promise. */
+#include "encode.h"
+
+enum { TILE = 16 };
+
+void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide, const void *source,
+                const double origin[3], double *out)
+{
+    size_t T = (size_t)frames, N = (size_t)vertex_count;
+    for (int32_t start = 0; start < frames; start += TILE)
+        for (size_t v = 0; v < N; v++)
+            for (size_t axis = 0; axis < 3; axis++)
+                for (int32_t t = start; t < ath_min(start + TILE, frames); t++) {
+                    size_t at = ((size_t)t * N + (size_t)vertex_source[v]) * 3 + axis;
+                    double value = wide ? ((const double *)source)[at] : (double)((const float *)source)[at];
+                    out[(v * 3 + axis) * T + (size_t)t] = value - origin[axis];
+                }
+}
+
+static void store(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3], int wide,
+                  void *positions)
+{
+    for (int32_t row = 0; row < 3 * count; row++) {
+        const double *from = placed + (size_t)row * (size_t)T;
+        size_t at = ((size_t)first * 3 + (size_t)row) * (size_t)T;
+        double shift = origin[row % 3];
+        if (wide)
+            for (int32_t t = 0; t < T; t++) ((double *)positions)[at + (size_t)t] = from[t] + shift;
+        else
+            for (int32_t t = 0; t < T; t++) ((float *)positions)[at + (size_t)t] = (float)(from[t] + shift);
+    }
+}
+
+static void pose_node(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t n,
+                      const ath_scratch *scratch, const double origin[3], int wide, void *positions)
+{
+    const ath_node *node = shape->nodes + n;
+    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    ath_piece_rows piece_rows = ath_rows_of_piece(shape, integers, motion->frames, node->piece);
+    ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
+    ath_node_map(shape, motion, n, &piece_rows, &rows, scratch);
+    for (int32_t v = node->first; v < node->first + node->count; v++) {
+        const double *x0 = ath_rest_of(shape, v);
+        for (int32_t axis = 0; axis < 3; axis++)
+            for (int32_t t = 0; t < motion->frames; t++) scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
+        ath_move(motion->frames, &scratch->at, scratch->placed);
+        store(scratch->placed, v, 1, motion->frames, origin, wide, positions);
+    }
+}
+
+void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t level,
+              const double origin[3], int wide, void *positions)
+{
+    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    for (int32_t p = 0; p < shape->piece_count; p++) {
+        const ath_piece *piece = shape->pieces + p;
+        ath_piece_rows rows = ath_rows_of_piece(shape, integers, motion->frames, p);
+        if (piece->level > level) continue;
+        const double *placed = ath_pose_piece(shape, motion, p, &rows, &scratch);
+        store(placed, piece->first, piece->count, motion->frames, origin, wide, positions);
+    }
+    for (int32_t n = 0; n < shape->node_count; n++)
+        if (ath_is_shown(shape->nodes + n, level))
+            pose_node(shape, motion, integers, n, &scratch, origin, wide, positions);
+}
 
 static double position_at(int wide, const void *positions, size_t at)
 {
@@ -34,7 +97,7 @@ void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *posit
     *sum_squares = sum;
 }
 
-static double rounded(int wide, double value) { return wide ? value : (double)(float)value; }
+static double rounded(int wide, double value) { return wide ? value : ath_single(value); }
 
 static double corrected_error(int wide, const double here[3], const double want[3], const int32_t q[3], double step)
 {

@@ -1,17 +1,23 @@
 /* From quantised coefficients to positions: FORMAT.md, "Reconstruction". One piece after the other, parents first;
  * what hangs on a piece is placed from that piece's decoded vertices, in doubles, in the order written here. */
+#include "lanes.h"
 #include "motion.h"
 
-enum { POLAR_ITERATIONS = 4 };
+enum { POLAR_ITERATIONS = 4, TURN_LANES = 16 };
 
-size_t ath_motion_work(int32_t frames)
+/* A map takes four rows. */
+static size_t scratch_rows(int32_t longest, int32_t frames) { return (size_t)ath_max(longest, 4) * 3 * (size_t)frames; }
+
+size_t ath_motion_work(int32_t longest, int32_t frames)
 {
-    return (size_t)frames * (6 * ATH_PIECE_VERTICES + 3 + 9 + 3);
+    return 2 * scratch_rows(longest, frames) + (3 + 9 + 3) * (size_t)frames;
 }
 
-ath_scratch ath_motion_scratch(const ath_motion *motion)
+size_t ath_carrier_size(int64_t carrier_rows, int32_t frames) { return (size_t)carrier_rows * 3 * (size_t)frames; }
+
+ath_scratch ath_motion_scratch(const ath_shape *shape, const ath_motion *motion)
 {
-    size_t rows = 3 * ATH_PIECE_VERTICES * (size_t)motion->frames;
+    size_t rows = scratch_rows(shape->longest, motion->frames);
     ath_scratch scratch;
     scratch.rows = motion->work;
     scratch.placed = scratch.rows + rows;
@@ -21,25 +27,30 @@ ath_scratch ath_motion_scratch(const ath_motion *motion)
     return scratch;
 }
 
-static double *carried_vertex(const ath_motion *motion, const ath_piece *piece, int32_t vertex)
+static double *carried_vertices(const ath_motion *motion, const ath_piece *piece)
 {
-    return motion->carriers + (size_t)(piece->carrier + vertex - piece->first) * 3 * (size_t)motion->frames;
+    return motion->carriers + ath_carrier_size(piece->carrier, motion->frames);
+}
+
+static const double *carried_vertex(const ath_motion *motion, const ath_piece *piece, int32_t vertex)
+{
+    return motion->carriers + ath_carrier_size(piece->carrier + vertex - piece->first, motion->frames);
 }
 
 static ath_frames carried_frames(const ath_motion *motion, const ath_piece *piece)
 {
     ath_frames at;
-    at.rotation = motion->carrier_frames + (size_t)piece->carrier_index * 12 * (size_t)motion->frames;
+    at.rotation = motion->carriers + ath_carrier_size(piece->carrier + piece->count, motion->frames);
     at.point = at.rotation + 9 * (size_t)motion->frames;
     return at;
 }
 
 /* The rotation by the least angle that takes the parent's rest tangent, turned by R, to its tangent now; R itself where
  * either tangent vanishes or they are opposed. */
-ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const double *from, const double *to,
-                                   const double *parent, double *restrict out)
+ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, const double *from, const double *to,
+                           const double *parent, double turned[9][TURN_LANES])
 {
-    for (int32_t t = 0; t < T; t++) {
+    for (int32_t t = 0; t < count; t++) {
         double r0 = parent[t], r1 = parent[T + t], r2 = parent[2 * T + t], r3 = parent[3 * T + t];
         double r4 = parent[4 * T + t], r5 = parent[5 * T + t], r6 = parent[6 * T + t], r7 = parent[7 * T + t];
         double r8 = parent[8 * T + t];
@@ -58,7 +69,7 @@ ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const doubl
         vy = vy * inverse;
         vz = vz * inverse;
         double cosine = ux * vx + uy * vy + uz * vz;
-        int usable = v2 > 1e-200 && cosine > -0.9;
+        int usable = (v2 > 1e-200) & (cosine > -0.9);
         double wx = uy * vz - uz * vy, wy = uz * vx - ux * vz, wz = ux * vy - uy * vx;
         double h = 1.0 / (1.0 + (usable ? cosine : 0.0));
         wx = usable ? wx : 0.0;
@@ -68,15 +79,28 @@ ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const doubl
         double b0 = c + h * wx * wx, b1 = h * wx * wy - wz, b2 = h * wx * wz + wy;
         double b3 = h * wx * wy + wz, b4 = c + h * wy * wy, b5 = h * wy * wz - wx;
         double b6 = h * wx * wz - wy, b7 = h * wy * wz + wx, b8 = c + h * wz * wz;
-        out[t] = b0 * r0 + b1 * r3 + b2 * r6;
-        out[T + t] = b0 * r1 + b1 * r4 + b2 * r7;
-        out[2 * T + t] = b0 * r2 + b1 * r5 + b2 * r8;
-        out[3 * T + t] = b3 * r0 + b4 * r3 + b5 * r6;
-        out[4 * T + t] = b3 * r1 + b4 * r4 + b5 * r7;
-        out[5 * T + t] = b3 * r2 + b4 * r5 + b5 * r8;
-        out[6 * T + t] = b6 * r0 + b7 * r3 + b8 * r6;
-        out[7 * T + t] = b6 * r1 + b7 * r4 + b8 * r7;
-        out[8 * T + t] = b6 * r2 + b7 * r5 + b8 * r8;
+        turned[0][t] = b0 * r0 + b1 * r3 + b2 * r6;
+        turned[1][t] = b0 * r1 + b1 * r4 + b2 * r7;
+        turned[2][t] = b0 * r2 + b1 * r5 + b2 * r8;
+        turned[3][t] = b3 * r0 + b4 * r3 + b5 * r6;
+        turned[4][t] = b3 * r1 + b4 * r4 + b5 * r7;
+        turned[5][t] = b3 * r2 + b4 * r5 + b5 * r8;
+        turned[6][t] = b6 * r0 + b7 * r3 + b8 * r6;
+        turned[7][t] = b6 * r1 + b7 * r4 + b8 * r7;
+        turned[8][t] = b6 * r2 + b7 * r5 + b8 * r8;
+    }
+}
+
+ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const double *from, const double *to,
+                                   const double *parent, double *out)
+{
+    double turned[9][TURN_LANES]; /* out of reach of the pointers, or compilers would not use SIMD */
+    int32_t count;
+    for (int32_t start = 0; start < T; start += count, from += count, to += count, parent += count, out += count) {
+        count = ath_min(TURN_LANES, T - start);
+        turn_lanes(count, T, tangent, from, to, parent, turned);
+        for (int32_t k = 0; k < 9; k++)
+            for (int32_t t = 0; t < count; t++) out[k * T + t] = turned[k][t];
     }
 }
 
@@ -124,17 +148,19 @@ void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piec
     copy_rows(at.rotation, base.rotation, 9 * (size_t)T);
 }
 
-/* row = sum over k of quantised[k] * step * temporal[k], k ascending; rows of zeros stay exact zeros. */
-ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, double step, const int32_t *quantised,
-                                  double *restrict row)
+/* row = sum over k of quantised[k] * step * temporal[k], k ascending, those of 0 left out. */
+ATH_HOT void ath_inverse_temporal(const ath_stream *stream, int32_t T, int32_t count, double step,
+                                  const int32_t *quantised, double *row)
 {
-    for (int32_t t = 0; t < T; t++) row[t] = 0.0;
-    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+    double value[ATH_SEGMENT_FRAMES];
+    const double *wave[ATH_SEGMENT_FRAMES];
+    int32_t used = 0;
+    for (int32_t k = 0; k < count; k++) {
         if (quantised[k] == 0) continue;
-        const double *wave = stream->temporal + (size_t)k * (size_t)T;
-        double value = (double)quantised[k] * step;
-        for (int32_t t = 0; t < T; t++) row[t] = row[t] + value * wave[t];
+        value[used] = (double)quantised[k] * step;
+        wave[used++] = stream->temporal + (size_t)k * (size_t)T;
     }
+    lanes_sum(T, used, value, wave, 0.0, row);
 }
 
 void ath_move_point(int32_t T, const double *track, double *point)
@@ -162,7 +188,7 @@ ATH_INLINE void rational_rotation(double x, double y, double z, double q[9])
 }
 
 /* R := R Q(omega), Q being the rotation of the quaternion normalize(1, omega / 4) squared. */
-ATH_HOT void ath_turn(int32_t T, const double *omega, double *restrict R)
+ATH_HOT void ath_turn(int32_t T, const double *omega, double *ATH_RESTRICT R)
 {
     for (int32_t t = 0; t < T; t++) {
         double q[9];
@@ -177,18 +203,9 @@ ATH_HOT void ath_turn(int32_t T, const double *omega, double *restrict R)
     }
 }
 
-/* placed = c + R (x0 - a + sum over modes of basis * row), modes ascending, rows of zeros left out. */
-ATH_HOT static void place_vertex(int32_t T, int32_t rank, const double *basis, size_t stride, const uint8_t *used,
-                                 const double *rows, const double *d, const ath_frames *at, double *restrict out)
+/* x := c + R x */
+ATH_HOT void ath_move(int32_t T, const ath_frames *at, double *ATH_RESTRICT out)
 {
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t t = 0; t < T; t++) out[axis * T + t] = d[axis];
-    for (int32_t m = 0; m < rank; m++) {
-        if (!used[m]) continue;
-        double weight = basis[(size_t)m * stride];
-        const double *row = rows + (size_t)m * 3 * (size_t)T;
-        for (int32_t i = 0; i < 3 * T; i++) out[i] = out[i] + weight * row[i];
-    }
     const double *R = at->rotation, *c = at->point;
     for (int32_t t = 0; t < T; t++) {
         double x = out[t], y = out[T + t], z = out[2 * T + t];
@@ -205,18 +222,27 @@ static int any_nonzero(const double *row, int32_t count)
     return 0;
 }
 
-void ath_place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
+/* placed = c + R (x0 - a + sum over modes of basis * row), modes ascending, rows of zeros left out. */
+ATH_HOT static void place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const uint8_t *used,
+                          const ath_scratch *scratch)
 {
-    int32_t T = motion->frames;
-    uint8_t used[ATH_PIECE_VERTICES];
+    int32_t T = motion->frames, count = 0;
     const double *a = ath_rest_attach(shape, piece);
-    for (int32_t m = 0; m < piece->rank; m++)
-        used[m] = (uint8_t)any_nonzero(scratch->rows + (size_t)m * 3 * (size_t)T, 3 * T);
+    const double *basis[ATH_PIECE_VERTICES], *rows[3][ATH_PIECE_VERTICES];
+    double weight[ATH_PIECE_VERTICES];
+    for (int32_t m = 0; m < piece->rank; m++) {
+        if (!used[m]) continue;
+        basis[count] = shape->bases + piece->basis + (size_t)m * (size_t)piece->count;
+        for (int32_t axis = 0; axis < 3; axis++) rows[axis][count] = scratch->rows + (m * 3 + axis) * T;
+        count++;
+    }
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(shape, piece->first + i);
-        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
-        place_vertex(T, piece->rank, shape->bases + piece->basis + i, (size_t)piece->count, used, scratch->rows, d,
-                     &scratch->at, scratch->placed + (size_t)i * 3 * (size_t)T);
+        double *out = scratch->placed + i * 3 * T;
+        for (int32_t m = 0; m < count; m++) weight[m] = basis[m][i];
+        for (int32_t axis = 0; axis < 3; axis++)
+            lanes_sum(T, count, weight, rows[axis], x0[axis] - a[axis], out + axis * T);
+        ath_move(T, &scratch->at, out);
     }
 }
 
@@ -284,13 +310,11 @@ static void turn_with_sheet(const ath_shape *shape, int32_t T, const ath_piece *
     }
 }
 
-/* Keeps what the pieces that hang on this one need. */
-void ath_carry(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
+static void carry(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
     if (piece->carrier < 0) return;
     ath_frames at = carried_frames(motion, piece);
-    copy_rows(carried_vertex(motion, piece, piece->first), scratch->placed, (size_t)piece->count * 3 * (size_t)T);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
     if (piece->flags & ATH_SHEET)
         turn_with_sheet(shape, T, piece, scratch, at.rotation);
@@ -316,19 +340,81 @@ double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
     return stream->step / ath_sqrt((double)piece->count);
 }
 
-static void inverse_track(const ath_stream *stream, int32_t T, double step, const int32_t *quantised, double *track)
+static void inverse_track(const ath_stream *stream, int32_t T, int32_t count, double step, const int32_t *quantised,
+                          double *track)
 {
     for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, step, quantised + axis * T, track + axis * T);
+        ath_inverse_temporal(stream, T, count, step, quantised + axis * T, track + axis * T);
 }
 
-static void reconstruct_modes(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
+static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stream *stream)
+{
+    return rows->counts ? rows->counts[slot] : stream->temporal_rank;
+}
+
+void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                       const ath_scratch *scratch)
+{
+    int32_t T = motion->frames;
+    const ath_piece *piece = shape->pieces + p;
+    const ath_stream *base = ath_base_stream(motion, piece);
+    double omega_step = ath_omega_step(shape, piece, base);
+    ath_attach(shape, motion, piece, scratch->at);
+    if (ath_has_shift(piece)) {
+        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->track);
+        ath_move_point(T, scratch->track, scratch->at.point);
+    }
+    if (omega_step > 0.0) {
+        inverse_track(base, T, count_of(rows, OMEGA_SLOT, base), omega_step, rows->omega, scratch->track);
+        ath_turn(T, scratch->track, scratch->at.rotation);
+    }
+}
+
+static void inverse_mode(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t m,
+                         double *track)
+{
+    const ath_stream *stream = ath_mode_stream(motion, piece, m);
+    inverse_track(stream, motion->frames, count_of(rows, m, stream), ath_mode_step(motion, piece, m),
+                  ath_row(rows->modes, m, motion->frames), track);
+}
+
+static const double *place_used(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+                                const uint8_t *used, const ath_scratch *scratch)
+{
+    ath_scratch here = *scratch;
+    if (piece->carrier >= 0) here.placed = carried_vertices(motion, piece);
+    place(shape, motion, piece, used, &here);
+    carry(shape, motion, piece, &here);
+    return here.placed;
+}
+
+static double *row_of(const ath_motion *motion, const ath_scratch *scratch, int32_t m)
+{
+    return scratch->rows + (size_t)m * 3 * (size_t)motion->frames;
+}
+
+const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
 {
     const ath_piece *piece = shape->pieces + p;
+    uint8_t used[ATH_PIECE_VERTICES];
+    for (int32_t m = 0; m < piece->rank; m++)
+        used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
+    return place_used(shape, motion, piece, used, scratch);
+}
+
+const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                             const ath_scratch *scratch)
+{
+    const ath_piece *piece = shape->pieces + p;
+    uint8_t used[ATH_PIECE_VERTICES];
+    ath_turned_attach(shape, motion, p, rows, scratch);
     for (int32_t m = 0; m < piece->rank; m++) {
-        inverse_track(ath_mode_stream(motion, piece, m), motion->frames, ath_mode_step(motion, piece, m),
-                      ath_coefficients_of(motion, piece->first + m), scratch->rows + (size_t)m * 3 * (size_t)motion->frames);
+        used[m] = 0;
+        if (rows->counts && rows->counts[m] == 0) continue;
+        inverse_mode(motion, piece, rows, m, row_of(motion, scratch, m));
+        used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
     }
+    return place_used(shape, motion, piece, used, scratch);
 }
 
 /* ---- nodes ---- */
@@ -342,14 +428,8 @@ static double half_octave(int32_t exponent)
     return value;
 }
 
-double ath_node_step(const ath_motion *motion, int32_t n) { return half_octave(motion->node_steps[n]); }
+double ath_node_step(int32_t exponent) { return half_octave(exponent); }
 
-int32_t *ath_node_track(const ath_motion *motion, int32_t n, int32_t row)
-{
-    return motion->node_tracks + ((size_t)n * 4 + (size_t)row) * 3 * (size_t)motion->frames;
-}
-
-/* The stream that node maps use: cosines, the node's own step. */
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
     ath_stream stream = {step, 0.0, motion->cosines, motion->frames, 0};
@@ -357,7 +437,7 @@ ath_stream ath_node_stream(const ath_motion *motion, double step)
 }
 
 /* E += columns x functional: axis i of track r adds track[i] * functional[k] to E[i][k]. E: 9 rows. */
-ATH_HOT static void add_outer(int32_t T, const double *track, const double functional[3], double *restrict E)
+ATH_HOT static void add_outer(int32_t T, const double *track, const double functional[3], double *ATH_RESTRICT E)
 {
     for (int32_t i = 0; i < 3; i++)
         for (int32_t k = 0; k < 3; k++) {
@@ -383,54 +463,36 @@ static void affine_part(const ath_shape *shape, const ath_node *node, const doub
     }
 }
 
-static void coded_map(const ath_motion *motion, const ath_node *node, int32_t n, const ath_scratch *scratch,
-                      int shifted, double *E)
+static void coded_map(const ath_motion *motion, const ath_node *node, const ath_node_rows *rows,
+                      const ath_scratch *scratch, int shifted, double *E)
 {
-    double step = ath_node_step(motion, n);
+    int32_t T = motion->frames;
+    double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     if (shifted) {
-        inverse_track(&stream, motion->frames, step, ath_node_track(motion, n, 3), scratch->track);
-        ath_move_point(motion->frames, scratch->track, scratch->at.point);
+        inverse_track(&stream, T, T, step, ath_row(rows->rows, 3, T), scratch->track);
+        ath_move_point(T, scratch->track, scratch->at.point);
     }
     for (int32_t r = 0; r < node->rank; r++) {
-        inverse_track(&stream, motion->frames, step, ath_node_track(motion, n, r), scratch->track);
-        add_outer(motion->frames, scratch->track, node->whitening + 3 * r, E);
-    }
-}
-
-/* Attach frame of a piece with its own tracks applied. */
-static void turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
-{
-    const ath_piece *piece = shape->pieces + p;
-    const ath_stream *base = ath_base_stream(motion, piece);
-    double omega_step = ath_omega_step(shape, piece, base);
-    ath_attach(shape, motion, piece, scratch->at);
-    if (ath_has_shift(piece)) {
-        inverse_track(base, motion->frames, ath_shift_step(piece, base), ath_shift_track(motion, p), scratch->track);
-        ath_move_point(motion->frames, scratch->track, scratch->at.point);
-    }
-    if (omega_step > 0.0) {
-        inverse_track(base, motion->frames, omega_step, ath_omega_track(motion, p), scratch->track);
-        ath_turn(motion->frames, scratch->track, scratch->at.rotation);
+        inverse_track(&stream, T, T, step, ath_row(rows->rows, r, T), scratch->track);
+        add_outer(T, scratch->track, node->whitening + 3 * r, E);
     }
 }
 
 static void map_of_modes(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
-                         const ath_scratch *scratch, double *E)
+                         const ath_piece_rows *rows, const ath_scratch *scratch, double *E)
 {
     const ath_piece *piece = shape->pieces + node->piece;
-    const ath_stream *base = ath_base_stream(motion, piece);
     for (int32_t m = 0; m < ath_min(piece->low_modes, piece->rank); m++) {
         double g[3];
         affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
-        inverse_track(base, motion->frames, ath_mode_step(motion, piece, m),
-                      ath_coefficients_of(motion, piece->first + m), scratch->track);
+        inverse_mode(motion, piece, rows, m, scratch->track);
         add_outer(motion->frames, scratch->track, g, E);
     }
 }
 
 /* R := R (I + E) */
-ATH_HOT static void compose(int32_t T, const double *E, double *restrict R)
+ATH_HOT static void compose(int32_t T, const double *E, double *ATH_RESTRICT R)
 {
     for (int32_t i = 0; i < 3; i++) {
         double *r = R + 3 * i * T;
@@ -443,93 +505,18 @@ ATH_HOT static void compose(int32_t T, const double *E, double *restrict R)
     }
 }
 
-/* The node's map x = point + rotation (x0 - a), left in scratch->at. */
-void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch)
+void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
+                  const ath_node_rows *rows, const ath_scratch *scratch)
 {
     const ath_node *node = shape->nodes + n;
     double *E = scratch->rows;
     for (int32_t i = 0; i < 9 * motion->frames; i++) E[i] = 0.0;
     if (node->coded) {
         ath_attach(shape, motion, shape->pieces + node->piece, scratch->at);
-        coded_map(motion, node, n, scratch, ath_has_shift(shape->pieces + node->piece), E);
+        coded_map(motion, node, rows, scratch, ath_has_shift(shape->pieces + node->piece), E);
     } else {
-        turned_attach(shape, motion, node->piece, scratch);
-        map_of_modes(shape, motion, node, scratch, E);
+        ath_turned_attach(shape, motion, node->piece, piece_rows, scratch);
+        map_of_modes(shape, motion, node, piece_rows, scratch, E);
     }
     compose(motion->frames, E, scratch->at.rotation);
-}
-
-/* ---- output ---- */
-
-static void store(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3], int wide,
-                  void *positions)
-{
-    for (int32_t row = 0; row < 3 * count; row++) {
-        const double *from = placed + (size_t)row * (size_t)T;
-        size_t at = ((size_t)first * 3 + (size_t)row) * (size_t)T;
-        double shift = origin[row % 3];
-        if (wide)
-            for (int32_t t = 0; t < T; t++) ((double *)positions)[at + (size_t)t] = from[t] + shift;
-        else
-            for (int32_t t = 0; t < T; t++) ((float *)positions)[at + (size_t)t] = (float)(from[t] + shift);
-    }
-}
-
-static void pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
-{
-    const ath_piece *piece = shape->pieces + p;
-    turned_attach(shape, motion, p, scratch);
-    reconstruct_modes(shape, motion, p, scratch);
-    ath_place(shape, motion, piece, scratch);
-    ath_carry(shape, motion, piece, scratch);
-}
-
-static void pose_node(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch,
-                      const double origin[3], int wide, void *positions)
-{
-    const ath_node *node = shape->nodes + n;
-    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
-    ath_node_map(shape, motion, n, scratch);
-    for (int32_t v = node->first; v < node->first + node->count; v++) {
-        const double *x0 = ath_rest_of(shape, v);
-        double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
-        place_vertex(motion->frames, 0, 0, 0, 0, 0, d, &scratch->at, scratch->placed);
-        store(scratch->placed, v, 1, motion->frames, origin, wide, positions);
-    }
-}
-
-static int shown(const ath_node *node, int32_t level) { return node->level <= level && level <= node->last; }
-
-void ath_pose(const ath_shape *shape, const ath_motion *motion, int32_t level, const double origin[3], int wide,
-              void *positions)
-{
-    ath_scratch scratch = ath_motion_scratch(motion);
-    for (int32_t p = 0; p < shape->piece_count; p++) {
-        const ath_piece *piece = shape->pieces + p;
-        if (piece->level > level) continue;
-        pose_piece(shape, motion, p, &scratch);
-        store(scratch.placed, piece->first, piece->count, motion->frames, origin, wide, positions);
-    }
-    for (int32_t n = 0; n < shape->node_count; n++)
-        if (shown(shape->nodes + n, level)) pose_node(shape, motion, n, &scratch, origin, wide, positions);
-}
-
-void ath_node_matrices(const ath_shape *shape, const ath_motion *motion, int32_t level, const double origin[3],
-                       double *matrices)
-{
-    ath_scratch scratch = ath_motion_scratch(motion);
-    int32_t T = motion->frames;
-    for (int32_t n = 0; n < shape->node_count; n++) {
-        if (!shown(shape->nodes + n, level)) continue;
-        const double *a = ath_rest_attach(shape, shape->pieces + shape->nodes[n].piece);
-        double *out = matrices + (size_t)n * 12 * (size_t)T;
-        ath_node_map(shape, motion, n, &scratch);
-        for (int32_t i = 0; i < 3; i++) {
-            const double *R = scratch.at.rotation + 3 * i * T, *c = scratch.at.point + i * T;
-            copy_rows(out + 4 * i * T, R, 3 * (size_t)T);
-            for (int32_t t = 0; t < T; t++)
-                out[(4 * i + 3) * T + t] = (c[t] + origin[i])
-                    - (R[t] * (a[0] + origin[0]) + R[T + t] * (a[1] + origin[1]) + R[2 * T + t] * (a[2] + origin[2]));
-        }
-    }
 }

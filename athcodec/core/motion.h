@@ -1,8 +1,43 @@
-/* Steps of the motion model that decoding (motion.c) and analysis (analyse.c) share. */
+/* Steps of the motion model that decoding and analysis share (FORMAT.md, "Reconstruction"). */
 #ifndef ATH_MOTION_H
 #define ATH_MOTION_H
 
-#include "internal.h"
+#include "plan.h"
+
+/* How the integers of one level and segment are to be read. */
+typedef struct ath_stream {
+    double step;             /* quantisation step, scene units */
+    double omega;            /* step factor of rotation tracks, 0: none are coded */
+    const double *temporal;  /* temporal_rank x frames, orthonormal rows */
+    int32_t temporal_rank;
+    int32_t reserved;
+} ath_stream;
+
+/* What the pieces and nodes of one segment are placed with. */
+typedef struct ath_motion {
+    const ath_stream *streams; /* one per level, 0 to height + 1 */
+    const double *cosines;     /* frames x frames */
+    double *carriers;          /* ath_carrier_size(carrier_rows, frames) doubles */
+    double *work;              /* ath_motion_work(longest, frames) doubles */
+    int32_t frames;
+    int32_t reserved;
+} ath_motion;
+
+/* Rows of integers over temporal frequency, 3 x frames each. */
+enum { SHIFT_SLOT = ATH_PIECE_VERTICES, OMEGA_SLOT, ATH_SLOTS };
+
+/* The integers of one piece. */
+typedef struct {
+    int32_t *modes;        /* rank rows */
+    int32_t *omega, *shift;
+    int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
+} ath_piece_rows;
+
+/* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
+typedef struct {
+    int32_t *rows;         /* 4 rows */
+    int32_t *step;
+} ath_node_rows;
 
 /* Where a piece hangs at every frame: attach point (3 rows of `frames`) and rotation (9 rows, row-major matrix). */
 typedef struct {
@@ -11,42 +46,47 @@ typedef struct {
 
 /* The scratch memory of one piece, carved out of ath_motion.work. */
 typedef struct {
-    double *rows;   /* ATH_PIECE_VERTICES x 3 x frames: coefficients over time */
-    double *placed; /* ATH_PIECE_VERTICES x 3 x frames: positions */
+    double *rows;   /* of the longest piece, or of a map, x 3 x frames: coefficients over time */
+    double *placed; /* as many: positions */
     ath_frames at;
     double *track;  /* 3 x frames */
 } ath_scratch;
 
-ath_scratch ath_motion_scratch(const ath_motion *motion);
+ATH_ENCODER_API size_t ath_motion_work(int32_t longest, int32_t frames);
+ATH_ENCODER_API size_t ath_carrier_size(int64_t carrier_rows, int32_t frames);
+
+ath_scratch ath_motion_scratch(const ath_shape *shape, const ath_motion *motion);
 void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, ath_frames at);
-void ath_inverse_temporal(const ath_stream *stream, int32_t frames, double step, const int32_t *quantised, double *row);
+/* Attach frame of a piece with its own tracks applied, in scratch->at. */
+void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                       const ath_scratch *scratch);
+/* Places a piece from its coefficients over time (scratch->rows) in its attach frame (scratch->at), and keeps what the
+ * pieces that hang on it need. Rows that are all 0 are left out. Returns its vertices, count x 3 x frames. */
+const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch);
+/* The same from its integers. */
+const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                             const ath_scratch *scratch);
+/* The node's map x = point + rotation (x0 - a), left in scratch->at. */
+void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
+                  const ath_node_rows *rows, const ath_scratch *scratch);
+
+void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step, const int32_t *quantised,
+                          double *row);
+/* x := c + R x, 3 x frames. */
+void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
 void ath_turn_towards(const double H[9], double size2, double R[9]);
-void ath_place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch);
-void ath_carry(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch);
 double ath_omega_step(const ath_shape *shape, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
-int32_t *ath_node_track(const ath_motion *motion, int32_t n, int32_t row);
-double ath_node_step(const ath_motion *motion, int32_t n);
+double ath_node_step(int32_t exponent);
+/* The stream that node maps use: cosines, the node's own step. */
 ath_stream ath_node_stream(const ath_motion *motion, double step);
-void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_scratch *scratch);
-
-ATH_INLINE const double *ath_rest_of(const ath_shape *shape, int32_t vertex)
-{
-    return shape->rest + 3 * (size_t)vertex;
-}
-
-/* Rest position of the point that a piece hangs on. */
-ATH_INLINE const double *ath_rest_attach(const ath_shape *shape, const ath_piece *piece)
-{
-    return ath_rest_of(shape, piece->attach >= 0 ? piece->attach : piece->first);
-}
 
 /* The stream of a piece's rotation and translation tracks and of its first modes. */
 ATH_INLINE const ath_stream *ath_base_stream(const ath_motion *motion, const ath_piece *piece)
 {
-    return motion->streams + (piece->low_level >= 0 ? piece->low_level : piece->level);
+    return motion->streams + ath_base_level(piece);
 }
 
 /* The stream that holds a piece's mode. */
@@ -64,21 +104,9 @@ ATH_INLINE double ath_mode_step(const ath_motion *motion, const ath_piece *piece
     return piece->flags & ATH_SHEET ? step : step * (m < 4 ? weight[m] : 1.125);
 }
 
-ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
-
-ATH_INLINE int32_t *ath_omega_track(const ath_motion *motion, int32_t p)
+ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)
 {
-    return motion->tracks + (size_t)p * 6 * (size_t)motion->frames;
-}
-
-ATH_INLINE int32_t *ath_shift_track(const ath_motion *motion, int32_t p)
-{
-    return ath_omega_track(motion, p) + 3 * (size_t)motion->frames;
-}
-
-ATH_INLINE int32_t *ath_coefficients_of(const ath_motion *motion, int32_t slot)
-{
-    return motion->coefficients + (size_t)slot * 3 * (size_t)motion->frames;
+    return rows + (size_t)row * 3 * (size_t)frames;
 }
 
 /* The one place where a correction meets a position. */

@@ -4,7 +4,7 @@
 
 #include "range_coder.h"
 
-enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30 };
+enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MAGNITUDE_CLIP = 1 << 20 };
 
 typedef struct {
     ath_context size[NUMBER_CLASSES][NUMBER_BINS];
@@ -25,24 +25,30 @@ ATH_INLINE int32_t bit_length(uint32_t x)
 
 ATH_INLINE uint32_t magnitude_of(int32_t value) { return (uint32_t)(value < 0 ? -value : value); }
 
+/* What the contexts see of a value. */
+ATH_INLINE uint32_t clipped(int32_t value)
+{
+    uint32_t magnitude = magnitude_of(value);
+    return magnitude < MAGNITUDE_CLIP ? magnitude : (uint32_t)MAGNITUDE_CLIP;
+}
+
 /* Half-octave classes of an expected magnitude in 1/16: 0, 1, 2, 3, 4, 6, 8, 12, 16, ... */
 ATH_INLINE int32_t number_class(uint32_t expected)
 {
     int32_t length = bit_length(expected);
     if (length < 2) return length;
-    int32_t class = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
-    return class < NUMBER_CLASSES ? class : NUMBER_CLASSES - 1;
+    int32_t half_octave = 2 * length - 2 + (int32_t)(expected >> (length - 2) & 1);
+    return half_octave < NUMBER_CLASSES ? half_octave : NUMBER_CLASSES - 1;
 }
 
 /* Starting probabilities are those of a geometric distribution with the class's mean. */
 static void number_model_init(number_model *model)
 {
-    for (int32_t class = 0; class < NUMBER_CLASSES; class++) {
-        uint32_t mean = class < 2 ? (uint32_t)(class * 2 + 1)
-                                  : (uint32_t)(5 + (class & 1) * 2) << (class / 2 - 1); /* in 1/32, mid of the class */
+    for (int32_t c = 0; c < NUMBER_CLASSES; c++) {
+        uint32_t mean = c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, mid of c */
         uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
         for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {
-            context_init(&model->size[class][bin], more);
+            context_init(&model->size[c][bin], more);
             if (bin > 0) more = (uint32_t)(((uint64_t)more * more) >> 16);
         }
     }

@@ -1,5 +1,5 @@
 /* From branches to pieces and nodes: how stems are cut, what hangs where, which level's stream holds what. */
-#include "motion.h"
+#include "plan.h"
 
 /* Smallest second moment that counts as a direction, relative to the largest. */
 #define RANK_TOLERANCE 1e-4
@@ -70,21 +70,29 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
         piece->flags = j == 0 ? branch->flags : branch->flags & ~ATH_LOOSE;
         piece->rank = piece->count;
         piece->low_level = -1;
-        piece->carrier = -1;
+        piece->carrier = piece->last_carried = -1;
         for (int32_t v = piece->first; v < piece->first + piece->count; v++) piece_of_vertex[v] = next + j;
     }
 }
 
-static void place_carriers(ath_shape *shape, ath_piece *pieces)
+/* Carriers on a stack: in depth-first order those on top are done with first. One goes when its last piece has been
+ * attached, before that piece is kept itself, so that a long chain never holds more than one. */
+static void place_carriers(ath_shape *shape, ath_piece *pieces, int32_t *stack, int keep)
 {
+    int64_t used = 0;
+    int32_t height = 0;
+    shape->carrier_rows = 0;
+    shape->longest = 0;
+    for (int32_t p = 0; p < shape->piece_count; p++) shape->longest = ath_max(shape->longest, pieces[p].count);
     for (int32_t p = 0; p < shape->piece_count; p++)
-        if (pieces[p].parent >= 0) pieces[pieces[p].parent].carrier = 0;
-    shape->carrier_vertices = shape->carrier_pieces = 0;
+        if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_carried = p;
     for (int32_t p = 0; p < shape->piece_count; p++) {
-        if (pieces[p].carrier < 0) continue;
-        pieces[p].carrier = shape->carrier_vertices;
-        pieces[p].carrier_index = shape->carrier_pieces++;
-        shape->carrier_vertices += pieces[p].count;
+        while (!keep && height > 0 && pieces[stack[height - 1]].last_carried <= p) used = pieces[stack[--height]].carrier;
+        if (pieces[p].last_carried < 0) continue;
+        stack[height++] = p;
+        pieces[p].carrier = used;
+        used += pieces[p].count + ATH_CARRIER_FRAMES;
+        if (used > shape->carrier_rows) shape->carrier_rows = used;
     }
 }
 
@@ -106,7 +114,7 @@ static void plan_node(const ath_shape *shape, ath_piece *pieces, ath_node *node,
     }
 }
 
-void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *piece_of_vertex)
+void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep)
 {
     const ath_branch *branches = shape->branches;
     int32_t next_piece = 0, node = 0, following = 0;
@@ -115,7 +123,7 @@ void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *pie
         shape->height = ath_max(shape->height, branches[b].depth);
     for (int32_t b = 0; b < shape->branch_count; b++) {
         int32_t parts = pieces_of(branches[b].count), level = shape->height + 1;
-        split_branch(branches, b, pieces, next_piece, piece_of_vertex);
+        split_branch(branches, b, pieces, next_piece, memory);
         if (b == following) {
             plan_node(shape, pieces, nodes + node++, b, next_piece);
             following = next_node(branches, b);
@@ -124,7 +132,7 @@ void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *pie
         for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].level = level;
         next_piece += parts;
     }
-    place_carriers(shape, pieces);
+    place_carriers(shape, pieces, memory, keep);
 }
 
 /* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes

@@ -38,8 +38,9 @@ ATH_INLINE void context_learn(ath_context *context, int bit)
 
 ATH_INLINE void context_init(ath_context *context, uint32_t one)
 {
-    context->one = (uint16_t)(one < PROBABILITY_MIN ? PROBABILITY_MIN
-                              : one > 65536u - PROBABILITY_MIN ? 65536u - PROBABILITY_MIN : one);
+    if (one < PROBABILITY_MIN) one = PROBABILITY_MIN;
+    if (one > 65536u - PROBABILITY_MIN) one = 65536u - PROBABILITY_MIN;
+    context->one = (uint16_t)one;
     context->experience = 0;
 }
 

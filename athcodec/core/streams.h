@@ -4,8 +4,7 @@
 #ifndef ATH_STREAMS_H
 #define ATH_STREAMS_H
 
-#include "coefficient_model.h"
-#include "motion.h"
+#include "number_model.h"
 
 /* ---- hierarchy ---- */
 
@@ -53,17 +52,17 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {.lag = 1};
+    static const ath_branch none = {0, 0, 0, 0, 1, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
     if (branch->parent < -1) return 0;
-    int32_t depth = branch->parent < 0 ? 0 : branches[branch->parent].depth + 1, class = ath_min(depth, 15);
+    int32_t depth = branch->parent < 0 ? 0 : branches[branch->parent].depth + 1, kind = ath_min(depth, 15);
     branch->depth = depth;
-    uint32_t more = code_unsigned(coder, &model->count, (uint32_t)mean_count[class], (uint32_t)(branch->count - 1));
+    uint32_t more = code_unsigned(coder, &model->count, (uint32_t)mean_count[kind], (uint32_t)(branch->count - 1));
     if (more >= (uint32_t)vertices_left) return 0;
     branch->count = (int32_t)more + 1;
-    mean_count[class] += (ath_min((int32_t)more, 1 << 16) * 16 - mean_count[class]) / 4;
+    mean_count[kind] += (ath_min((int32_t)more, 1 << 16) * 16 - mean_count[kind]) / 4;
     branch->flags = code_flags(coder, model, before->flags, branch->flags);
     branch->lag = code_signed(coder, &model->lag, 0, branch->lag - before->lag) + before->lag;
     if (branch->lag < 0 || branch->lag > 65535 || (branch->parent < 0 && branch->flags & ATH_LOOSE)) return 0;
@@ -351,156 +350,6 @@ static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, in
         }
     }
     return 1;
-}
-
-/* ---- stems ---- */
-
-/* Frequencies that a row of a level's stream may code. */
-static int32_t rank_of(const ath_motion *motion, int32_t level) { return motion->streams[level].temporal_rank; }
-
-static void code_piece(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
-                       int32_t p, int32_t level)
-{
-    const ath_piece *piece = shape->pieces + p;
-    int32_t from = 0, to = 0, above_count = 0, frames = motion->frames, rank = rank_of(motion, level);
-    if (level == (piece->low_level >= 0 ? piece->low_level : piece->level)) {
-        if (ath_has_shift(piece))
-            code_row(coder, model, frames, rank, SHIFT_SLOT, 0, 0, ath_shift_track(motion, p));
-        if (ath_omega_step(shape, piece, motion->streams + level) > 0.0)
-            code_row(coder, model, frames, rank, OMEGA_SLOT, 0, 0, ath_omega_track(motion, p));
-    }
-    if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
-    if (piece->level == level) {
-        from = piece->low_modes;
-        to = piece->rank;
-    }
-    const int32_t *above = 0;
-    for (int32_t m = from; m < to; m++) {
-        int32_t *row = ath_coefficients_of(motion, piece->first + m);
-        above_count = code_row(coder, model, frames, rank, m, above, above_count, row);
-        above = row;
-    }
-}
-
-static int code_stems(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_motion *motion,
-                       int32_t level)
-{
-    coefficient_model_init(model);
-    for (int32_t p = 0; p < shape->piece_count; p++) code_piece(coder, model, shape, motion, p, level);
-    return !model->invalid;
-}
-
-/* ---- maps of nodes ---- */
-
-typedef struct {
-    coefficient_model rows;
-    number_model step;
-} affine_model;
-
-static int code_affines(ath_coder *coder, affine_model *model, const ath_shape *shape, const ath_motion *motion,
-                        int32_t level)
-{
-    int32_t before = 0;
-    coefficient_model_init(&model->rows);
-    number_model_init(&model->step);
-    for (int32_t n = 0; n < shape->node_count; n++) {
-        const ath_node *node = shape->nodes + n;
-        if (!node->coded || node->level != level) continue;
-        int32_t change = code_signed(coder, &model->step, 32, motion->node_steps[n] - before), above_count = 0;
-        if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
-        motion->node_steps[n] = before = before + change;
-        const int32_t *above = 0;
-        for (int32_t r = 0; r < node->rank; r++) {
-            int32_t *row = ath_node_track(motion, n, r);
-            above_count = code_row(coder, &model->rows, motion->frames, motion->frames, r, above, above_count, row);
-            above = row;
-        }
-        if (ath_has_shift(shape->pieces + node->piece))
-            code_row(coder, &model->rows, motion->frames, motion->frames, SHIFT_SLOT, 0, 0,
-                     ath_node_track(motion, n, 3));
-    }
-    return !model->rows.invalid;
-}
-
-/* ---- corrections ---- */
-
-enum { CORRECTION_BLOCK = 8 };
-
-typedef struct {
-    ath_context vertex[4], block[2][4], frame[3][3][2], zero[2][3], sign[3][3];
-    number_model size;
-    int32_t row[2][ATH_SEGMENT_FRAMES][3]; /* corrections of the vertex before and of this one */
-} correction_model;
-
-static void correction_model_init(correction_model *model)
-{
-    memset(model, 0, sizeof *model);
-    for (int32_t i = 0; i < 4; i++) context_init(&model->vertex[i], i == 0 ? 4000 : 32768);
-    for (int32_t i = 0; i < 2; i++)
-        for (int32_t j = 0; j < 4; j++) context_init(&model->block[i][j], 8000);
-    for (int32_t i = 0; i < 3; i++)
-        for (int32_t j = 0; j < 3; j++)
-            for (int32_t k = 0; k < 2; k++) context_init(&model->frame[i][j][k], i || j ? 32768 : 6000);
-    for (int32_t i = 0; i < 2; i++)
-        for (int32_t j = 0; j < 3; j++) context_init(&model->zero[i][j], 32768);
-    for (int32_t i = 0; i < 3; i++)
-        for (int32_t j = 0; j < 3; j++) context_init(&model->sign[i][j], 32768);
-    number_model_init(&model->size);
-}
-
-ATH_INLINE int is_correction(const int32_t q[3]) { return q[0] != 0 || q[1] != 0 || q[2] != 0; }
-
-static int any_correction(int32_t row[][3], int32_t from, int32_t to)
-{
-    for (int32_t t = from; t < to; t++)
-        if (is_correction(row[t])) return 1;
-    return 0;
-}
-
-/* A vector that is not all zero; `like` is a neighbour's correction, or zeros. */
-static void code_correction(ath_coder *coder, correction_model *model, const int32_t like[3], int32_t q[3])
-{
-    int any = 0;
-    for (int32_t axis = 0; axis < 3; axis++) {
-        int32_t sign = like[axis] == 0 ? 0 : like[axis] < 0 ? 1 : 2;
-        int nonzero = axis == 2 && !any;
-        if (!nonzero) nonzero = coder_bit(coder, &model->zero[any][sign != 0 ? 1 : is_correction(like) ? 2 : 0], q[axis] != 0);
-        if (!nonzero) {
-            q[axis] = 0;
-            continue;
-        }
-        any = 1;
-        int negative = coder_bit(coder, &model->sign[axis][sign], q[axis] < 0);
-        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, clipped(like[axis]) * 16, magnitude_of(q[axis]) - 1) + 1;
-        q[axis] = negative ? -magnitude : magnitude;
-    }
-}
-
-/* The corrections of one vertex, in model->row[1]; those of the vertex before are in model->row[0]. */
-static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames)
-{
-    int32_t(*above)[3] = model->row[0], (*row)[3] = model->row[1];
-    int any = 0, block_before = 0;
-    for (int32_t from = 0; from < frames; from += CORRECTION_BLOCK) {
-        int32_t to = ath_min(from + CORRECTION_BLOCK, frames);
-        int beside = any_correction(above, from, to)
-                     + 2 * any_correction(above, ath_max(from - CORRECTION_BLOCK, 0), ath_min(to + CORRECTION_BLOCK, frames));
-        int block = to == frames && !any ? 1
-                    : coder_bit(coder, &model->block[block_before][beside], ENCODING && any_correction(row, from, to));
-        int found = 0;
-        block_before = block;
-        any |= block;
-        for (int32_t t = from; block && t < to; t++) {
-            int earlier = t == 0 ? 0 : is_correction(row[t - 1]) ? 2 : t > 1 && is_correction(row[t - 2]) ? 1 : 0;
-            int near = is_correction(above[t]) ? 2
-                       : (t > 0 && is_correction(above[t - 1])) || (t + 1 < frames && is_correction(above[t + 1])) ? 1 : 0;
-            int here = t == to - 1 && !found ? 1
-                       : coder_bit(coder, &model->frame[earlier][near][found], ENCODING && is_correction(row[t]));
-            if (!here) continue;
-            found = 1;
-            code_correction(coder, model, earlier == 2 ? row[t - 1] : above[t], row[t]);
-        }
-    }
 }
 
 #endif

@@ -1,0 +1,72 @@
+/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, the only place that knows offsets. */
+#ifndef ATH_CONTAINER_H
+#define ATH_CONTAINER_H
+
+#include "internal.h"
+
+enum {
+    ATH_HIERARCHY = 1,
+    ATH_REST = 2,
+    ATH_TIME = 3,
+    ATH_STEMS = 16,
+    ATH_AFFINES = 17,
+    ATH_CORRECTIONS = 18,
+    ATH_NO_LEVEL = 255
+};
+
+typedef struct {
+    uint64_t file_length;
+    uint64_t chunks_at;  /* where the first chunk begins */
+    double max_error;
+    uint32_t checksum;
+    uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
+    int32_t level_count, full_level_count, wide;
+} ath_header;
+
+/* Checks everything in front of the first chunk. Fills *header, *needed (bytes wanted from the front on ATH_MISSING, the
+ * prelude's length on ATH_OK) and, unless null, chunk_count chunks and level_count x segment_count pairs of errors. */
+int ath_read_front(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
+                   ath_chunk *chunks, float *errors);
+
+/* The chunk of this kind, or null. Level ATH_NO_LEVEL and segment 0 for those of the prelude. */
+const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
+                                uint32_t segment);
+int ath_is_motion(const ath_chunk *chunk);
+
+/* ---- heads of chunks: ATH_OK or ATH_BAD_CHUNK; `body` is what follows the head ---- */
+
+typedef struct {
+    const uint8_t *bytes;
+    size_t size;
+} ath_bytes;
+
+typedef struct {
+    float epsilon, xi;
+    uint32_t eta, lambda;
+} ath_thresholds;
+
+typedef struct {
+    double origin[3], step;
+    int32_t exact, wide;
+} ath_rest_head;
+
+typedef struct {
+    double first, step;
+    int32_t method; /* 0: first + i * step; 1: first + i / step; 2: stream */
+} ath_time_head;
+
+typedef struct {
+    double step, omega;
+    int32_t bits, rank;
+    ath_bytes basis;
+} ath_stems_head;
+
+int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
+int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
+int ath_parse_time(ath_bytes chunk, ath_time_head *head, ath_bytes *body);
+int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
+int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
+
+int ath_is_finite(double value);
+
+#endif

@@ -1,0 +1,89 @@
+/* What an encoder needs of the core: athcodec's Python side is its only user, and players leave it out. Segments are
+ * analysed, measured and written stage by stage; ath.h reads what comes out.
+ *
+ * Motion arrays are vertex-major: element (vertex v, axis, frame t) of a segment of T frames stands at
+ * (v * 3 + axis) * T + t. Vertices are in file order. */
+#ifndef ATH_ENCODE_H
+#define ATH_ENCODE_H
+
+#include "motion.h"
+
+/* The integers of one segment; with them come ath_motion's streams. */
+typedef struct ath_integers {
+    int32_t *coefficients; /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
+    int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
+    int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
+    int32_t *node_steps;   /* node_count: exponents of half-octave steps */
+} ath_integers;
+
+ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_shape *shape, const ath_integers *integers, int32_t frames,
+                                            int32_t p)
+{
+    ath_piece_rows rows;
+    rows.modes = ath_row(integers->coefficients, shape->pieces[p].first, frames);
+    rows.omega = ath_row(integers->tracks, 2 * p, frames);
+    rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
+    rows.counts = 0;
+    return rows;
+}
+
+ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t frames, int32_t n)
+{
+    ath_node_rows rows;
+    rows.rows = ath_row(integers->node_tracks, 4 * n, frames);
+    rows.step = integers->node_steps + n;
+    return rows;
+}
+
+/* Bytes of scratch memory that any of the writers below needs as `model`. */
+ATH_ENCODER_API size_t ath_model_size(void);
+
+/* Source positions, (frames, vertices, 3) in the source's order, float or (wide) double, to vertex-major doubles less
+ * the origin. */
+ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide,
+                        const void *source, const double origin[3], double *out);
+
+/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
+ * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
+ * its number of vertices: the same error in all of them together costs the same everywhere. Carriers are to be kept
+ * (ath_plan). */
+ATH_ENCODER_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+                         const double *source, double dead_zone);
+ATH_ENCODER_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+                               const double *source, const double *level_steps, double dead_zone);
+
+/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (wide) double. */
+ATH_ENCODER_API void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t level,
+                      const double origin[3], int wide, void *positions);
+
+/* Largest distance and sum of squared distances between positions and source (plus origin). */
+ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
+                       const double origin[3], double *max_error, double *sum_squares);
+
+/* Finds the corrections that bring every vertex within `limit`, applies them to `positions` and fills rows of
+ * (vertex, frame, x, y, z). Returns their number; when it is above `capacity` nothing was applied; -1: the step cannot
+ * express them. */
+ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions,
+                                     const double *source, const double origin[3], double limit, double step,
+                                     int32_t *corrections, int64_t capacity);
+
+/* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
+ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                     int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
+                                     const int32_t *vertex_source);
+ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                int32_t branch_count, double step, const double *source, double *rest);
+ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                      int32_t branch_count, int wide, const double *rest);
+ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
+                                 const double *times);
+ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
+                                    int32_t limit, const int32_t *basis);
+ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+                                 const ath_motion *motion, const ath_integers *integers, int32_t level);
+ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+                                   const ath_motion *motion, const ath_integers *integers, int32_t level);
+ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
+                                       int32_t frames, const int32_t *corrections, int64_t count);
+
+#endif

@@ -1,0 +1,519 @@
+/* Opening a file, and what is known once it is open (ath.h). */
+#include "file.h"
+#include "decode.h"
+
+/* ---- memory ---- */
+
+static int32_t most_pieces(const ath_header *header)
+{
+    return (int32_t)(header->branch_count + header->vertex_count / ATH_PIECE_VERTICES);
+}
+
+static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
+
+static uint64_t scratch_size(const ath_header *header)
+{
+    uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
+    return larger(larger(size, ath_prelude_model_size()), ATH_BASIS_WORK * sizeof(double));
+}
+
+/* Lays the file out behind its struct; with a null base only counts. */
+static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t vertices = header->vertex_count, branches = header->branch_count;
+    uint64_t entries = (uint64_t)header->level_count * header->segment_count;
+    ath_take(&arena, sizeof *file);
+    file->chunks = (ath_chunk *)ath_take(&arena, header->chunk_count * sizeof(ath_chunk));
+    file->errors = (float *)ath_take(&arena, entries * 2 * sizeof(float));
+    file->branches = (ath_branch *)ath_take(&arena, branches * sizeof(ath_branch));
+    file->branch_source = (int32_t *)ath_take(&arena, branches * sizeof(int32_t));
+    file->vertex_source = (int32_t *)ath_take(&arena, vertices * sizeof(int32_t));
+    file->times = (double *)ath_take(&arena, header->frame_count * sizeof(double));
+    file->rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
+    file->stored_rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
+    file->pieces = (ath_piece *)ath_take(&arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
+    file->nodes = (ath_node *)ath_take(&arena, branches * sizeof(ath_node));
+    file->gaps = (uint8_t *)ath_take(&arena, vertices);
+    file->scratch = ath_take(&arena, scratch_size(header));
+    return arena.used;
+}
+
+/* FORMAT.md, "Limits": what a segment may take, whatever the decoder. */
+static int within_memory(const ath_header *header, const ath_limits *limits)
+{
+    uint64_t frames = (header->frame_count + header->segment_count - 1) / header->segment_count;
+    return header->vertex_count * (60 * frames + 512) <= limits->memory_bytes;
+}
+
+static ath_limits limits_or_default(const ath_limits *limits)
+{
+    ath_limits chosen;
+    ath_default_limits(&chosen);
+    return limits ? *limits : chosen;
+}
+
+int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, size_t *front_bytes,
+              size_t *memory_bytes)
+{
+    ath_limits chosen = limits_or_default(limits);
+    ath_header header;
+    ath_file file;
+    uint64_t needed;
+    int result = ath_read_front(bytes, available, &chosen, &header, &needed, 0, 0);
+    if (needed > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
+    *front_bytes = (size_t)needed;
+    *memory_bytes = 0;
+    if (result != ATH_OK) return result;
+    uint64_t memory = carve(&file, &header, 0);
+    if (!within_memory(&header, &chosen) || memory > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
+    *memory_bytes = (size_t)memory;
+    return ATH_OK;
+}
+
+/* ---- the chunks of the prelude ---- */
+
+static int32_t index_of(const ath_file *file, const ath_chunk *chunk) { return (int32_t)(chunk - file->chunks); }
+
+/* The chunk's bytes, checked; the chunk is at fault until the next is loaded. */
+static int load(ath_file *file, int32_t kind, ath_bytes *content)
+{
+    const ath_chunk *chunk = ath_find_chunk(file->chunks, file->header.chunk_count, kind, ATH_NO_LEVEL, 0);
+    if (!chunk) return ATH_BAD_CHUNK_TABLE;
+    file->fault = index_of(file, chunk);
+    content->bytes = chunk->bytes;
+    content->size = chunk->length;
+    return ath_check_chunk(file, file->fault);
+}
+
+static int read_hierarchy(ath_file *file, const ath_limits *limits)
+{
+    const ath_header *header = &file->header;
+    int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
+    ath_bytes chunk, body;
+    ath_thresholds thresholds;
+    int result = load(file, ATH_HIERARCHY, &chunk);
+    if (result == ATH_OK) result = ath_parse_hierarchy(chunk, &thresholds, &body);
+    if (result != ATH_OK) return result;
+    memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
+    result = ath_decode_hierarchy(file->scratch, body.bytes, body.size, branch_count, vertex_count, file->branches,
+                                  file->branch_source, file->vertex_source);
+    if (result != ATH_OK) return result;
+    file->info.epsilon = thresholds.epsilon;
+    file->info.xi = thresholds.xi;
+    file->info.eta = thresholds.eta;
+    file->info.lambda = thresholds.lambda;
+    for (int32_t b = 0; b < branch_count; b++)
+        if ((uint32_t)file->branches[b].depth >= limits->hierarchy_depth) return ATH_LIMIT_EXCEEDED;
+    return ATH_OK;
+}
+
+static void plan(ath_file *file)
+{
+    ath_shape *shape = &file->shape;
+    shape->vertex_count = (int32_t)file->header.vertex_count;
+    shape->branch_count = (int32_t)file->header.branch_count;
+    shape->branches = file->branches;
+    shape->pieces = file->pieces;
+    shape->nodes = file->nodes;
+    shape->piece_count = ath_count_pieces(file->branches, shape->branch_count, shape->vertex_count);
+    shape->node_count = ath_count_nodes(file->branches, shape->branch_count);
+    ath_plan(shape, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
+}
+
+/* Which levels have which chunks. */
+static void plan_levels(ath_file *file)
+{
+    const ath_shape *shape = &file->shape;
+    file->stems_levels = 0;
+    memset(file->affine_levels, 0, sizeof file->affine_levels);
+    for (int32_t p = 0; p < shape->piece_count; p++) {
+        file->stems_levels |= 1u << shape->pieces[p].level;
+        if (shape->pieces[p].low_level >= 0) file->stems_levels |= 1u << shape->pieces[p].low_level;
+    }
+    for (int32_t n = 0; n < shape->node_count; n++) {
+        const ath_node *node = shape->nodes + n;
+        for (int32_t level = node->level; node->coded && level <= node->last; level++)
+            file->affine_levels[level] |= 1u << node->level;
+    }
+}
+
+int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
+{
+    if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
+    if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
+    return kind == ATH_CORRECTIONS && d == level && d == file->shape.height + 1;
+}
+
+/* The table has the motion chunks that the hierarchy asks for, and no others. */
+static int check_motion_chunks(const ath_file *file)
+{
+    uint32_t count[2][ATH_LEVELS] = {{0}};
+    for (uint32_t i = 0; i < file->header.chunk_count; i++) {
+        const ath_chunk *chunk = file->chunks + i;
+        if (chunk->kind == ATH_STEMS || chunk->kind == ATH_AFFINES) count[chunk->kind - ATH_STEMS][chunk->level]++;
+        if (chunk->kind == ATH_CORRECTIONS && chunk->level != file->shape.height + 1) return ATH_BAD_CHUNK_TABLE;
+    }
+    for (int32_t kind = ATH_STEMS; kind <= ATH_AFFINES; kind++)
+        for (int32_t d = 0; d < file->header.level_count; d++) {
+            uint32_t wanted = ath_file_needs(file, kind, d, d) ? file->header.segment_count : 0;
+            if (count[kind - ATH_STEMS][d] != wanted) return ATH_BAD_CHUNK_TABLE;
+        }
+    return ATH_OK;
+}
+
+static int all_finite(const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!ath_is_finite(values[i])) return 0;
+    return 1;
+}
+
+static int read_rest(ath_file *file)
+{
+    const ath_header *header = &file->header;
+    size_t numbers = 3 * (size_t)header->vertex_count;
+    ath_bytes chunk, body;
+    ath_rest_head head;
+    int result = load(file, ATH_REST, &chunk);
+    if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
+    if (result != ATH_OK) return result;
+    memcpy(file->info.origin, head.origin, sizeof head.origin);
+    file->info.rest_wide = head.wide;
+    if (head.exact) {
+        result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
+                                       (int32_t)header->branch_count, head.wide, file->stored_rest);
+        for (size_t i = 0; i < numbers; i++) file->rest[i] = file->stored_rest[i] - head.origin[i % 3];
+    } else {
+        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
+                                 head.step, file->rest);
+        file->stored_rest = 0;
+    }
+    return result != ATH_OK ? result : all_finite(file->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+static int read_time(ath_file *file)
+{
+    int32_t count = (int32_t)file->header.frame_count;
+    double *times = file->times;
+    ath_bytes chunk, body;
+    ath_time_head head;
+    int result = load(file, ATH_TIME, &chunk);
+    if (result == ATH_OK) result = ath_parse_time(chunk, &head, &body);
+    if (result == ATH_OK && head.method == 2)
+        result = ath_decode_times(file->scratch, body.bytes, body.size, count, times);
+    if (result != ATH_OK) return result;
+    for (int32_t i = 0; i < count; i++) {
+        if (head.method == 0) times[i] = head.first + (double)i * head.step;
+        if (head.method == 1) times[i] = head.first + (double)i / head.step;
+        if (!ath_is_finite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) return ATH_BAD_CHUNK;
+    }
+    file->info.duration = times[count - 1] - times[0];
+    return ATH_OK;
+}
+
+/* ---- opening ---- */
+
+static void set_info(ath_file *file, uint64_t prelude)
+{
+    const ath_header *header = &file->header;
+    ath_info *info = &file->info;
+    info->file_length = header->file_length;
+    info->prelude_length = prelude;
+    info->max_error = header->max_error;
+    info->vertex_count = (int32_t)header->vertex_count;
+    info->branch_count = (int32_t)header->branch_count;
+    info->frame_count = (int32_t)header->frame_count;
+    info->segment_count = (int32_t)header->segment_count;
+    info->level_count = header->level_count;
+    info->full_level_count = header->full_level_count;
+    info->chunk_count = (int32_t)header->chunk_count;
+    info->wide = header->wide;
+    file->frames[0] = info->frame_count / info->segment_count;
+    file->frames[1] = (info->frame_count + info->segment_count - 1) / info->segment_count;
+}
+
+static int read_prelude(ath_file *file, const ath_limits *limits)
+{
+    int result = read_hierarchy(file, limits);
+    if (result != ATH_OK) return result;
+    file->fault = -1;
+    plan(file);
+    file->info.node_count = file->shape.node_count;
+    if (file->shape.height + 2 != file->header.full_level_count) return ATH_BAD_HEADER;
+    plan_levels(file);
+    if ((result = check_motion_chunks(file)) != ATH_OK) return result;
+    if ((result = read_rest(file)) != ATH_OK) return result;
+    if ((result = read_time(file)) != ATH_OK) return result;
+    file->fault = -1;
+    file->shape.rest = file->rest;
+    file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->shape.piece_count, file->rest, file->gaps,
+                                                   (int32_t *)file->scratch);
+    ath_plan_nodes(&file->shape, file->nodes);
+    return ATH_OK;
+}
+
+int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits)
+{
+    ath_limits chosen = limits_or_default(limits);
+    ath_file *file = (ath_file *)memory;
+    size_t front, needed;
+    uint64_t prelude;
+    if (!ath_fits(memory, memory_bytes, sizeof *file)) return ATH_NO_MEMORY;
+    file->fault = -1;
+    int result = ath_front(bytes, available, &chosen, &front, &needed);
+    if (result != ATH_OK) return result;
+    if (memory_bytes < needed) return ATH_NO_MEMORY;
+    memset(file, 0, sizeof *file);
+    ath_read_front(bytes, available, &chosen, &file->header, &prelude, 0, 0);
+    carve(file, &file->header, (uint8_t *)memory);
+    ath_read_front(bytes, available, &chosen, &file->header, &prelude, file->chunks, file->errors);
+    file->fault = -1;
+    set_info(file, prelude);
+    ath_feed(file, bytes, 0, available);
+    return read_prelude(file, &chosen);
+}
+
+/* ---- building ---- */
+
+static uint64_t carve_build(ath_file *file, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
+    for (int32_t i = 0; i < 2; i++)
+        file->cosines[i] = i == 1 && file->frames[0] == file->frames[1] ? file->cosines[0]
+                           : (double *)ath_take(&arena, (uint64_t)file->frames[i] * (uint64_t)file->frames[i] * sizeof(double));
+    return arena.used;
+}
+
+size_t ath_build_size(const ath_file *file)
+{
+    ath_file counted = *file;
+    return ath_size_or_most(carve_build(&counted, 0));
+}
+
+int ath_build(ath_file *file, void *memory, size_t memory_bytes)
+{
+    ath_file counted = *file;
+    if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
+    carve_build(file, (uint8_t *)memory);
+    ath_basis_fill(file->pieces, file->shape.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
+    file->shape.bases = file->bases;
+    ath_cosine_basis(file->frames[0], file->cosines[0]);
+    if (file->cosines[1] != file->cosines[0]) ath_cosine_basis(file->frames[1], file->cosines[1]);
+    return ATH_OK;
+}
+
+const double *ath_file_cosines(const ath_file *file, int32_t frames)
+{
+    return file->cosines[frames == file->frames[0] ? 0 : 1];
+}
+
+/* ---- what a file holds ---- */
+
+void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
+
+const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
+
+const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
+
+const int32_t *ath_branch_source(const ath_file *file) { return file->branch_source; }
+
+const double *ath_times(const ath_file *file) { return file->times; }
+
+static double rest_number(const ath_file *file, size_t i)
+{
+    return file->stored_rest ? file->stored_rest[i] : file->rest[i] + file->info.origin[i % 3];
+}
+
+static size_t place_of(const ath_file *file, ath_order order, size_t v)
+{
+    return order == ATH_SOURCE_ORDER ? (size_t)file->vertex_source[v] : v;
+}
+
+void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
+{
+    for (size_t v = 0; v < file->header.vertex_count; v++) {
+        float *out = (float *)(void *)((char *)xyz + place_of(file, order, v) * stride);
+        for (size_t k = 0; k < 3; k++) out[k] = (float)rest_number(file, 3 * v + k);
+    }
+}
+
+void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t stride)
+{
+    for (size_t v = 0; v < file->header.vertex_count; v++) {
+        double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
+        for (size_t k = 0; k < 3; k++) out[k] = rest_number(file, 3 * v + k);
+    }
+}
+
+/* Squares are weighted by the frames of their segments. */
+void ath_level_error(const ath_file *file, int32_t level, int32_t segment, double *max_error, double *rms_error)
+{
+    int32_t first = segment < 0 ? 0 : segment, last = segment < 0 ? file->info.segment_count - 1 : segment;
+    double largest = 0.0, squares = 0.0, frames = 0.0;
+    for (int32_t s = first; s <= last; s++) {
+        const float *entry = file->errors + 2 * ((size_t)level * (size_t)file->info.segment_count + (size_t)s);
+        double count = (double)ath_file_frames(file, s);
+        if ((double)entry[0] > largest) largest = (double)entry[0];
+        squares = squares + (double)entry[1] * (double)entry[1] * count;
+        frames = frames + count;
+    }
+    if (max_error) *max_error = largest;
+    if (rms_error) *rms_error = first == last ? (double)file->errors[2 * ((size_t)level * (size_t)file->info.segment_count + (size_t)first) + 1]
+                                : ath_sqrt(squares / frames);
+}
+
+int32_t ath_segment_start(const ath_file *file, int32_t segment)
+{
+    return (int32_t)((int64_t)file->info.frame_count * segment / file->info.segment_count);
+}
+
+int32_t ath_file_frames(const ath_file *file, int32_t segment)
+{
+    return ath_segment_start(file, segment + 1) - ath_segment_start(file, segment);
+}
+
+int32_t ath_segment_of(const ath_file *file, int32_t frame)
+{
+    int32_t segment = (int32_t)((int64_t)frame * file->info.segment_count / file->info.frame_count);
+    while (segment + 1 < file->info.segment_count && ath_segment_start(file, segment + 1) <= frame) segment++;
+    return segment;
+}
+
+/* ---- chunks and bytes ---- */
+
+const ath_chunk *ath_chunks(const ath_file *file) { return file->chunks; }
+
+int ath_check_chunk(const ath_file *file, int32_t index)
+{
+    const ath_chunk *chunk = file->chunks + index;
+    if (!chunk->bytes) return ATH_MISSING;
+    return ath_crc32c(0, chunk->bytes, chunk->length) == chunk->checksum ? ATH_OK : ATH_BAD_CHECKSUM;
+}
+
+int32_t ath_fault(const ath_file *file) { return file->fault; }
+
+const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)
+{
+    return ath_find_chunk(file->chunks, file->header.chunk_count, kind, level, (uint32_t)segment);
+}
+
+/* First chunk that ends behind `offset`. */
+static uint32_t chunk_at(const ath_file *file, uint64_t offset)
+{
+    uint32_t low = 0, high = file->header.chunk_count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (file->chunks[middle].offset + file->chunks[middle].length <= offset)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size)
+{
+    uint64_t end = offset + size;
+    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count; i++) {
+        ath_chunk *chunk = file->chunks + i;
+        if (chunk->offset + chunk->length > end) break;
+        if (chunk->offset >= offset && chunk->length > 0) chunk->bytes = bytes + (chunk->offset - offset);
+    }
+}
+
+void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
+{
+    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count && file->chunks[i].offset < offset + size; i++)
+        if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
+}
+
+static int is_needed(const ath_file *file, const ath_chunk *chunk, int32_t level, int32_t first, int32_t last)
+{
+    return ath_is_motion(chunk) && (int32_t)chunk->segment >= first && (int32_t)chunk->segment <= last
+           && ath_file_needs(file, chunk->kind, chunk->level, level);
+}
+
+int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
+                   ath_range *ranges, int32_t capacity)
+{
+    int32_t count = 0;
+    uint64_t end = 0;
+    for (uint32_t i = 0; i < file->header.chunk_count; i++) {
+        const ath_chunk *chunk = file->chunks + i;
+        if (chunk->length == 0 || (chunk->bytes && !all) || !is_needed(file, chunk, level, first_segment, last_segment)) continue;
+        int joined = count > 0 && chunk->offset == end;
+        end = chunk->offset + chunk->length;
+        if (!joined) count++;
+        if (count > capacity) continue;
+        if (!joined) ranges[count - 1].offset = chunk->offset;
+        ranges[count - 1].size = end - ranges[count - 1].offset;
+    }
+    return count;
+}
+
+static int is_ready(const ath_file *file, int32_t segment, int32_t level)
+{
+    for (int32_t kind = ATH_STEMS; kind <= ATH_CORRECTIONS; kind++)
+        for (int32_t d = 0; d <= level; d++) {
+            if (!ath_file_needs(file, kind, d, level)) continue;
+            const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);
+            if (chunk && !chunk->bytes) return 0;
+        }
+    return 1;
+}
+
+int32_t ath_ready_level(const ath_file *file, int32_t segment)
+{
+    for (int32_t level = file->info.level_count - 1; level >= 0; level--)
+        if (is_ready(file, segment, level)) return level;
+    return -1;
+}
+
+/* ---- parts of a level ---- */
+
+/* Walks over the parts in order; `parts` may be null. */
+static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32_t count[3])
+{
+    const ath_shape *shape = &file->shape;
+    ath_part run = {0, 0, -1, 0};
+    int32_t n = 0;
+    count[0] = count[1] = count[2] = 0;
+    for (int32_t p = 0; p <= shape->piece_count; p++) {
+        const ath_piece *piece = shape->pieces + p;
+        int exact = p < shape->piece_count && piece->level <= level;
+        if (run.count > 0 && !exact) {
+            if (parts) parts[count[0]] = run;
+            count[0]++;
+            run.count = 0;
+        }
+        if (exact && run.count == 0) {
+            run.first = piece->first;
+            run.index = count[2];
+        }
+        if (exact) run.count += piece->count;
+        if (exact) count[2] += piece->count;
+        while (n < shape->node_count && shape->nodes[n].piece < p) n++;
+        if (n == shape->node_count || shape->nodes[n].piece != p || !ath_is_shown(shape->nodes + n, level)) continue;
+        ath_part node = {shape->nodes[n].first, shape->nodes[n].count, shape->nodes[n].branch, count[1]};
+        if (parts) parts[count[0]] = node;
+        count[0]++;
+        count[1]++;
+    }
+}
+
+void ath_cut_size(const ath_file *file, int32_t level, int32_t *parts, int32_t *nodes, int32_t *exact_vertices)
+{
+    int32_t count[3];
+    walk_cut(file, level, 0, count);
+    if (parts) *parts = count[0];
+    if (nodes) *nodes = count[1];
+    if (exact_vertices) *exact_vertices = count[2];
+}
+
+void ath_cut(const ath_file *file, int32_t level, ath_part *parts)
+{
+    int32_t count[3];
+    walk_cut(file, level, parts, count);
+}

@@ -1,0 +1,38 @@
+/* An opened file, as opening, preparing and playing see it. */
+#ifndef ATH_FILE_H
+#define ATH_FILE_H
+
+#include "container.h"
+#include "plan.h"
+
+struct ath_file {
+    ath_header header;
+    ath_info info;
+    ath_shape shape;
+    ath_chunk *chunks;
+    float *errors;               /* level_count x segment_count x (max, rms) */
+    ath_branch *branches;
+    int32_t *branch_source, *vertex_source;
+    double *times;
+    double *rest;                /* relative to the origin */
+    double *stored_rest;         /* as stored, where the file holds it exactly, else null */
+    ath_piece *pieces;
+    ath_node *nodes;
+    uint8_t *gaps;
+    void *scratch;               /* of opening and building */
+    double *bases;               /* null until ath_build */
+    double *cosines[2];          /* of the shorter and the longer segments */
+    uint64_t bases_count;
+    int32_t frames[2];           /* of the shorter and the longer segments */
+    int32_t fault;
+    uint32_t stems_levels;       /* bit d: level d has STEMS */
+    uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
+};
+
+int32_t ath_file_frames(const ath_file *file, int32_t segment);
+const double *ath_file_cosines(const ath_file *file, int32_t frames);
+const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
+/* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
+int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
+
+#endif

@@ -1,0 +1,83 @@
+/* Four doubles at a time. Every lane does what a scalar would, each operation rounded once, so that it makes no
+ * difference how many lanes the machine has. */
+#ifndef ATH_LANES_H
+#define ATH_LANES_H
+
+#include "internal.h"
+
+enum { ATH_LANES = 4 };
+
+#if defined(__GNUC__)
+
+typedef double ath_lanes __attribute__((vector_size(ATH_LANES * 8), aligned(8), may_alias));
+
+ATH_INLINE void lanes_set(ath_lanes *to, double x) { *to = (ath_lanes){x, x, x, x}; }
+
+/* to += weight * from */
+ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *from)
+{
+    *to = *to + weight * *(const ath_lanes *)(const void *)from;
+}
+
+ATH_INLINE void lanes_store(double *to, const ath_lanes *from) { *(ath_lanes *)(void *)to = *from; }
+
+#else
+
+typedef struct {
+    double lane[ATH_LANES];
+} ath_lanes;
+
+ATH_INLINE void lanes_set(ath_lanes *to, double x)
+{
+    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = x;
+}
+
+ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *from)
+{
+    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + weight * from[i];
+}
+
+ATH_INLINE void lanes_store(double *to, const ath_lanes *from)
+{
+    for (int i = 0; i < ATH_LANES; i++) to[i] = from->lane[i];
+}
+
+#endif
+
+/* out[t] = first + sum of weight[i] * row[i][t], i ascending, for `frames` values of t. */
+ATH_INLINE void lanes_sum(int32_t frames, int32_t count, const double *weight, const double *const *row, double first,
+                          double *out)
+{
+    int32_t t = 0;
+    for (; t + 4 * ATH_LANES <= frames; t += 4 * ATH_LANES) {
+        ath_lanes a, b, c, d;
+        lanes_set(&a, first);
+        lanes_set(&b, first);
+        lanes_set(&c, first);
+        lanes_set(&d, first);
+        for (int32_t i = 0; i < count; i++) {
+            const double *from = row[i] + t;
+            lanes_add_scaled(&a, weight[i], from);
+            lanes_add_scaled(&b, weight[i], from + ATH_LANES);
+            lanes_add_scaled(&c, weight[i], from + 2 * ATH_LANES);
+            lanes_add_scaled(&d, weight[i], from + 3 * ATH_LANES);
+        }
+        lanes_store(out + t, &a);
+        lanes_store(out + t + ATH_LANES, &b);
+        lanes_store(out + t + 2 * ATH_LANES, &c);
+        lanes_store(out + t + 3 * ATH_LANES, &d);
+    }
+    for (; t + ATH_LANES <= frames; t += ATH_LANES) {
+        ath_lanes a;
+        lanes_set(&a, first);
+        for (int32_t i = 0; i < count; i++) lanes_add_scaled(&a, weight[i], row[i] + t);
+        lanes_store(out + t, &a);
+    }
+    for (; t < frames; t++) {
+        double sum = first;
+        for (int32_t i = 0; i < count; i++) sum = sum + weight[i] * row[i][t];
+        out[t] = sum;
+    }
+}
+
+#endif

@@ -1,0 +1,182 @@
+/* What the streams of a segment hold, in which order: stems, maps of nodes, corrections. Compiled once for each
+ * direction, as streams.h is; a unit at a time, so that a decoder reads all levels side by side, piece by piece. */
+#ifndef ATH_MOTION_STREAMS_H
+#define ATH_MOTION_STREAMS_H
+
+#include "coefficient_model.h"
+
+/* ---- stems ---- */
+
+static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)
+{
+    if (rows->counts) rows->counts[slot] = count;
+}
+
+/* What the stream of one level holds of a piece. */
+static void code_piece(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_stream *stream,
+                       int32_t frames, int32_t p, int32_t level, const ath_piece_rows *rows)
+{
+    const ath_piece *piece = shape->pieces + p;
+    int32_t from = 0, to = 0, above_count = -1, rank = stream->temporal_rank;
+    if (level == ath_base_level(piece)) {
+        if (ath_has_shift(piece))
+            note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
+        if (ath_omega_step(shape, piece, stream) > 0.0)
+            note_count(rows, OMEGA_SLOT, code_row(coder, model, frames, rank, OMEGA_SLOT, -1, rows->omega));
+    }
+    if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
+    if (piece->level == level) {
+        from = piece->low_modes;
+        to = piece->rank;
+    }
+    for (int32_t m = from; m < to; m++) {
+        above_count = code_row(coder, model, frames, rank, m, above_count, ath_row(rows->modes, m, frames));
+        note_count(rows, m, above_count);
+    }
+}
+
+/* ---- maps of nodes ---- */
+
+typedef struct {
+    coefficient_model rows;
+    number_model step;
+    int32_t step_before;
+} affine_model;
+
+static void affine_model_init(affine_model *model, int32_t frames, uint32_t *history)
+{
+    coefficient_model_init(&model->rows, frames, history);
+    number_model_init(&model->step);
+    model->step_before = 0;
+}
+
+static int code_node(ath_coder *coder, affine_model *model, const ath_shape *shape, int32_t frames, int32_t n,
+                     const ath_node_rows *rows)
+{
+    const ath_node *node = shape->nodes + n;
+    int32_t before = model->step_before, above_count = -1;
+    int32_t change = code_signed(coder, &model->step, 32, *rows->step - before);
+    if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
+    *rows->step = model->step_before = before + change;
+    for (int32_t r = 0; r < node->rank; r++)
+        above_count = code_row(coder, &model->rows, frames, frames, r, above_count, ath_row(rows->rows, r, frames));
+    if (ath_has_shift(shape->pieces + node->piece))
+        code_row(coder, &model->rows, frames, frames, SHIFT_SLOT, -1, ath_row(rows->rows, 3, frames));
+    return !model->rows.invalid;
+}
+
+/* ---- corrections ---- */
+
+enum { CORRECTION_BLOCK = 8, CORRECTION_BLOCKS = ATH_SEGMENT_FRAMES / CORRECTION_BLOCK };
+
+/* The corrections of one vertex, and a bit for each frame that has one, a byte for each block; the bytes of the block
+ * before the first and of the one behind the last are 0. */
+typedef struct {
+    int32_t q[ATH_SEGMENT_FRAMES][3];
+    uint8_t blocks[1 + CORRECTION_BLOCKS + 1];
+} correction_row;
+
+typedef struct {
+    ath_context vertex[4], block[2][4], frame[3][3][2], zero[2][3], sign[3][3];
+    number_model size;
+    correction_row row[2]; /* of the vertex before and of this one; which is which: `turn` */
+    int32_t turn;
+    int32_t before;        /* whether the two vertices before had any */
+} correction_model;
+
+static void correction_model_init(correction_model *model)
+{
+    memset(model, 0, sizeof *model);
+    for (int32_t i = 0; i < 4; i++) context_init(&model->vertex[i], i == 0 ? 4000 : 32768);
+    for (int32_t i = 0; i < 2; i++)
+        for (int32_t j = 0; j < 4; j++) context_init(&model->block[i][j], 8000);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++)
+            for (int32_t k = 0; k < 2; k++) context_init(&model->frame[i][j][k], i || j ? 32768 : 6000);
+    for (int32_t i = 0; i < 2; i++)
+        for (int32_t j = 0; j < 3; j++) context_init(&model->zero[i][j], 32768);
+    for (int32_t i = 0; i < 3; i++)
+        for (int32_t j = 0; j < 3; j++) context_init(&model->sign[i][j], 32768);
+    number_model_init(&model->size);
+}
+
+ATH_INLINE int has_correction(const correction_row *row, int32_t t)
+{
+    return row->blocks[(t + CORRECTION_BLOCK) / CORRECTION_BLOCK] >> (t & (CORRECTION_BLOCK - 1)) & 1;
+}
+
+static void set_correction(correction_row *row, int32_t t)
+{
+    uint8_t *block = &row->blocks[1 + t / CORRECTION_BLOCK];
+    *block = (uint8_t)(*block | 1u << t % CORRECTION_BLOCK);
+}
+
+static void clear_corrections(correction_row *row)
+{
+    for (int32_t b = 0; b < CORRECTION_BLOCKS; b++) {
+        if (row->blocks[1 + b]) memset(row->q[b * CORRECTION_BLOCK], 0, sizeof row->q[0] * CORRECTION_BLOCK);
+        row->blocks[1 + b] = 0;
+    }
+}
+
+/* A vector that is not all zero; `like` is a neighbour's correction, or zeros. */
+static void code_correction(ath_coder *coder, correction_model *model, const int32_t like[3], int32_t q[3])
+{
+    int any = 0, alike = like[0] != 0 || like[1] != 0 || like[2] != 0;
+    for (int32_t axis = 0; axis < 3; axis++) {
+        int32_t sign = like[axis] == 0 ? 0 : like[axis] < 0 ? 1 : 2;
+        int nonzero = axis == 2 && !any;
+        if (!nonzero) nonzero = coder_bit(coder, &model->zero[any][sign != 0 ? 1 : alike ? 2 : 0], q[axis] != 0);
+        if (!nonzero) {
+            q[axis] = 0;
+            continue;
+        }
+        any = 1;
+        int negative = coder_bit(coder, &model->sign[axis][sign], q[axis] < 0);
+        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, clipped(like[axis]) * 16, magnitude_of(q[axis]) - 1) + 1;
+        q[axis] = negative ? -magnitude : magnitude;
+    }
+}
+
+static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames, const correction_row *above,
+                                  correction_row *row)
+{
+    int any = 0, block_before = 0;
+    for (int32_t from = 0, b = 1; from < frames; from += CORRECTION_BLOCK, b++) {
+        int32_t to = ath_min(from + CORRECTION_BLOCK, frames);
+        const uint8_t *blocks = above->blocks + b;
+        int beside = (blocks[0] != 0) + 2 * ((blocks[-1] | blocks[0] | blocks[1]) != 0);
+        int block = to == frames && !any ? 1
+                    : coder_bit(coder, &model->block[block_before][beside], row->blocks[b] != 0);
+        int found = 0;
+        block_before = block;
+        any |= block;
+        for (int32_t t = from; block && t < to; t++) {
+            int earlier = has_correction(row, t - 1) ? 2 : has_correction(row, t - 2) ? 1 : 0;
+            int near = has_correction(above, t) ? 2 : has_correction(above, t - 1) | has_correction(above, t + 1) ? 1 : 0;
+            int here = t == to - 1 && !found ? 1
+                       : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
+            if (!here) continue;
+            found = 1;
+            code_correction(coder, model, earlier == 2 ? row->q[t - 1] : above->q[t], row->q[t]);
+            set_correction(row, t);
+        }
+    }
+}
+
+/* The next vertex, whose corrections are in, or come into, the row returned, which is valid until the vertex after it;
+ * null: it has none. Encoding, the row is to be filled before (next_row). */
+static correction_row *next_row(correction_model *model) { return &model->row[model->turn]; }
+
+static const correction_row *code_vertex(ath_coder *coder, correction_model *model, int32_t frames, int any)
+{
+    correction_row *row = next_row(model), *above = &model->row[1 - model->turn];
+    any = coder_bit(coder, &model->vertex[model->before], any);
+    if (any) code_corrected_frames(coder, model, frames, above, row);
+    if (model->before & 1) clear_corrections(above);
+    model->before = (model->before << 1 | any) & 3;
+    model->turn = 1 - model->turn;
+    return any ? row : 0;
+}
+
+#endif

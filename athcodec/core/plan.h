@@ -1,0 +1,100 @@
+/* What all segments share (FORMAT.md, "Plan"): branches cut into pieces, nodes, the rest pose and its bases. */
+#ifndef ATH_PLAN_H
+#define ATH_PLAN_H
+
+#include "internal.h"
+
+/* A run of at most ATH_PIECE_VERTICES vertices of one stem, with one spatial basis. The first piece of a branch hangs
+ * on the parent's stem, the others on the last vertex of the piece before. */
+typedef struct ath_piece {
+    int64_t modes;        /* its cantilever modes in the bases */
+    int64_t basis;        /* its basis: `rank` rows of `count` */
+    int64_t carrier;      /* where what it carries is kept, in vertices; -1 when nothing hangs on it */
+    int32_t first, count; /* vertices */
+    int32_t parent;       /* piece, -1 for a root */
+    int32_t attach;       /* vertex, -1 for a root */
+    int32_t branch;
+    int32_t flags;
+    int32_t rank;
+    int32_t level;        /* whose stream completes it */
+    int32_t low_level;    /* whose stream holds its tracks and first modes, -1 when `level` does */
+    int32_t low_modes;
+    int32_t last_carried; /* last piece that hangs on it, -1: none */
+    int32_t reserved;
+} ath_piece;
+
+/* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */
+typedef struct ath_node {
+    double whitening[9];  /* rows: functionals that are orthonormal over the subtree's rest vertices */
+    int32_t branch, piece;
+    int32_t first, count; /* vertices of the subtree */
+    int32_t level, last;
+    int32_t coded;        /* 1: its map has a stream of its own; 0: it follows from the stem's first modes */
+    int32_t rank;         /* of the rest vertices about the attach point */
+} ath_node;
+
+typedef struct ath_shape {
+    int32_t vertex_count, branch_count, piece_count, node_count;
+    int64_t carrier_rows; /* memory of carriers, in vertices */
+    int32_t height;       /* deepest node: levels run from 0 to height + 1 */
+    int32_t longest;      /* vertices of the longest piece */
+    const ath_branch *branches;
+    const ath_piece *pieces;
+    const ath_node *nodes;
+    const double *rest;   /* vertex_count x 3, relative to the origin */
+    const double *bases;
+} ath_shape;
+
+/* Frames of a carrier take the place of four vertices: an attach point, a rotation. */
+enum { ATH_CARRIER_FRAMES = 4 };
+
+/* Completes first, subtree and depth of the branches and counts their pieces; 0 when they are no valid hierarchy. */
+ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
+ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
+
+/* Fills pieces and nodes, and height, longest and carrier_rows of `shape`, whose branches and counts are set. Carriers are kept for
+ * the whole pass over the pieces (keep), or until the last piece that hangs on them has come. `memory`: scratch,
+ * vertex_count. */
+ATH_ENCODER_API void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
+
+/* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */
+ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
+ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
+                                 int32_t *table);
+/* work: ATH_BASIS_WORK doubles. */
+enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
+ATH_ENCODER_API void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
+                            double *work, double *bases);
+/* Completes the nodes, once the rest pose is known. */
+ATH_ENCODER_API void ath_plan_nodes(const ath_shape *shape, ath_node *nodes);
+
+/* frames x frames: row k is the k-th function of the orthonormal DCT-II. */
+ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
+
+/* tan(x / 2) for 0 <= x < pi, by the series of the cosines. */
+double ath_tan_of_half(double x);
+
+ATH_INLINE const double *ath_rest_of(const ath_shape *shape, int32_t vertex)
+{
+    return shape->rest + 3 * (size_t)vertex;
+}
+
+/* Rest position of the point that a piece hangs on. */
+ATH_INLINE const double *ath_rest_attach(const ath_shape *shape, const ath_piece *piece)
+{
+    return ath_rest_of(shape, piece->attach >= 0 ? piece->attach : piece->first);
+}
+
+ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level)
+{
+    return node->level <= level && level <= node->last;
+}
+
+ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
+{
+    return piece->low_level >= 0 ? piece->low_level : piece->level;
+}
+
+ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
+
+#endif

@@ -1,0 +1,388 @@
+/* What a prepared segment shows: positions and matrices at any time, and which level a distance asks for. */
+#include "segment.h"
+
+/* ---- time ---- */
+
+/* 0 <= x < period; 0 where x is beyond what a double counts. */
+static double wrapped(double x, double period)
+{
+    double turns = x / period;
+    if (!(turns > -4503599627370496.0 && turns < 4503599627370496.0)) return 0.0;
+    double rest = x - period * (double)(int64_t)turns;
+    if (rest < 0.0) rest = rest + period;
+    return rest < period ? rest : 0.0;
+}
+
+static double frame_of(const ath_file *file, double seconds)
+{
+    const double *times = file->times;
+    int32_t low = 0, high = file->info.frame_count - 1;
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (times[middle] - times[0] <= seconds)
+            low = middle;
+        else
+            high = middle;
+    }
+    return (double)low + (seconds - (times[low] - times[0])) / (times[high] - times[low]);
+}
+
+double ath_frame_at(const ath_file *file, double seconds, ath_wrap wrap)
+{
+    double last = (double)(file->info.frame_count - 1), duration = file->info.duration;
+    if (file->info.frame_count < 2) return 0.0;
+    double frame_time = duration / last;
+    if (wrap == ATH_LOOP) seconds = wrapped(seconds, duration + frame_time);
+    if (wrap == ATH_PING_PONG) {
+        seconds = wrapped(seconds, 2.0 * duration);
+        if (seconds > duration) seconds = 2.0 * duration - seconds;
+    }
+    if (!(seconds > 0.0)) return 0.0;
+    if (seconds < duration) return frame_of(file, seconds);
+    double beyond = wrap == ATH_LOOP ? (seconds - duration) / frame_time : 0.0;
+    return last + (beyond < 1.0 ? beyond : 1.0);
+}
+
+ath_blend ath_blend_at(const ath_file *file, double frame)
+{
+    int32_t count = file->info.frame_count;
+    ath_blend blend;
+    if (!(frame > 0.0) || frame >= (double)count) frame = 0.0;
+    blend.frame[0] = blend.frame[1] = (int32_t)frame;
+    blend.weight = frame - (double)blend.frame[0];
+    if (blend.weight > 0.0) blend.frame[1] = blend.frame[0] + 1 < count ? blend.frame[0] + 1 : 0;
+    for (int32_t i = 0; i < 2; i++) blend.segment[i] = ath_segment_of(file, blend.frame[i]);
+    return blend;
+}
+
+/* ---- segments ---- */
+
+/* The frames to show, in the segments that have them. */
+typedef struct {
+    const ath_segment *segment[2];
+    size_t frame[2]; /* within the segment */
+    double weight;
+} shown_frames;
+
+static const ath_segment *find_segment(const ath_segment *const *segments, int32_t count, int32_t index, int32_t level)
+{
+    for (int32_t i = 0; i < count; i++)
+        if (segments[i] && segments[i]->level >= 0 && segments[i]->index == index
+            && (level < 0 || segments[i]->level == level))
+            return segments[i];
+    return 0;
+}
+
+static int show_one(const ath_segment *segment, int32_t frame, shown_frames *shown)
+{
+    shown->segment[0] = shown->segment[1] = segment;
+    shown->frame[0] = shown->frame[1] = (size_t)(frame - segment->start);
+    shown->weight = 0.0;
+    return ATH_HELD;
+}
+
+static int find_frames(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame,
+                       shown_frames *shown)
+{
+    ath_blend blend = ath_blend_at(file, frame);
+    shown->weight = blend.weight;
+    for (int32_t i = 0; i < count; i++) {
+        const ath_segment *first = find_segment(segments + i, 1, blend.segment[0], -1);
+        const ath_segment *second = first ? find_segment(segments, count, blend.segment[1], first->level) : 0;
+        if (!second) continue;
+        shown->segment[0] = first;
+        shown->segment[1] = second;
+        shown->frame[0] = (size_t)(blend.frame[0] - first->start);
+        shown->frame[1] = (size_t)(blend.frame[1] - second->start);
+        return ATH_OK;
+    }
+    int32_t nearer = blend.weight < 0.5 ? 0 : 1;
+    for (int32_t i = 0; i < 2; i++) {
+        int32_t side = i == 0 ? nearer : 1 - nearer;
+        const ath_segment *segment = find_segment(segments, count, blend.segment[side], -1);
+        if (segment) return show_one(segment, blend.frame[side], shown);
+    }
+    return ATH_NOT_PREPARED;
+}
+
+/* ---- maps of nodes ---- */
+
+static void blend_map(const shown_frames *shown, int32_t index, double map[ATH_MAP])
+{
+    const double *at[2];
+    for (size_t i = 0; i < 2; i++) {
+        const ath_segment *segment = shown->segment[i];
+        at[i] = segment->maps + (shown->frame[i] * (size_t)segment->node_count + (size_t)index) * ATH_MAP;
+    }
+    if (shown->weight > 0.0)
+        for (int32_t k = 0; k < ATH_MAP; k++) map[k] = at[0][k] + (at[1][k] - at[0][k]) * shown->weight;
+    else
+        for (int32_t k = 0; k < ATH_MAP; k++) map[k] = at[0][k];
+}
+
+static const double *rest_attach_of(const ath_file *file, const ath_part *part)
+{
+    const ath_branch *branch = file->branches + part->branch;
+    return file->rest + 3 * (size_t)(branch->attach >= 0 ? branch->attach : branch->first);
+}
+
+/* The map as a matrix from absolute rest to absolute positions. */
+static void matrix_of(const ath_file *file, const ath_part *part, const double map[ATH_MAP], double matrix[12])
+{
+    const double *a = rest_attach_of(file, part), *origin = file->info.origin;
+    for (int32_t i = 0; i < 3; i++) {
+        const double *R = map + 3 * i;
+        for (int32_t k = 0; k < 3; k++) matrix[4 * i + k] = R[k];
+        matrix[4 * i + 3] = (map[9 + i] + origin[i])
+            - (R[0] * (a[0] + origin[0]) + R[1] * (a[1] + origin[1]) + R[2] * (a[2] + origin[2]));
+    }
+}
+
+/* ---- vertices ---- */
+
+/* Where a position goes, as float or (wide) double. */
+typedef struct {
+    char *out;
+    size_t stride;
+    const int32_t *place; /* null: file order */
+    int wide;
+} target;
+
+ATH_INLINE void put(const target *to, size_t vertex, double x, double y, double z)
+{
+    char *at = to->out + (to->place ? (size_t)to->place[vertex] : vertex) * to->stride;
+    if (to->wide) {
+        double *out = (double *)(void *)at;
+        out[0] = x;
+        out[1] = y;
+        out[2] = z;
+    } else {
+        float *out = (float *)(void *)at;
+        out[0] = (float)x;
+        out[1] = (float)y;
+        out[2] = (float)z;
+    }
+}
+
+enum { BLOCK = 64 };
+
+/* Rest positions, relative to the origin, moved by a map; absolute. */
+ATH_HOT static void move_block(const double *x0, size_t count, const double m[ATH_MAP], const double a[3],
+                               const double origin[3], double *ATH_RESTRICT out)
+{
+    for (size_t i = 0; i < count; i++) {
+        double x = x0[3 * i] - a[0], y = x0[3 * i + 1] - a[1], z = x0[3 * i + 2] - a[2];
+        out[3 * i] = (m[9] + (m[0] * x + m[1] * y + m[2] * z)) + origin[0];
+        out[3 * i + 1] = (m[10] + (m[3] * x + m[4] * y + m[5] * z)) + origin[1];
+        out[3 * i + 2] = (m[11] + (m[6] * x + m[7] * y + m[8] * z)) + origin[2];
+    }
+}
+
+/* A file's positions are what its own type holds. */
+ATH_HOT static void round_block(double *block, size_t count)
+{
+    for (size_t i = 0; i < count; i++) block[i] = ath_single(block[i]);
+}
+
+ATH_HOT static void narrow_block(const double *ATH_RESTRICT block, size_t count, float *ATH_RESTRICT out)
+{
+    for (size_t i = 0; i < count; i++) out[i] = (float)block[i];
+}
+
+static int is_packed(const target *to) { return !to->wide && !to->place && to->stride == 3 * sizeof(float); }
+
+static void put_node(const ath_file *file, const ath_part *part, const double m[ATH_MAP], const target *to)
+{
+    const double *a = rest_attach_of(file, part);
+    double block[3 * BLOCK];
+    for (size_t start = 0; start < (size_t)part->count; start += BLOCK) {
+        size_t count = (size_t)part->count - start, first = (size_t)part->first + start;
+        if (count > (size_t)BLOCK) count = BLOCK;
+        move_block(file->rest + 3 * first, count, m, a, file->info.origin, block);
+        if (is_packed(to)) {
+            narrow_block(block, 3 * count, (float *)(void *)to->out + 3 * first);
+            continue;
+        }
+        if (!file->info.wide && to->wide) round_block(block, 3 * count);
+        for (size_t i = 0; i < count; i++) put(to, first + i, block[3 * i], block[3 * i + 1], block[3 * i + 2]);
+    }
+}
+
+ATH_HOT static void blend_floats(const float *a, const float *b, float weight, size_t count, float *ATH_RESTRICT out)
+{
+    if (weight == 0.0f)
+        for (size_t i = 0; i < count; i++) out[i] = a[i];
+    else
+        for (size_t i = 0; i < count; i++) out[i] = a[i] + (b[i] - a[i]) * weight;
+}
+
+/* Vertices first to first + count - 1 go to `vertex` on, those of the exact run that begins at `index`. */
+static void put_floats(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+{
+    const float *at[2];
+    for (size_t i = 0; i < 2; i++) {
+        const ath_segment *segment = shown->segment[i];
+        at[i] = (const float *)segment->positions + (shown->frame[i] * (size_t)segment->exact_vertices + index) * 3;
+    }
+    float weight = (float)shown->weight, block[3 * BLOCK];
+    if (is_packed(to)) {
+        blend_floats(at[0], at[1], weight, 3 * count, (float *)(void *)to->out + 3 * vertex);
+        return;
+    }
+    for (size_t start = 0; start < count; start += BLOCK) {
+        size_t size = count - start < (size_t)BLOCK ? count - start : (size_t)BLOCK;
+        blend_floats(at[0] + 3 * start, at[1] + 3 * start, weight, 3 * size, block);
+        for (size_t i = 0; i < size; i++)
+            put(to, vertex + start + i, (double)block[3 * i], (double)block[3 * i + 1], (double)block[3 * i + 2]);
+    }
+}
+
+static void put_doubles(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+{
+    const double *at[2];
+    double w = shown->weight, x[3];
+    for (size_t i = 0; i < 2; i++) {
+        const ath_segment *segment = shown->segment[i];
+        at[i] = (const double *)segment->positions + (shown->frame[i] * (size_t)segment->exact_vertices + index) * 3;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const double *a = at[0] + 3 * i, *b = at[1] + 3 * i;
+        for (size_t k = 0; k < 3; k++) x[k] = w > 0.0 ? a[k] + (b[k] - a[k]) * w : a[k];
+        put(to, vertex + i, x[0], x[1], x[2]);
+    }
+}
+
+static void put_exact(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+{
+    if (shown->segment[0]->wide)
+        put_doubles(shown, index, count, vertex, to);
+    else
+        put_floats(shown, index, count, vertex, to);
+}
+
+static int positions(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, target to)
+{
+    shown_frames shown;
+    int result = find_frames(file, segments, count, frame, &shown);
+    if (result == ATH_NOT_PREPARED) return result;
+    for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
+        const ath_part *part = shown.segment[0]->parts + i;
+        double map[ATH_MAP];
+        if (part->branch < 0) {
+            put_exact(&shown, (size_t)part->index, (size_t)part->count, (size_t)part->first, &to);
+            continue;
+        }
+        blend_map(&shown, part->index, map);
+        put_node(file, part, map, &to);
+    }
+    return result;
+}
+
+static target target_of(const ath_file *file, ath_order order, void *out, size_t stride, int wide)
+{
+    target to;
+    to.out = (char *)out;
+    to.stride = stride;
+    to.place = order == ATH_SOURCE_ORDER ? file->vertex_source : 0;
+    to.wide = wide;
+    return to;
+}
+
+int ath_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                  ath_order order, float *xyz, size_t stride)
+{
+    return positions(file, segments, segment_count, frame, target_of(file, order, xyz, stride, 0));
+}
+
+int ath_positions_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                       ath_order order, double *xyz, size_t stride)
+{
+    return positions(file, segments, segment_count, frame, target_of(file, order, xyz, stride, 1));
+}
+
+static int exact(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, target to)
+{
+    shown_frames shown;
+    int result = find_frames(file, segments, count, frame, &shown);
+    if (result != ATH_NOT_PREPARED) put_exact(&shown, 0, (size_t)shown.segment[0]->exact_vertices, 0, &to);
+    return result;
+}
+
+int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame, float *xyz,
+              size_t stride)
+{
+    return exact(file, segments, segment_count, frame, target_of(file, ATH_FILE_ORDER, xyz, stride, 0));
+}
+
+int ath_exact_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                   double *xyz, size_t stride)
+{
+    return exact(file, segments, segment_count, frame, target_of(file, ATH_FILE_ORDER, xyz, stride, 1));
+}
+
+int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame)
+{
+    shown_frames shown;
+    return find_frames(file, segments, segment_count, frame, &shown) == ATH_NOT_PREPARED ? -1 : shown.segment[0]->level;
+}
+
+static int matrices(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, void *out,
+                    size_t stride, int wide)
+{
+    shown_frames shown;
+    int result = find_frames(file, segments, count, frame, &shown);
+    if (result == ATH_NOT_PREPARED) return result;
+    for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
+        const ath_part *part = shown.segment[0]->parts + i;
+        double map[ATH_MAP], matrix[12];
+        if (part->branch < 0) continue;
+        char *at = (char *)out + (size_t)part->index * stride;
+        blend_map(&shown, part->index, map);
+        matrix_of(file, part, map, matrix);
+        if (wide)
+            memcpy(at, matrix, sizeof matrix);
+        else
+            for (int32_t k = 0; k < 12; k++) ((float *)(void *)at)[k] = (float)matrix[k];
+    }
+    return result;
+}
+
+int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                 float *out, size_t stride)
+{
+    return matrices(file, segments, segment_count, frame, out, stride, 0);
+}
+
+int ath_matrices_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                      double *out, size_t stride)
+{
+    return matrices(file, segments, segment_count, frame, out, stride, 1);
+}
+
+/* ---- level of detail ---- */
+
+int32_t ath_depth_for(const ath_file *file, int32_t segment, double distance, double fov, double height, double pixels)
+{
+    int32_t deepest = file->info.level_count - 1;
+    if (!(distance > 0.0 && fov > 0.0 && fov < 3.141592653589793)) return deepest;
+    double pixels_per_unit = height / (2.0 * distance * ath_tan_of_half(fov));
+    for (int32_t level = 0; level < deepest; level++) {
+        double error;
+        ath_level_error(file, level, segment, &error, 0);
+        if (error * pixels_per_unit <= pixels) return level;
+    }
+    return deepest;
+}
+
+/* ---- results ---- */
+
+const char *ath_result_name(int result)
+{
+    static const char *const errors[] = {"OK", "INVALID", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED",
+                                         "BAD_CHECKSUM", "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK", "BAD_CHUNK",
+                                         "LIMIT_EXCEEDED", "TRAILING_BYTES"};
+    static const char *const calls[] = {"MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"};
+    if (result >= 0 && result < (int)(sizeof errors / sizeof *errors)) return errors[result];
+    int call = result - ATH_MORE;
+    return call >= 0 && call < (int)(sizeof calls / sizeof *calls) ? calls[call] : "UNKNOWN";
+}

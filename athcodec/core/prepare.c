@@ -1,0 +1,497 @@
+/* From the chunks of a segment to what is played of it: all levels' streams are read side by side, piece by piece, each
+ * piece placed as soon as its integers are there, so that only what hangs on it is kept. */
+#include "decode.h"
+#include "motion_streams.h"
+#include "segment.h"
+
+enum { CHECKSUM_STEP = 1 << 16, TILE = 8 };
+
+typedef enum { CHECKSUMS, HEADS, PIECES, DONE, FAILED } prepare_phase;
+
+typedef struct {
+    ath_coder coder;
+    coefficient_model *model;
+    uint32_t *history;
+    double *temporal;
+    const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
+} stems_reader;
+
+typedef struct {
+    ath_coder coder;
+    affine_model *model;
+    uint32_t *history;
+    const ath_chunk *chunk;
+} affines_reader;
+
+typedef struct {
+    ath_coder coder;
+    correction_model *model;
+    double step;
+    const ath_chunk *chunk;
+} corrections_reader;
+
+struct ath_work {
+    const ath_file *file;
+    ath_segment *segment;
+    stems_reader stems[ATH_LEVELS];
+    affines_reader affines[ATH_LEVELS];
+    corrections_reader corrections;
+    ath_stream streams[ATH_LEVELS];
+    ath_motion motion;
+    ath_scratch scratch;
+    ath_piece_rows piece;
+    ath_node_rows node;
+    void *prelude_model;
+    prepare_phase phase;
+    int32_t index, level;    /* of the segment in preparation */
+    int32_t next;            /* level of CHECKSUMS and HEADS, piece of PIECES */
+    int32_t next_kind;       /* of CHECKSUMS */
+    uint32_t crc, crc_at;
+    int32_t next_node, exact, shown;
+    int32_t fault;
+    int32_t node_step;
+    int32_t counts[ATH_SLOTS];
+};
+
+/* ---- memory ---- */
+
+static uint32_t levels_with_affines(const ath_file *file)
+{
+    uint32_t levels = 0;
+    for (int32_t level = 0; level < file->info.level_count; level++) levels |= file->affine_levels[level];
+    return levels;
+}
+
+static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t);
+    uint32_t affines = levels_with_affines(file);
+    ath_take(&arena, sizeof *work);
+    for (int32_t d = 0; d < file->info.level_count; d++) {
+        if (file->stems_levels >> d & 1) {
+            work->stems[d].model = (coefficient_model *)ath_take(&arena, sizeof(coefficient_model));
+            work->stems[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
+            work->stems[d].temporal = (double *)ath_take(&arena, T * T * sizeof(double));
+        }
+        if (affines >> d & 1) {
+            work->affines[d].model = (affine_model *)ath_take(&arena, sizeof(affine_model));
+            work->affines[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
+        }
+    }
+    work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
+    work->prelude_model = ath_take(&arena, ath_prelude_model_size());
+    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->shape.longest * row);
+    work->piece.omega = (int32_t *)ath_take(&arena, row);
+    work->piece.shift = (int32_t *)ath_take(&arena, row);
+    work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
+    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->shape.longest, frames) * sizeof(double));
+    work->motion.carriers = (double *)ath_take(&arena, (uint64_t)file->shape.carrier_rows * 3 * T * sizeof(double));
+    return arena.used;
+}
+
+static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    uint64_t T = (uint64_t)frames, number = file->info.wide ? sizeof(double) : sizeof(float);
+    segment->frames = frames;
+    segment->wide = file->info.wide;
+    ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
+    ath_take(&arena, sizeof *segment);
+    segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
+    segment->maps = (double *)ath_take(&arena, T * (uint64_t)segment->node_count * ATH_MAP * sizeof(double));
+    segment->positions = ath_take(&arena, T * (uint64_t)segment->exact_vertices * 3 * number);
+    return arena.used;
+}
+
+size_t ath_work_size(const ath_file *file)
+{
+    ath_work counted;
+    return ath_size_or_most(carve(&counted, file, file->frames[1], 0));
+}
+
+size_t ath_segment_size(const ath_file *file, int32_t level)
+{
+    ath_segment counted;
+    return ath_size_or_most(carve_segment(&counted, file, level, file->frames[1], 0));
+}
+
+/* ---- start ---- */
+
+static const ath_chunk *wanted_chunk(const ath_file *file, int32_t segment, int32_t level, int32_t kind, int32_t d)
+{
+    return ath_file_needs(file, kind, d, level) ? ath_file_chunk(file, kind, d, segment) : 0;
+}
+
+static int32_t checksum_steps(const ath_chunk *chunk)
+{
+    return chunk && chunk->length > 0 ? (int32_t)((chunk->length - 1) / CHECKSUM_STEP) + 1 : 1;
+}
+
+int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t checks = checksum_steps(wanted_chunk(file, segment, level, ATH_CORRECTIONS, level)), heads = level + 2;
+    for (int32_t d = 0; d <= level; d++)
+        for (int32_t kind = ATH_STEMS; kind <= ATH_AFFINES; kind++)
+            checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
+    return checks + heads + file->shape.piece_count + 1;
+}
+
+/* Whether all chunks have been fed. */
+static int find_chunks(ath_work *work)
+{
+    int there = 1;
+    for (int32_t d = 0; d <= work->level; d++) {
+        const ath_chunk *stems = wanted_chunk(work->file, work->index, work->level, ATH_STEMS, d);
+        const ath_chunk *affines = wanted_chunk(work->file, work->index, work->level, ATH_AFFINES, d);
+        work->stems[d].chunk = stems;
+        work->affines[d].chunk = affines;
+        there = there && (!stems || stems->bytes) && (!affines || affines->bytes);
+    }
+    work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS, work->level);
+    return there && (!work->corrections.chunk || work->corrections.chunk->bytes);
+}
+
+static void ready_motion(ath_work *work)
+{
+    work->motion.frames = work->segment->frames;
+    work->motion.streams = work->streams;
+    work->motion.cosines = ath_file_cosines(work->file, work->segment->frames);
+    work->scratch = ath_motion_scratch(&work->file->shape, &work->motion);
+    work->piece.counts = work->counts;
+    work->node.step = &work->node_step;
+    memset(work->piece.modes, 0, (size_t)work->file->shape.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.omega, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.shift, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    for (int32_t d = 0; d < ATH_LEVELS; d++) {
+        work->streams[d].step = 1.0;
+        work->streams[d].temporal = work->motion.cosines;
+        work->streams[d].temporal_rank = work->motion.frames;
+    }
+}
+
+int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
+                      void *segment_memory, size_t segment_bytes)
+{
+    ath_work *work = (ath_work *)memory;
+    ath_segment *segment = (ath_segment *)segment_memory;
+    if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
+        return ATH_BAD_ARGUMENT;
+    if (!file->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+        || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
+        return ATH_NO_MEMORY;
+    int32_t frames = ath_file_frames(file, index);
+    memset(work, 0, sizeof *work);
+    memset(segment, 0, sizeof *segment);
+    carve(work, file, frames, (uint8_t *)memory);
+    carve_segment(segment, file, level, frames, (uint8_t *)segment_memory);
+    segment->index = segment->level = -1;
+    segment->start = ath_segment_start(file, index);
+    work->file = file;
+    work->segment = segment;
+    work->index = index;
+    work->level = level;
+    work->fault = -1;
+    work->next_kind = ATH_STEMS;
+    ready_motion(work);
+    int there = find_chunks(work);
+    work->phase = there ? CHECKSUMS : FAILED;
+    return there ? ATH_OK : ATH_MISSING;
+}
+
+/* ---- steps ---- */
+
+static ath_bytes bytes_of(const ath_chunk *chunk)
+{
+    ath_bytes bytes = {chunk->bytes, chunk->length};
+    return bytes;
+}
+
+/* Notes the chunk that is at fault, if anything is. */
+static int blame(ath_work *work, const ath_chunk *chunk, int result)
+{
+    if (result != ATH_OK) work->fault = (int32_t)(chunk - work->file->chunks);
+    return result;
+}
+
+static const ath_chunk *chunk_to_check(const ath_work *work)
+{
+    if (work->next_kind == ATH_STEMS) return work->stems[work->next].chunk;
+    return work->next_kind == ATH_AFFINES ? work->affines[work->next].chunk : work->corrections.chunk;
+}
+
+static void next_phase(ath_work *work, prepare_phase phase)
+{
+    work->phase = phase;
+    work->next = 0;
+}
+
+/* A level's two chunks, then the next level's; at last the corrections. */
+static void next_to_check(ath_work *work)
+{
+    work->crc = work->crc_at = 0;
+    if (work->next_kind == ATH_CORRECTIONS) {
+        next_phase(work, HEADS);
+    } else if (work->next_kind == ATH_STEMS) {
+        work->next_kind = ATH_AFFINES;
+    } else {
+        work->next++;
+        work->next_kind = work->next > work->level ? ATH_CORRECTIONS : ATH_STEMS;
+    }
+}
+
+static int check_some(ath_work *work)
+{
+    const ath_chunk *chunk = chunk_to_check(work);
+    if (chunk && work->crc_at < chunk->length) {
+        uint32_t left = chunk->length - work->crc_at, size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+        work->crc = ath_crc32c(work->crc, chunk->bytes + work->crc_at, size);
+        work->crc_at += size;
+    }
+    if (chunk && work->crc_at < chunk->length) return ATH_OK;
+    if (chunk && work->crc != chunk->checksum) return blame(work, chunk, ATH_BAD_CHECKSUM);
+    next_to_check(work);
+    return ATH_OK;
+}
+
+/* Integers are decoded into the far half of the rows that they become. */
+static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reader *reader, ath_stream *stream)
+{
+    int32_t frames = work->motion.frames, limit = 1 << (head->bits - 1);
+    size_t count = (size_t)head->rank * (size_t)frames;
+    int32_t *integers = (int32_t *)(void *)reader->temporal + count;
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames, limit,
+                                     integers);
+    double unit = 1.0 / (double)limit;
+    for (size_t i = 0; result == ATH_OK && i < count; i++) reader->temporal[i] = (double)integers[i] * unit;
+    stream->temporal = reader->temporal;
+    stream->temporal_rank = head->rank;
+    return result;
+}
+
+static int open_stems(ath_work *work, stems_reader *reader, ath_stream *stream)
+{
+    ath_stems_head head;
+    ath_bytes body;
+    int result = ath_parse_stems(bytes_of(reader->chunk), work->motion.frames, &head, &body);
+    if (result != ATH_OK) return result;
+    stream->step = head.step;
+    stream->omega = head.omega;
+    if (head.bits) result = read_temporal(work, &head, reader, stream);
+    coefficient_model_init(reader->model, work->motion.frames, reader->history);
+    coder_start(&reader->coder, body.bytes, body.size);
+    return result;
+}
+
+static int open_corrections(corrections_reader *reader)
+{
+    ath_bytes body;
+    int result = ath_parse_corrections(bytes_of(reader->chunk), &reader->step, &body);
+    if (result != ATH_OK) return result;
+    correction_model_init(reader->model);
+    coder_start(&reader->coder, body.bytes, body.size);
+    return ATH_OK;
+}
+
+/* The streams of one level. */
+static int open_level(ath_work *work)
+{
+    int32_t d = work->next++, result = ATH_OK;
+    if (d > work->level) {
+        const ath_chunk *chunk = work->corrections.chunk;
+        next_phase(work, PIECES);
+        return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
+    }
+    affines_reader *affines = work->affines + d;
+    if (affines->chunk) {
+        affine_model_init(affines->model, work->motion.frames, affines->history);
+        coder_start(&affines->coder, affines->chunk->bytes, affines->chunk->length);
+    }
+    if (work->stems[d].chunk) result = open_stems(work, work->stems + d, work->streams + d);
+    return blame(work, work->stems[d].chunk, result);
+}
+
+/* ---- pieces ---- */
+
+static void clear_row(int32_t *row, int32_t frames, int32_t *count)
+{
+    for (int32_t axis = 0; axis < 3 && *count > 0; axis++)
+        memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
+    *count = 0;
+}
+
+/* Rows are zero on entry to code_row. */
+static void clear_piece(ath_work *work, const ath_piece *piece)
+{
+    int32_t T = work->motion.frames;
+    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(work->piece.modes, m, T), T, work->counts + m);
+    clear_row(work->piece.shift, T, work->counts + SHIFT_SLOT);
+    clear_row(work->piece.omega, T, work->counts + OMEGA_SLOT);
+}
+
+static int read_piece(ath_work *work, int32_t p, int32_t level)
+{
+    stems_reader *reader = work->stems + level;
+    ath_coder coder = reader->coder;
+    code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level, &work->piece);
+    reader->coder = coder;
+    return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
+}
+
+/* Transposes rows over time into frames. */
+ATH_HOT static void store_floats(const double *placed, int32_t rows, int32_t T, const double origin[3], float *out,
+                                 size_t frame_size)
+{
+    for (int32_t start = 0; start < T; start += TILE) {
+        int32_t count = ath_min(TILE, T - start);
+        for (int32_t r = 0; r < rows; r++) {
+            const double *from = placed + (size_t)r * (size_t)T + start;
+            float *to = out + (size_t)start * frame_size + r;
+            for (int32_t t = 0; t < count; t++) to[(size_t)t * frame_size] = (float)(from[t] + origin[r % 3]);
+        }
+    }
+}
+
+static void store_doubles(const double *placed, int32_t rows, int32_t T, const double origin[3], double *out,
+                          size_t frame_size)
+{
+    for (int32_t r = 0; r < rows; r++)
+        for (int32_t t = 0; t < T; t++)
+            out[(size_t)t * frame_size + (size_t)r] = placed[(size_t)r * (size_t)T + (size_t)t] + origin[r % 3];
+}
+
+static void store_piece(ath_work *work, const ath_piece *piece, const double *placed)
+{
+    ath_segment *segment = work->segment;
+    size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
+    const double *origin = work->file->info.origin;
+    if (segment->wide)
+        store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
+    else
+        store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
+}
+
+static void correct(ath_segment *segment, size_t at, int32_t steps, double step)
+{
+    if (steps == 0) return;
+    if (segment->wide) {
+        double *position = (double *)segment->positions + at;
+        *position = ath_corrected(*position, steps, step);
+    } else {
+        float *position = (float *)segment->positions + at;
+        *position = (float)ath_corrected((double)*position, steps, step);
+    }
+}
+
+static void correct_piece(ath_work *work, const ath_piece *piece)
+{
+    ath_segment *segment = work->segment;
+    corrections_reader *reader = &work->corrections;
+    ath_coder coder = reader->coder;
+    for (int32_t i = 0; i < piece->count; i++) {
+        const correction_row *row = code_vertex(&coder, reader->model, segment->frames, 0);
+        size_t vertex = (size_t)(work->exact + i), vertices = (size_t)segment->exact_vertices;
+        for (int32_t t = 0; row && t < segment->frames; t++)
+            for (size_t k = 0; k < 3 && has_correction(row, t); k++)
+                correct(segment, ((size_t)t * vertices + vertex) * 3 + k, row->q[t][k], reader->step);
+    }
+    reader->coder = coder;
+}
+
+static void show_piece(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->shape.pieces + p;
+    const double *placed = ath_pose_piece(&work->file->shape, &work->motion, p, &work->piece, &work->scratch);
+    store_piece(work, piece, placed);
+    if (work->corrections.chunk) correct_piece(work, piece);
+    work->exact += piece->count;
+}
+
+static void show_node(ath_work *work, int32_t n)
+{
+    ath_segment *segment = work->segment;
+    size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
+    double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
+    ath_node_map(&work->file->shape, &work->motion, n, &work->piece, &work->node, &work->scratch);
+    for (size_t t = 0; t < T; t++) {
+        double *map = maps + t * nodes * ATH_MAP;
+        for (size_t k = 0; k < 9; k++) map[k] = work->scratch.at.rotation[k * T + t];
+        for (size_t k = 0; k < 3; k++) map[9 + k] = work->scratch.at.point[k * T + t];
+    }
+}
+
+static int read_node(ath_work *work, int32_t n)
+{
+    const ath_node *node = work->file->shape.nodes + n;
+    affines_reader *reader = work->affines + node->level;
+    if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
+    memset(work->node.rows, 0, 4 * 3 * (size_t)work->motion.frames * sizeof *work->node.rows);
+    int valid = code_node(&reader->coder, reader->model, &work->file->shape, work->motion.frames, n, &work->node);
+    return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
+}
+
+static int finish_level(ath_work *work, int32_t d)
+{
+    const stems_reader *stems = work->stems + d;
+    const affines_reader *affines = work->affines + d;
+    if (stems->chunk && !coder_finish(&stems->coder)) return blame(work, stems->chunk, ATH_BAD_CHUNK);
+    if (affines->chunk && !coder_finish(&affines->coder)) return blame(work, affines->chunk, ATH_BAD_CHUNK);
+    return ATH_OK;
+}
+
+static int finish(ath_work *work)
+{
+    const corrections_reader *corrections = &work->corrections;
+    for (int32_t d = 0; d <= work->level; d++)
+        if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
+    if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
+    ath_cut(work->file, work->level, work->segment->parts);
+    work->segment->index = work->index;
+    work->segment->level = work->level;
+    work->phase = DONE;
+    return ATH_OK;
+}
+
+/* One piece, and the node that begins with it. */
+static int do_piece(ath_work *work)
+{
+    const ath_shape *shape = &work->file->shape;
+    int32_t p = work->next++, result = ATH_OK;
+    if (p == shape->piece_count) return finish(work);
+    const ath_piece *piece = shape->pieces + p;
+    if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
+    if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
+    if (result == ATH_OK && work->next_node < shape->node_count && shape->nodes[work->next_node].piece == p) {
+        int32_t n = work->next_node++;
+        result = read_node(work, n);
+        if (result == ATH_OK && ath_is_shown(shape->nodes + n, work->level)) show_node(work, n);
+    }
+    if (result == ATH_OK && piece->level <= work->level) show_piece(work, p);
+    clear_piece(work, piece);
+    return result;
+}
+
+int ath_prepare_step(ath_work *work, int32_t steps)
+{
+    int result = ATH_OK;
+    if (work->phase == FAILED) return ATH_BAD_ARGUMENT;
+    for (; steps > 0 && work->phase != DONE && result == ATH_OK; steps--)
+        result = work->phase == CHECKSUMS ? check_some(work) : work->phase == HEADS ? open_level(work) : do_piece(work);
+    if (result != ATH_OK) work->phase = FAILED;
+    return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
+}
+
+int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level, void *memory,
+                size_t memory_bytes)
+{
+    int result = ath_prepare_start(work, work_bytes, file, segment, level, memory, memory_bytes);
+    if (result == ATH_OK) result = ATH_MORE;
+    while (result == ATH_MORE) result = ath_prepare_step((ath_work *)work, INT32_MAX);
+    return result;
+}
+
+int32_t ath_work_fault(const ath_work *work) { return work->fault; }
+
+int32_t ath_segment_index(const ath_segment *segment) { return segment->index; }
+
+int32_t ath_segment_level(const ath_segment *segment) { return segment->level; }

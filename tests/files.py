@@ -1,0 +1,155 @@
+"""Files taken to pieces, put together again, and made from nothing, for tests of what no encoder would write.
+
+`Parts` is a file in pieces whose checksums always fit. `still_file` is the least that a hierarchy and a number
+of frames ask for: a plant that never leaves the origin, in which a test replaces the stream that it is about.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, replace
+from io import BytesIO
+
+import numpy as np
+
+import athcodec
+from athcodec import container as ct
+from athcodec import entropy
+from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
+from athcodec.transform import LevelStream, Plan, SegmentMotion, balanced_segments
+
+HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
+                 "segment_count level_count full_level_count clip_count flags max_error reserved").split()
+CHECKSUM_AT = 12
+
+
+@dataclass
+class Parts:
+    """An .ath file in pieces."""
+
+    header: ct.Header
+    errors: np.ndarray
+    chunks: list[tuple[ct.Chunk, bytes]]
+
+    @classmethod
+    def of(cls, data: bytes) -> Parts:
+        container = ct.Container(BytesIO(data), strict=True)
+        return cls(container.header, container.errors, [(c, container.payload(c)) for c in container.chunks])
+
+    def file(self) -> bytes:
+        """The bytes of a file whose table and checksums fit its chunks."""
+        chunks = [replace(chunk, length=len(data), checksum=crc32c(data)) for chunk, data in self.chunks]
+        front = ct.pack_front(replace(self.header), chunks, self.errors)
+        return front + b"".join(data for _, data in self.chunks)
+
+    def index(self, kind: int, level: int | None = None, segment: int = 0) -> int:
+        return next(i for i, (c, _) in enumerate(self.chunks)
+                    if c.kind == kind and (level is None or (c.level, c.segment) == (level, segment)))
+
+    def payload(self, kind: int, level: int | None = None) -> bytes:
+        return self.chunks[self.index(kind, level)][1]
+
+    def with_payload(self, kind: int, data: bytes, level: int | None = None) -> bytes:
+        """The file with another content of one chunk."""
+        i = self.index(kind, level)
+        chunks = list(self.chunks)
+        chunks[i] = chunks[i][0], data
+        return Parts(self.header, self.errors, chunks).file()
+
+    def with_chunks(self, chunks: list) -> bytes:
+        return Parts(self.header, self.errors, chunks).file()
+
+    def without(self, kind: int) -> bytes:
+        """The file less all chunks of a kind."""
+        return self.with_chunks([entry for entry in self.chunks if entry[0].kind != kind])
+
+
+def header_fields(data: bytes) -> dict:
+    return dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data)))
+
+
+def with_header(data: bytes, **fields) -> bytes:
+    """The file with other values in its header and a checksum that fits."""
+    tables_end = Parts.of(data).chunks[0][0].offset
+    front = ct._HEADER.pack(*(header_fields(data) | fields).values()) + data[ct._HEADER.size: tables_end]
+    return with_checksum(front) + data[tables_end:]
+
+
+def with_checksum(front: bytes) -> bytes:
+    """Header and tables with a checksum that fits."""
+    head, tail = front[:CHECKSUM_AT], front[CHECKSUM_AT + 4:]
+    return head + struct.pack("<I", crc32c(head + bytes(4) + tail)) + tail
+
+
+def opened(data: bytes, **options) -> athcodec.Decoder:
+    return athcodec.open(BytesIO(data), **options)
+
+
+# ---- files made from nothing ----
+
+
+def roots(*counts: int) -> np.ndarray:
+    """(B,) of BRANCH: stems of so many vertices, each its own root."""
+    branches = np.zeros(len(counts), BRANCH)
+    branches["parent"] = branches["attach"] = -1
+    branches["count"], branches["lag"] = counts, 1
+    return branches
+
+
+def still_file(frames: int = 1, branches: np.ndarray | None = None, *, hierarchy: bytes | None = None,
+               rest: bytes | None = None, time: bytes | None = None, stems: bytes | None = None) -> bytes:
+    """One vertex, or `branches`, at the origin, one frame a second; or other payloads, `stems` at level 0."""
+    branches = roots(1) if branches is None else branches
+    plan = Plan(branches, int(branches["count"].sum()))
+    plan.set_rest(np.zeros((plan.vertex_count, 3)))
+    store = ct.ChunkStore(BytesIO())
+    store.add(ct.HIERARCHY, still_hierarchy(plan) if hierarchy is None else hierarchy)
+    store.add(ct.REST, still_rest(plan) if rest is None else rest)
+    store.add(ct.TIME, ct.pack_steady_time(np.arange(frames, dtype=float)) if time is None else time)
+    levels, segments = plan.level_count, balanced_segments(frames, -(-frames // SEGMENT_FRAMES))
+    for index, (start, stop) in enumerate(segments):
+        add_still_segment(store, plan, index, stop - start, stems)
+    header = ct.Header(plan.vertex_count, len(branches), frames, len(segments), levels, levels, 1.0)
+    out = BytesIO()
+    store.write(out, header, np.zeros((levels, len(segments), 2)))
+    return out.getvalue()
+
+
+def still_hierarchy(plan: Plan) -> bytes:
+    numbers = (np.arange(count, dtype=np.int32) for count in (len(plan.branches), plan.vertex_count))
+    return hierarchy_chunk(entropy.encode_hierarchy(plan.branches, *numbers))
+
+
+def still_rest(plan: Plan) -> bytes:
+    stream, _ = entropy.encode_rest(plan.branches, 1.0, plan.rest)
+    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream))
+
+
+def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int, stems: bytes | None) -> None:
+    motion = SegmentMotion(plan, frames, [LevelStream(1.0)] * plan.level_count)
+    for level in range(plan.level_count):
+        if plan.has_stems(level):
+            payload = ct.pack_stems(ct.StemsHead(1.0, 0), entropy.encode_stems(motion, level))
+            store.add(ct.STEMS, payload if stems is None or level > 0 else stems, level, index)
+        if plan.has_affines(level):
+            store.add(ct.AFFINES, entropy.encode_affines(motion, level), level, index)
+
+
+def hierarchy_chunk(stream: bytes) -> bytes:
+    return ct.pack_hierarchy((0.0, 0, 0.0, 0), stream)
+
+
+def exact_rest_chunk(stream: bytes, dtype) -> bytes:
+    """REST of Method 1, origin 0."""
+    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(dtype), stream, exact=True))
+
+
+def basis_chunk(stream: bytes, frames: int, bits: int) -> bytes:
+    """STEMS of level 0 of the one vertex, which makes the integers of a learned basis of rank 1 its x."""
+    plan = Plan(roots(1), 1)
+    plan.set_rest(np.zeros((1, 3)))
+    learned = LevelStream(1.0, temporal=np.ones((1, frames)))
+    motion = SegmentMotion(plan, frames, [learned, LevelStream(1.0)])
+    motion.tracks[0, 1, 0, 0] = 1 << bits - 1
+    head = ct.StemsHead(1.0, 0, bits, 1, stream)
+    return ct.pack_stems(head, entropy.encode_stems(motion, 0))
