@@ -1,0 +1,306 @@
+/* Plays an .ath file as an engine would, without the screen: the file arrives slice by slice, a camera walks up
+ * to the plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance
+ * asks for.
+ *
+ *     play FILE [--slices N] [--seconds S] [--fps F]
+ *
+ * It prints the same on every machine, but for the microseconds. What it leaves out: threads (each has an
+ * ath_work of its own), more than two segments in memory, and range requests (ath_ranges) instead of a download
+ * from the front. */
+#include <ath.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const double FOV = 1.0, SCREEN = 1080.0; /* vertical, in radians and in pixels */
+static const double PIXELS = 1.0;               /* an error above this on the screen asks for a finer level */
+static const double COMFORTABLE = 0.7;          /* a coarser level stays below this, or it would flicker */
+
+typedef struct {
+    FILE *download;
+    uint8_t *bytes;               /* room for the whole file: bytes that were fed must not move */
+    size_t length, there, slice;
+    ath_file *file;
+    ath_info info;
+    void *bases;
+    ath_work *work;
+    size_t file_size, build_size, work_size, segments_size;
+    ath_segment *playing, *next;  /* null: none. `next` is prepared while `playing` plays */
+    int preparing;
+    int32_t steps, spread;        /* of the preparation in all, and over how many drawn frames it is spread */
+    int32_t level, bound_level;   /* that the camera asks for; that `binding` is for */
+    int32_t *binding;
+    float *matrices, *positions;
+    double drawn_per_frame;       /* frames on the screen for one of the file */
+    long drawn, held;
+    double preparing_time, playing_time, longest;
+} player;
+
+static void fail(const char *where, const char *why)
+{
+    fprintf(stderr, "play: %s: %s\n", where, why);
+    exit(EXIT_FAILURE);
+}
+
+static void check(int result, const char *where)
+{
+    if (result != ATH_OK) fail(where, ath_result_name(result));
+}
+
+/* malloc aligns to 16 on 64-bit systems. Where it does not, athcodec says NO_MEMORY: take an aligned allocator. */
+static void *allocate(size_t size)
+{
+    void *memory = malloc(size > 0 ? size : 1);
+    if (!memory) fail("malloc", "no memory");
+    return memory;
+}
+
+/* ---- the file ---- */
+
+/* One more slice of the download; 0 when there is none. */
+static size_t receive(player *p)
+{
+    size_t left = p->length - p->there;
+    size_t got = fread(p->bytes + p->there, 1, p->slice < left ? p->slice : left, p->download);
+    p->there += got;
+    return got;
+}
+
+/* Header, hierarchy and rest pose come first: with them all sizes are known, and the plant can be shown. */
+static void open_file(player *p, const char *path, size_t slices)
+{
+    size_t front;
+    int result;
+    p->download = fopen(path, "rb");
+    if (!p->download || fseek(p->download, 0, SEEK_END) != 0) fail(path, "cannot be read");
+    p->length = (size_t)ftell(p->download);
+    p->slice = p->length / slices + 1;
+    p->bytes = allocate(p->length);
+    rewind(p->download);
+    do result = ath_front(p->bytes, p->there, NULL, &front, &p->file_size);
+    while (result == ATH_MISSING && receive(p) > 0);
+    check(result, path);
+    p->file = allocate(p->file_size);
+    check(ath_open(p->file, p->file_size, p->bytes, p->there, NULL), path);
+    p->build_size = ath_build_size(p->file);
+    p->bases = allocate(p->build_size);
+    check(ath_build(p->file, p->bases, p->build_size), path);
+    p->work_size = ath_work_size(p->file);
+    p->work = allocate(p->work_size);
+    ath_get_info(p->file, &p->info);
+    p->binding = allocate((size_t)p->info.vertex_count * sizeof(int32_t));
+    p->matrices = allocate((size_t)p->info.node_count * 12 * sizeof(float));
+    p->positions = allocate((size_t)p->info.vertex_count * 3 * sizeof(float));
+    p->bound_level = -1;
+}
+
+static void close_file(player *p)
+{
+    void *const memories[] = {p->playing, p->next, p->work, p->bases, p->file,
+                              p->binding, p->matrices, p->positions, p->bytes};
+    for (size_t i = 0; i < sizeof memories / sizeof *memories; i++) free(memories[i]);
+    fclose(p->download);
+}
+
+/* ---- levels ---- */
+
+static void choose_level(player *p, double distance)
+{
+    int32_t at_least = ath_depth_for(p->file, -1, distance, FOV, SCREEN, PIXELS);
+    int32_t at_most = ath_depth_for(p->file, -1, distance, FOV, SCREEN, COMFORTABLE);
+    if (p->level < at_least) p->level = at_least;
+    if (p->level > at_most) p->level = at_most;
+}
+
+/* That level, or the best that has arrived; -1: nothing has. */
+static int32_t level_for(const player *p, int32_t segment)
+{
+    int32_t ready = ath_ready_level(p->file, segment);
+    return p->level < ready ? p->level : ready;
+}
+
+/* ---- preparing ---- */
+
+static int32_t index_of(const ath_segment *segment) { return segment ? ath_segment_index(segment) : -1; }
+static int32_t level_of(const ath_segment *segment) { return segment ? ath_segment_level(segment) : -1; }
+
+/* Memory is for the level, so that a plant far away takes little. */
+static int start(player *p, int32_t segment, int32_t level)
+{
+    size_t size = ath_segment_size(p->file, level);
+    size_t both = size + (p->playing ? ath_segment_size(p->file, level_of(p->playing)) : 0);
+    if (p->segments_size < both) p->segments_size = both;
+    free(p->next);
+    p->next = allocate(size);
+    check(ath_prepare_start(p->work, p->work_size, p->file, segment, level, p->next, size), "preparing");
+    p->steps = ath_prepare_steps(p->file, segment, level);
+    return p->preparing = 1;
+}
+
+/* First a segment to show now, then a new level for it, then what comes after it. A new level waits for the
+ * next segment where this one is nearly over. `left`: drawn frames until then. */
+static int start_next(player *p, int32_t now, double left)
+{
+    int32_t count = p->info.segment_count, after = (now + 1) % count;
+    int32_t level = level_for(p, now), level_after = level_for(p, after);
+    if (level < 0) return 0;
+    if (index_of(p->playing) != now) return start(p, now, level);
+    if (level_of(p->playing) != level && (count == 1 || left > 2 * p->spread)) return start(p, now, level);
+    if (count == 1 || level_after < 0) return 0;
+    if (index_of(p->next) != after) return start(p, after, level_after);
+    if (level_of(p->next) != level_after && left > p->spread) return start(p, after, level_after);
+    return 0;
+}
+
+/* Plays what is prepared for this segment: its time has come, or it is a new level. */
+static void take_over(player *p, int32_t now)
+{
+    if (p->preparing || index_of(p->next) != now) return;
+    free(p->playing);
+    p->playing = p->next;
+    p->next = NULL;
+}
+
+/* Some steps per drawn frame. All at once where there would be nothing to show: at the start, after a jump in
+ * time. What has begun is finished, so that a fast camera cannot starve it. */
+static void prepare(player *p, double place)
+{
+    int32_t now = ath_blend_at(p->file, place).segment[0];
+    double left = (ath_segment_start(p->file, now + 1) - place) * p->drawn_per_frame;
+    int urgent;
+    do {
+        take_over(p, now);
+        urgent = index_of(p->playing) != now;
+        if (!p->preparing && !start_next(p, now, left)) return;
+        int result = ath_prepare_step(p->work, urgent ? INT32_MAX : p->steps / p->spread + 1);
+        if (result == ATH_MORE) return;
+        check(result, "preparing");
+        p->preparing = 0;
+    } while (urgent);
+    take_over(p, now);
+}
+
+/* A quarter of the time that a segment plays will do to prepare the next. */
+static void set_pace(player *p, double fps)
+{
+    double frame_time = p->info.duration / fmax(1.0, p->info.frame_count - 1);
+    p->drawn_per_frame = frame_time * fps;
+    double drawn = p->drawn_per_frame * p->info.frame_count / p->info.segment_count;
+    p->spread = (int32_t)fmin(30.0, 1.0 + drawn / 4.0);
+}
+
+/* ---- drawing ---- */
+
+/* Once per level: a vertex attribute, with which the vertex shader places a vertex of the rest pose at
+ *     binding < 0 ? positions[-1 - binding] : matrices[binding] * rest */
+static void bind_vertices(player *p, int32_t level)
+{
+    int32_t count;
+    ath_cut_size(p->file, level, &count, NULL, NULL);
+    ath_part *parts = allocate((size_t)count * sizeof *parts);
+    ath_cut(p->file, level, parts);
+    for (const ath_part *part = parts; part < parts + count; part++)
+        for (int32_t i = 0; i < part->count; i++)
+            p->binding[part->first + i] = part->branch >= 0 ? part->index : -1 - (part->index + i);
+    free(parts);
+    p->bound_level = level;
+}
+
+/* Frames of two levels are not blended: the last one of this segment is held until the next begins. */
+static int draw(player *p, double place)
+{
+    const ath_segment *segments[2] = {p->playing, p->next};
+    int32_t level = level_of(p->playing), count = level_of(p->next) == level ? 2 : 1;
+    if (level < 0) return ATH_NOT_PREPARED; /* the rest pose is shown until there is motion */
+    if (level != p->bound_level) bind_vertices(p, level);
+    size_t matrix = 12 * sizeof(float), vertex = 3 * sizeof(float);
+    if (level == p->info.full_level_count - 1) /* no matrices; without a GPU this is the call for all levels */
+        return ath_positions(p->file, segments, count, place, ATH_FILE_ORDER, p->positions, vertex);
+    ath_matrices(p->file, segments, count, place, p->matrices, matrix);
+    return ath_exact(p->file, segments, count, place, p->positions, vertex);
+}
+
+/* ---- the walk ---- */
+
+/* From where level 0 will do, to where none but the last will, and back: a third of the time close up. */
+static double camera(const player *p, double progress)
+{
+    double error, unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* pixels of a length of 1 from a distance of 1 */
+    double nearness = fmin(1.0, 1.5 * (1.0 - fabs(2.0 * progress - 1.0)));
+    ath_level_error(p->file, 0, -1, &error, NULL);
+    double far = fmax(1e-6, 1.5 * error * unit / COMFORTABLE);
+    ath_level_error(p->file, p->info.level_count > 1 ? p->info.level_count - 2 : 0, -1, &error, NULL);
+    double near = fmax(1e-6 * far, error * unit / (2.0 * PIXELS));
+    return far * pow(near / far, nearness);
+}
+
+static double microseconds(void)
+{
+    struct timespec now;
+    timespec_get(&now, TIME_UTC);
+    return (double)now.tv_sec * 1e6 + (double)now.tv_nsec * 1e-3;
+}
+
+static void draw_frame(player *p, double seconds)
+{
+    double place = ath_frame_at(p->file, seconds, ATH_LOOP), begin = microseconds();
+    prepare(p, place);
+    double prepared = microseconds();
+    p->held += draw(p, place) == ATH_HELD;
+    p->playing_time += microseconds() - prepared;
+    p->preparing_time += prepared - begin;
+    p->longest = fmax(p->longest, prepared - begin);
+    p->drawn++;
+}
+
+static void walk(player *p, double seconds, double fps)
+{
+    double distance = 0.0, preparing = 0.0, playing = 0.0;
+    puts("second   distance   asks  shows      bytes   us per frame: prepare       play");
+    for (int second = 0; second < (int)seconds; second++) {
+        long begin = p->drawn;
+        while ((double)p->drawn < (second + 1) * fps) {
+            double progress = (double)p->drawn / (seconds * fps);
+            while ((double)p->there < 2.0 * progress * (double)p->length && receive(p) > 0) continue;
+            ath_feed(p->file, p->bytes, 0, p->there);
+            distance = camera(p, progress);
+            choose_level(p, distance);
+            draw_frame(p, (double)p->drawn / fps);
+        }
+        double frames = (double)(p->drawn - begin);
+        printf("%6d %10.4g %6d %6d %10zu %23.1f %10.1f\n", second, distance, (int)p->level,
+               (int)level_of(p->playing), p->there, (p->preparing_time - preparing) / frames,
+               (p->playing_time - playing) / frames);
+        preparing = p->preparing_time;
+        playing = p->playing_time;
+    }
+    printf("total: %ld frames, %ld of them held\n", p->drawn, p->held);
+    printf("us per frame: prepare %.1f, at most %.1f, play %.1f\n", preparing / (double)p->drawn, p->longest,
+           playing / (double)p->drawn);
+}
+
+int main(int argc, char **argv)
+{
+    player p = {0};
+    double slices = 32, seconds = 12, fps = 60;
+    if (argc < 2 || argc % 2 != 0) fail("usage", "play FILE [--slices N] [--seconds S] [--fps F]");
+    for (int i = 2; i < argc; i += 2) {
+        double *option = !strcmp(argv[i], "--slices") ? &slices : !strcmp(argv[i], "--seconds") ? &seconds
+                         : !strcmp(argv[i], "--fps") ? &fps : NULL;
+        if (!option) fail(argv[i], "no such option");
+        *option = atof(argv[i + 1]);
+        if (!(*option >= 1.0 && *option <= 1e6)) fail(argv[i], "expected a number from 1 to 1e6");
+    }
+    open_file(&p, argv[1], (size_t)slices);
+    set_pace(&p, fps);
+    walk(&p, seconds, fps);
+    printf("bytes of memory: file %zu, opened %zu, built %zu, work %zu, segments at most %zu\n", p.length,
+           p.file_size, p.build_size, p.work_size, p.segments_size);
+    printf("ranges missing at the end: %d\n",
+           (int)ath_ranges(p.file, p.info.level_count - 1, 0, p.info.segment_count - 1, 0, NULL, 0));
+    close_file(&p);
+    return EXIT_SUCCESS;
+}
