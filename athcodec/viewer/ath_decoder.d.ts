@@ -1,0 +1,255 @@
+/**
+ * Plays .ath files, the motion of plants with levels of detail. The decoder is inside, as WebAssembly:
+ * nothing is fetched. Decoded positions have the same bits as those of the C library and of Python.
+ *
+ *     import { AthFile, ready } from "./ath_decoder.mjs";
+ *
+ *     await ready;
+ *     const file = AthFile.open(bytes);
+ *     const level = file.depthFor(distance, fov, height, 1);
+ *     const segments = [];
+ *     for (let i = 0; i < file.info.segmentCount; i++) segments.push(file.prepare(i, level));
+ *     const xyz = file.positions(segments, file.frameAt(seconds, "loop"));
+ *
+ * Units and layout. Positions and errors are in the file's scene units, time is in seconds, frames count from
+ * 0. Positions are x, y, z of one vertex after the other. Matrices are 3x4, row-major, 12 numbers:
+ * x' = m[0] x + m[1] y + m[2] z + m[3] and so on. Order "file": every subtree of the plant is one range of
+ * vertices; branches and parts refer to it. Order "source": as in the clip that was encoded; FACES and EDGES
+ * refer to it.
+ *
+ * Every returned array is a copy. Arguments out of range throw a RangeError or TypeError; a file that cannot
+ * be decoded throws an AthError.
+ */
+
+/** Whether this host can run the decoder: WebAssembly with SIMD, and DecompressionStream. */
+export const supported: boolean;
+
+/** Resolves when the decoder is compiled; before that, AthFile's functions throw. Rejects where
+ * `supported` is false. */
+export const ready: Promise<void>;
+
+/** What is wrong with a file, or missing of it. */
+export class AthError extends Error {
+  /** Number in FORMAT.md, "Errors", if below 64; 66: bytes are missing; 68: the host has no memory left. */
+  readonly code: number;
+  /** Such as "BAD_CHECKSUM", "NOT_AN_ATH_FILE", "MISSING", "NO_MEMORY". */
+  readonly codeName: string;
+  /** Index of the chunk at fault, see AthFile.chunks(); -1: none. */
+  readonly chunk: number;
+  /** Of "MISSING" from AthFile.open(): how many bytes of the file's front to come back with. More may be
+   * needed then. */
+  readonly needed: number;
+}
+
+/** "file" or "source", see above. */
+export type Order = "file" | "source";
+
+/** What comes after the last frame: it stays; the first, blended into; the same way back. */
+export type Wrap = "clamp" | "loop" | "pingpong";
+
+export interface AthInfo {
+  /** Bytes of the whole file. */
+  readonly fileLength: number;
+  /** Bytes in front of the first motion chunk: what open() needs. */
+  readonly preludeLength: number;
+  /** Largest distance of any vertex in any frame from the clip that was encoded, promised for the deepest
+   * level of the file as encoded (fullLevelCount - 1). */
+  readonly maxError: number;
+  /** x, y, z that the file's numbers are relative to. For information: positions are absolute. */
+  readonly origin: readonly [number, number, number];
+  /** Seconds from the first frame to the last. */
+  readonly duration: number;
+  readonly vertexCount: number;
+  readonly branchCount: number;
+  readonly frameCount: number;
+  readonly segmentCount: number;
+  /** Levels in this file, 0 to levelCount - 1; those that encoding made. */
+  readonly levelCount: number;
+  readonly fullLevelCount: number;
+  readonly nodeCount: number;
+  readonly chunkCount: number;
+  /** Whether positions are double in the file's own arithmetic; a Float64Array then holds more than a
+   * Float32Array. */
+  readonly wide: boolean;
+  /** The same of the rest pose. */
+  readonly restWide: boolean;
+  /** Thresholds by which nodes were accepted. */
+  readonly epsilon: number;
+  readonly xi: number;
+  readonly eta: number;
+  readonly lambda: number;
+}
+
+/** One entry per branch, parents before children; the subtree of b is the branches b to b + subtree[b] -
+ * 1. */
+export interface Branches {
+  /** Branch; -1 for a root. */
+  readonly parent: Int32Array;
+  /** First vertex in file order, and number of vertices, of its stem. */
+  readonly first: Int32Array;
+  readonly count: Int32Array;
+  /** Branches in its subtree, itself included. */
+  readonly subtree: Int32Array;
+  readonly depth: Int32Array;
+  /** Vertex (file order) of the parent's stem that it hangs on; -1 for a root. */
+  readonly attach: Int32Array;
+  /** 1: flat or compact; 2: not attached; 4: its subtree moves as one. Added up. */
+  readonly flags: Int32Array;
+  /** Of the rest pose's predictor. */
+  readonly lag: Int32Array;
+}
+
+/** How a level cuts the plant: parts ascend, and hold every vertex once. */
+export interface Parts {
+  readonly partCount: number;
+  /** Matrices of this level. */
+  readonly nodeCount: number;
+  /** Vertices that have positions of their own. */
+  readonly exactCount: number;
+  /** First vertex (file order) and number of vertices of each part. */
+  readonly first: Int32Array;
+  readonly count: Int32Array;
+  /** Branch whose subtree moves by one matrix; -1: an exact run, vertices with positions of their own. */
+  readonly branch: Int32Array;
+  /** Of the part's matrix, or of the run's first vertex among the exact ones. */
+  readonly index: Int32Array;
+}
+
+/** Kinds and what they hold: FORMAT.md, "Chunk table". Static data, as stored, zstd frames and all:
+ * METADATA 0x8004, FACES 0x8005, EDGES 0x8006, ATTRIBUTE 0x8020. */
+export interface Chunk {
+  readonly kind: number;
+  /** 255: not of a level. */
+  readonly level: number;
+  readonly segment: number;
+  /** Bytes, from the file's beginning. */
+  readonly offset: number;
+  readonly length: number;
+  /** CRC-32C of its bytes. */
+  readonly checksum: number;
+  /** Whether its bytes are here. */
+  readonly fed: boolean;
+}
+
+/** Bytes of a file. */
+export interface ByteRange {
+  readonly offset: number;
+  readonly size: number;
+}
+
+/** A range of frames, decoded at one level. It holds its own memory: free() it, or let go of the whole
+ * file. */
+export interface Segment {
+  readonly index: number;
+  readonly level: number;
+  readonly freed: boolean;
+  /** Frees its memory for further ones. Playing passes over it from then on. */
+  free(): void;
+}
+
+export type Segments = readonly (Segment | null)[];
+
+/** A segment in the making. */
+export interface Preparation {
+  readonly index: number;
+  readonly level: number;
+  /** Null until step() has returned true. */
+  readonly segment: Segment | null;
+  /** Goes on for `steps` (default 16) bounded pieces of work, of at most 64 vertices or one matrix over
+   * the segment's frames. True: done. Throws AthError where the file is damaged; nothing is left to clean
+   * up then. */
+  step(steps?: number): boolean;
+  /** Ends it before it is done, and frees its memory. */
+  cancel(): void;
+}
+
+/** An opened file, in WebAssembly memory of its own. It is freed with the object, like any other. */
+export class AthFile {
+  private constructor();
+
+  /** Whether `bytes`, the front of a file, are enough for open(), and how many are needed: the exact
+   * number where ready is true, else a number to come back with. Throws AthError where no more bytes can
+   * help. */
+  static front(bytes: Uint8Array): { ready: boolean; needed: number };
+
+  /** Opens a file from its front; what follows the prelude is fed. Copies what it keeps. Throws AthError,
+   * "MISSING" with `needed` where the front is too short. */
+  static open(bytes: Uint8Array): AthFile;
+
+  readonly info: AthInfo;
+
+  /** Whether the last positions(), matrices() or exact() showed the nearer frame in place of a blend,
+   * because the other one is in a segment that was not handed over at the same level. */
+  readonly held: boolean;
+
+  branches(): Branches;
+  /** File vertex i is vertex vertexSource()[i] of the source; branches likewise. */
+  vertexSource(): Int32Array;
+  branchSource(): Int32Array;
+  /** Seconds, one per frame, increasing. */
+  times(): Float64Array;
+  /** The rest pose, 3 numbers per vertex; order "source" by default. */
+  rest(order?: Order): Float32Array;
+  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
+  /** Largest and root-mean-square error of showing a level, measured by the encoder; segment -1 (default):
+   * over all. */
+  levelError(level: number, segment?: number): { max: number; rms: number };
+  /** First frame of a segment; of segmentCount: frameCount. */
+  segmentStart(segment: number): number;
+  segmentOf(frame: number): number;
+  /** The chunk table, in file order. */
+  chunks(): Chunk[];
+  /** The bytes of a chunk as stored, its checksum verified; null where they are not here. */
+  chunkBytes(index: number): Uint8Array | null;
+
+  /** Hands over `bytes`, the file's from `offset` on. Chunks that lie inside can be used from now on; one
+   * that begins inside goes on with the piece that continues it, so the pieces of one download can be fed
+   * as they come. Chunks that are here already are left alone. Copies what it keeps. */
+  feed(bytes: Uint8Array, offset: number): void;
+  /** Forgets motion chunks that touch this range, and frees their memory. Throws Error where one is in
+   * preparation. */
+  drop(offset: number, size: number): void;
+  /** Bytes that segments `first` to `last` (default: all) need for `level` and that are not here; with
+   * `all` those that are, too. Ascending, neighbours joined. */
+  ranges(level: number, first?: number, last?: number, all?: boolean): ByteRange[];
+  /** The deepest level that a segment can be prepared at with what is here; -1: none. */
+  readyLevel(segment: number): number;
+
+  parts(level: number): Parts;
+  /** The coarsest level whose largest error, seen from `distance` (scene units) under a vertical field of
+   * view of `fov` (radians) on a screen `height` pixels high, is at most `pixels`; the deepest where none
+   * is. segment -1 (default): over all of them. */
+  depthFor(distance: number, fov: number, height: number, pixels: number, segment?: number): number;
+
+  /** Decodes a segment at a level. Throws AthError: "MISSING", "BAD_CHECKSUM", "BAD_CHUNK", "NO_MEMORY". */
+  prepare(segment: number, level: number): Segment;
+  /** The same, to be spread over frames. Throws AthError: "MISSING", "NO_MEMORY". */
+  preparation(segment: number, level: number): Preparation;
+
+  /** Where on the frames a time, in seconds since the first frame, is: 0 to frameCount - 1 and, for a
+   * loop, on to frameCount, as the last frame blends into the first over the mean frame time. */
+  frameAt(seconds: number, wrap?: Wrap): number;
+
+  /*
+   * What follows shows a place on the frames, such as 3.25, from prepared segments, of which any number may
+   * be handed over; null and freed ones are passed over. Results go to `out`, which is returned, or to a new
+   * array. Null: none of the segments has this frame, and `out` is as it was. Hand over segments of one level
+   * where matrices or exact vertices are wanted: of several levels, nothing tells which one is shown.
+   */
+
+  /** All vertices, 3 numbers each; order "source" by default. */
+  positions(segments: Segments, frame: number, options?: { order?: Order }): Float32Array | null;
+  positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
+                                                   options: { out: T; order?: Order }): T | null;
+  /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from rest("file") to positions.
+   * Vertices of exact runs have none, exact() has them. */
+  matrices(segments: Segments, frame: number): Float32Array | null;
+  matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
+                                                  options: { out: T }): T | null;
+  /** parts().exactCount positions of 3 numbers, in file order. */
+  exact(segments: Segments, frame: number, options?: { out?: Float32Array }): Float32Array | null;
+
+  /** Lets go of the memory at once instead of with the object; nothing but free() and cancel() may be
+   * called then. */
+  dispose(): void;
+}

@@ -1,0 +1,645 @@
+// Plays .ath files: the C decoder of athcodec as WebAssembly, and a wrapper around it. ath_decoder.d.ts
+// documents what is exported, athcodec/core/ath.h what happens below. No dependencies, no fetch; browsers,
+// workers, Node. ath_decoder.mjs is made from ath_decoder.template.mjs by build_decoder.py: edit the
+// template.
+
+const WASM = "@WASM@"; // zlib, base64
+
+const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68;
+const ORDERS = { file: 0, source: 1 };
+const WRAPS = { clamp: 0, loop: 1, pingpong: 2 };
+const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
+
+// The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
+const INFO = {
+  fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
+  duration: "f64", vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32",
+  levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", wide: "i32", epsilon: "f32",
+  xi: "f32", eta: "u32", lambda: "u32", restWide: "i32",
+};
+const INFO_SIZE = 112;
+const CHUNK = {
+  fed: "u64", offset: "u64", length: "u32", checksum: "u32", segment: "u32", kind: "u16", level: "u8",
+};
+const CHUNK_SIZE = 32;
+const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth"];
+const PART = ["first", "count", "branch", "index"];
+const RANGE = { offset: "u64", size: "u64" };
+const RANGE_SIZE = 16;
+const TYPES = {
+  u8: [1, (view, at) => view.getUint8(at)],
+  u16: [2, (view, at) => view.getUint16(at, true)],
+  u32: [4, (view, at) => view.getUint32(at, true)],
+  i32: [4, (view, at) => view.getInt32(at, true)],
+  f32: [4, (view, at) => view.getFloat32(at, true)],
+  f64: [8, (view, at) => view.getFloat64(at, true)],
+  u64: [8, (view, at) => Number(view.getBigUint64(at, true))],
+};
+
+// ---- the module ----
+
+// A function that returns a vector: SIMD came to browsers last of all that the decoder needs.
+const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0,
+  253, 15, 253, 98, 11];
+
+export const supported = typeof WebAssembly === "object" && typeof DecompressionStream === "function"
+  && WebAssembly.validate(new Uint8Array(SIMD));
+
+let module = null, shared = null;
+
+async function compile() {
+  if (!supported) throw new Error("ath_decoder: got no WebAssembly SIMD, or no DecompressionStream");
+  const packed = Uint8Array.from(atob(WASM), (character) => character.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  module = await WebAssembly.compile(await new Response(stream).arrayBuffer());
+}
+
+export const ready = compile();
+ready.catch(() => {}); // who awaits it sees it
+
+export class AthError extends Error {
+  constructor(code, codeName, message, { chunk = -1, needed = 0 } = {}) {
+    super(`${codeName}: ${message}`);
+    this.name = "AthError";
+    this.code = code;
+    this.codeName = codeName;
+    this.chunk = chunk;
+    this.needed = needed;
+  }
+}
+
+// One instance and its memory, of which it hands out blocks aligned to 16. Memory moves when it grows: no
+// view of it outlives a call.
+class Core {
+  constructor() {
+    if (!module) throw new Error("ath_decoder: got a call before `await ready`");
+    this.c = new WebAssembly.Instance(module).exports;
+    this.end = Math.ceil(this.c.__heap_base.value / 16) * 16;
+    this.free = []; // {at, size}, ascending, never neighbours
+    this.sizes = new Map();
+  }
+
+  take(bytes) {
+    const size = Math.max(16, Math.ceil(bytes / 16) * 16);
+    const i = this.free.findIndex((block) => block.size >= size);
+    let at = this.end;
+    if (i >= 0) {
+      const block = this.free[i];
+      at = block.at;
+      block.at += size;
+      block.size -= size;
+      if (block.size === 0) this.free.splice(i, 1);
+    } else {
+      this.reach(at + size);
+      this.end += size;
+    }
+    this.sizes.set(at, size);
+    return at;
+  }
+
+  reach(end) {
+    const missing = end - this.c.memory.buffer.byteLength;
+    if (missing <= 0) return;
+    try {
+      this.c.memory.grow(Math.ceil(missing / PAGE));
+    } catch {
+      throw this.error(NO_MEMORY, `got no ${missing} bytes more from the host, expected ${end} in all`);
+    }
+  }
+
+  give(at) {
+    const block = { at, size: this.sizes.get(at) };
+    this.sizes.delete(at);
+    let i = this.free.findIndex((other) => other.at > at);
+    if (i < 0) i = this.free.length;
+    const after = this.free[i], before = this.free[i - 1];
+    if (after && at + block.size === after.at) block.size += this.free.splice(i, 1)[0].size;
+    if (before && before.at + before.size === at) {
+      before.size += block.size;
+    } else {
+      this.free.splice(i, 0, block);
+    }
+    const last = this.free[this.free.length - 1];
+    if (last.at + last.size === this.end) this.end = this.free.pop().at;
+  }
+
+  // A copy of a typed array, in memory.
+  put(array) {
+    const at = this.take(array.byteLength);
+    this.view(array.constructor, at, array.length).set(array);
+    return at;
+  }
+
+  view(Type, at, length) {
+    return new Type(this.c.memory.buffer, at, length);
+  }
+
+  copy(Type, at, length) {
+    return this.view(Type, at >>> 0, length).slice();
+  }
+
+  // What `call` returns, given `size` bytes of memory for its results.
+  with(size, call) {
+    const at = this.take(size);
+    try {
+      return call(at);
+    } finally {
+      this.give(at);
+    }
+  }
+
+  struct(fields, at) {
+    const view = new DataView(this.c.memory.buffer), result = {};
+    for (const [name, type] of Object.entries(fields)) {
+      const [size, read] = TYPES[type];
+      at = Math.ceil(at / size) * size;
+      result[name] = read(view, at);
+      at += size;
+    }
+    return result;
+  }
+
+  // An array of structs of int32 as an object of arrays.
+  columns(names, at, count) {
+    const rows = this.view(Int32Array, at >>> 0, count * names.length);
+    return Object.fromEntries(names.map((name, k) =>
+      [name, Int32Array.from({ length: count }, (_, i) => rows[i * names.length + k])]));
+  }
+
+  error(code, message, more) {
+    const at = this.c.ath_result_name(code) >>> 0;
+    const bytes = this.view(Uint8Array, at, 32);
+    return new AthError(code, String.fromCharCode(...bytes.subarray(0, bytes.indexOf(0))), message, more);
+  }
+
+  // Looks at ever more of the front: {code, needed, memory, at}; `at` is a copy of the prelude if code is OK.
+  front(bytes) {
+    let available = 0, needed = HEADER_SIZE, code, memory;
+    do {
+      available = Math.min(bytes.length, Math.max(needed, HEADER_SIZE));
+      const at = this.put(bytes.subarray(0, available));
+      [code, needed, memory] = this.with(8, (sizes) =>
+        [this.c.ath_front(at, available, 0, sizes, sizes + 4), ...this.copy(Uint32Array, sizes, 2)]);
+      if (code === OK) return { code, needed, memory, at };
+      this.give(at);
+    } while (code === MISSING && needed <= bytes.length);
+    return { code, needed, memory, at: 0 };
+  }
+
+  frontError({ code, needed }, available) {
+    const what = `the front of the file: got ${available} bytes`;
+    return code === MISSING ? this.error(code, `${what}, expected at least ${needed}`, { needed })
+      : this.error(code, what);
+  }
+}
+
+// ---- arguments ----
+
+function whole(value, low, high, what) {
+  if (Number.isInteger(value) && value >= low && value <= high) return value;
+  throw new RangeError(`${what}: got ${value}, expected a whole number from ${low} to ${high}`);
+}
+
+function number(value, what) {
+  if (typeof value === "number") return value;
+  throw new TypeError(`${what}: got ${value}, expected a number`);
+}
+
+function choice(value, choices, what) {
+  if (Object.hasOwn(choices, value)) return choices[value];
+  throw new RangeError(`${what}: got ${value}, expected one of ${Object.keys(choices).join(", ")}`);
+}
+
+function asBytes(bytes) {
+  if (bytes instanceof Uint8Array) return bytes;
+  throw new TypeError("bytes: got something else, expected a Uint8Array");
+}
+
+function asOut(out, length, types) {
+  const given = out === undefined ? new types[0](length) : out;
+  if (types.some((Type) => given instanceof Type) && given.length >= length) return given;
+  const names = types.map((Type) => Type.name).join(" or ");
+  const got = `${given?.constructor?.name} of ${given?.length}`;
+  throw new RangeError(`out: got ${got}, expected ${names} of ${length}`);
+}
+
+// ---- segments ----
+
+class Segment {
+  #release;
+
+  constructor(index, level, release) {
+    this.index = index;
+    this.level = level;
+    this.#release = release;
+  }
+
+  get freed() {
+    return this.#release === null;
+  }
+
+  free() {
+    const release = this.#release;
+    this.#release = null;
+    if (release) release(this);
+  }
+}
+
+class Preparation {
+  #step;
+  #cancel;
+
+  constructor(index, level, step, cancel) {
+    this.index = index;
+    this.level = level;
+    this.segment = null;
+    this.#step = step;
+    this.#cancel = cancel;
+  }
+
+  step(steps = 16) {
+    if (this.segment) return true;
+    if (!this.#step) throw new Error("step: got a preparation that has ended, expected one under way");
+    whole(steps, 1, MOST_STEPS, "steps");
+    try {
+      this.segment = this.#step(steps);
+    } catch (error) {
+      this.#step = null;
+      throw error;
+    }
+    return this.segment !== null;
+  }
+
+  cancel() {
+    if (this.#step && !this.segment) this.#cancel();
+    this.#step = null;
+  }
+}
+
+// ---- files ----
+
+export class AthFile {
+  info = null;
+  held = false;
+  #own = null;            // the Core, until dispose()
+  #at = 0;                // the ath_file
+  #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
+  #pointers = new Map();  // of segments that are prepared
+  #preparing = new Map(); // index of a segment: how many preparations of it are under way
+  #works = [];            // ath_works that nobody uses
+  #scratch = { at: 0, size: 0 };
+  #cutSizes = [];
+
+  static front(bytes) {
+    shared ??= new Core();
+    const front = shared.front(asBytes(bytes));
+    if (front.code === OK) shared.give(front.at);
+    if (front.code !== OK && front.code !== MISSING) throw shared.frontError(front, bytes.length);
+    return { ready: front.code === OK, needed: front.needed };
+  }
+
+  static open(bytes) {
+    const file = new AthFile();
+    file.#open(asBytes(bytes));
+    return file;
+  }
+
+  #open(bytes) {
+    const core = new Core(), c = core.c;
+    const front = core.front(bytes);
+    if (front.code !== OK) throw core.frontError(front, bytes.length);
+    this.#own = core;
+    this.#at = core.take(front.memory);
+    const code = c.ath_open(this.#at, front.memory, front.at, front.needed, 0);
+    this.info = this.#info();
+    this.#chunks = this.#chunkTable();
+    if (code !== OK) throw this.#chunkError(code, c.ath_fault(this.#at));
+    const size = c.ath_build_size(this.#at) >>> 0;
+    this.#check(c.ath_build(this.#at, core.take(size), size), `the bases of the motion, ${size} bytes`);
+    this.feed(bytes, 0);
+  }
+
+  #info() {
+    const info = this.#core.with(INFO_SIZE, (at) => {
+      this.#core.c.ath_get_info(this.#at, at);
+      return this.#core.struct(INFO, at);
+    });
+    const { originX, originY, originZ, wide, restWide, ...rest } = info;
+    const origin = [originX, originY, originZ];
+    return Object.freeze({ ...rest, origin, wide: wide !== 0, restWide: restWide !== 0 });
+  }
+
+  #chunkTable() {
+    const at = this.#core.c.ath_chunks(this.#at) >>> 0, chunks = [];
+    for (let i = 0; i < this.info.chunkCount; i++) {
+      const chunk = this.#core.struct(CHUNK, at + i * CHUNK_SIZE);
+      chunk.fed = (chunk.fed >>> 0) !== 0; // the upper half is no part of the pointer
+      chunks.push({ ...chunk, at: 0, filled: 0 }); // the prelude's are in the copy that ath_open has
+    }
+    return chunks;
+  }
+
+  get #core() {
+    if (this.#own) return this.#own;
+    throw new Error("AthFile: got a call after dispose(), expected none");
+  }
+
+  get #c() {
+    return this.#core.c;
+  }
+
+  #check(code, what) {
+    if (code !== OK) throw this.#core.error(code, what);
+  }
+
+  #chunkError(code, index) {
+    if (index < 0) return this.#core.error(code, "header, chunk table, hierarchy: got what does not match");
+    const { kind, level, segment, offset, length } = this.#chunks[index];
+    const what = `chunk ${index} (kind ${kind}, level ${level}, segment ${segment})`;
+    return this.#core.error(code, `${what}: got ${length} damaged bytes at ${offset}`, { chunk: index });
+  }
+
+  #level(level) {
+    return whole(level, 0, this.info.levelCount - 1, "level");
+  }
+
+  #segment(segment, low = 0) {
+    return whole(segment, low, this.info.segmentCount - 1, "segment");
+  }
+
+  // ---- what it holds ----
+
+  branches() {
+    return this.#core.columns(BRANCH, this.#c.ath_branches(this.#at), this.info.branchCount);
+  }
+
+  vertexSource() {
+    return this.#core.copy(Int32Array, this.#c.ath_vertex_source(this.#at), this.info.vertexCount);
+  }
+
+  branchSource() {
+    return this.#core.copy(Int32Array, this.#c.ath_branch_source(this.#at), this.info.branchCount);
+  }
+
+  times() {
+    return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
+  }
+
+  rest(order = "source", { out } = {}) {
+    const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+    const result = asOut(out, length, [Float32Array, Float64Array]);
+    return this.#fill(result, length, (at) => {
+      if (result instanceof Float64Array) c.ath_rest_wide(this.#at, which, at, 24);
+      else c.ath_rest(this.#at, which, at, 12);
+      return OK;
+    });
+  }
+
+  levelError(level, segment = -1) {
+    const c = this.#c;
+    this.#level(level);
+    this.#segment(segment, -1);
+    const [max, rms] = this.#core.with(16, (at) => {
+      c.ath_level_error(this.#at, level, segment, at, at + 8);
+      return this.#core.copy(Float64Array, at, 2);
+    });
+    return { max, rms };
+  }
+
+  segmentStart(segment) {
+    return this.#c.ath_segment_start(this.#at, whole(segment, 0, this.info.segmentCount, "segment"));
+  }
+
+  segmentOf(frame) {
+    return this.#c.ath_segment_of(this.#at, whole(frame, 0, this.info.frameCount - 1, "frame"));
+  }
+
+  chunks() {
+    return this.#chunks.map(({ kind, level, segment, offset, length, checksum, fed }) =>
+      ({ kind, level, segment, offset, length, checksum, fed }));
+  }
+
+  chunkBytes(index) {
+    const c = this.#c;
+    whole(index, 0, this.info.chunkCount - 1, "index");
+    const code = c.ath_check_chunk(this.#at, index);
+    if (code === MISSING) return null;
+    if (code !== OK) throw this.#chunkError(code, index);
+    const at = (c.ath_chunks(this.#at) >>> 0) + index * CHUNK_SIZE;
+    return this.#core.copy(Uint8Array, this.#core.view(Uint32Array, at, 1)[0], this.#chunks[index].length);
+  }
+
+  // ---- bytes ----
+
+  // First chunk that ends behind `offset`.
+  #chunkAt(offset) {
+    let low = 0, high = this.#chunks.length;
+    while (low < high) {
+      const middle = (low + high) >> 1, chunk = this.#chunks[middle];
+      if (chunk.offset + chunk.length <= offset) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  // Chunks are copied one by one, so that each can be dropped; one that ends in a later piece waits for it.
+  feed(bytes, offset) {
+    const c = this.#c, end = whole(offset, 0, Number.MAX_SAFE_INTEGER, "offset") + asBytes(bytes).length;
+    for (let i = this.#chunkAt(offset); i < this.#chunks.length && this.#chunks[i].offset < end; i++) {
+      const chunk = this.#chunks[i], start = chunk.offset + chunk.filled;
+      if (chunk.fed || start < offset || start >= end) continue;
+      if (!chunk.at) chunk.at = this.#core.take(chunk.length);
+      const piece = bytes.subarray(start - offset, Math.min(end, chunk.offset + chunk.length) - offset);
+      this.#core.view(Uint8Array, chunk.at + chunk.filled, piece.length).set(piece);
+      chunk.filled += piece.length;
+      chunk.fed = chunk.filled === chunk.length;
+      if (chunk.fed) c.ath_feed(this.#at, chunk.at, BigInt(chunk.offset), chunk.length);
+    }
+  }
+
+  drop(offset, size) {
+    const c = this.#c, end = whole(offset, 0, Number.MAX_SAFE_INTEGER, "offset") + number(size, "size");
+    const dropped = [];
+    for (let i = this.#chunkAt(offset); i < this.#chunks.length && this.#chunks[i].offset < end; i++)
+      if (this.#chunks[i].at) dropped.push(this.#chunks[i]);
+    const busy = dropped.find((chunk) => chunk.level !== NO_LEVEL && this.#preparing.has(chunk.segment));
+    if (busy) throw new Error(`drop: got bytes of segment ${busy.segment}, which is in preparation`);
+    for (const chunk of dropped) {
+      c.ath_drop(this.#at, BigInt(chunk.offset), BigInt(chunk.length));
+      this.#core.give(chunk.at);
+      Object.assign(chunk, { at: 0, filled: 0, fed: false });
+    }
+  }
+
+  ranges(level, first = 0, last = this.info.segmentCount - 1, all = false) {
+    const c = this.#c;
+    this.#level(level);
+    this.#segment(first);
+    this.#segment(last);
+    const count = c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, 0, 0);
+    return this.#core.with(count * RANGE_SIZE, (at) => {
+      c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, at, count);
+      return Array.from({ length: count }, (_, i) => this.#core.struct(RANGE, at + i * RANGE_SIZE));
+    });
+  }
+
+  readyLevel(segment) {
+    return this.#c.ath_ready_level(this.#at, this.#segment(segment));
+  }
+
+  // ---- levels ----
+
+  // Numbers of parts, nodes and exact vertices; they take a walk over the plant.
+  #cutSize(level) {
+    const c = this.#c;
+    return this.#cutSizes[level] ??= this.#core.with(12, (at) => {
+      c.ath_cut_size(this.#at, level, at, at + 4, at + 8);
+      return this.#core.copy(Int32Array, at, 3);
+    });
+  }
+
+  parts(level) {
+    const c = this.#c, [count, nodeCount, exactCount] = this.#cutSize(this.#level(level));
+    return this.#core.with(count * 4 * PART.length, (at) => {
+      c.ath_cut(this.#at, level, at);
+      return { partCount: count, nodeCount, exactCount, ...this.#core.columns(PART, at, count) };
+    });
+  }
+
+  depthFor(distance, fov, height, pixels, segment = -1) {
+    return this.#c.ath_depth_for(this.#at, this.#segment(segment, -1), number(distance, "distance"),
+      number(fov, "fov"), number(height, "height"), number(pixels, "pixels"));
+  }
+
+  // ---- preparing ----
+
+  preparation(segment, level) {
+    const c = this.#c, core = this.#core;
+    this.#segment(segment);
+    this.#level(level);
+    const workSize = c.ath_work_size(this.#at) >>> 0, size = c.ath_segment_size(this.#at, level) >>> 0;
+    const work = this.#works.pop() ?? core.take(workSize);
+    let at = 0;
+    const end = () => {
+      this.#works.push(work);
+      const left = this.#preparing.get(segment) - 1;
+      if (left > 0) this.#preparing.set(segment, left);
+      else this.#preparing.delete(segment);
+    };
+    const fail = () => {
+      end();
+      if (at) core.give(at);
+    };
+    const step = (steps) => {
+      const code = this.#c.ath_prepare_step(work, steps);
+      if (code === MORE) return null;
+      if (code !== OK) {
+        const fault = c.ath_work_fault(work);
+        fail();
+        throw this.#chunkError(code, fault);
+      }
+      end();
+      return this.#prepared(segment, level, at);
+    };
+    this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
+    try {
+      at = core.take(size);
+      this.#check(c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size),
+        `segment ${segment} at level ${level}: got a part of its bytes, expected all that ranges() lists`);
+    } catch (error) {
+      fail();
+      throw error;
+    }
+    return new Preparation(segment, level, step, fail);
+  }
+
+  #prepared(index, level, at) {
+    const segment = new Segment(index, level, (freed) => {
+      this.#pointers.delete(freed);
+      if (this.#own) this.#own.give(at);
+    });
+    this.#pointers.set(segment, at);
+    return segment;
+  }
+
+  prepare(segment, level) {
+    const preparation = this.preparation(segment, level);
+    while (!preparation.step(MOST_STEPS));
+    return preparation.segment;
+  }
+
+  // ---- playing ----
+
+  frameAt(seconds, wrap = "clamp") {
+    return this.#c.ath_frame_at(this.#at, number(seconds, "seconds"), choice(wrap, WRAPS, "wrap"));
+  }
+
+  // The memory that results pass through, `bytes` at least.
+  #passage(bytes) {
+    if (bytes > this.#scratch.size) {
+      if (this.#scratch.at) this.#core.give(this.#scratch.at);
+      this.#scratch = { at: 0, size: 0 };
+      this.#scratch = { at: this.#core.take(bytes), size: bytes };
+    }
+    return this.#scratch.at;
+  }
+
+  #fill(out, length, call) {
+    const at = this.#passage(length * out.BYTES_PER_ELEMENT), code = call(at);
+    this.held = code === HELD;
+    if (code === NOT_PREPARED) return null;
+    if (code !== HELD) this.#check(code, "playing");
+    out.set(this.#core.view(out.constructor, at, length));
+    return out;
+  }
+
+  // What `call` shows of segments, given the address of an array of pointers to them, and their number.
+  #show(segments, frame, out, length, call) {
+    number(frame, "frame");
+    const pointers = Array.from(segments, (segment) => this.#pointer(segment));
+    return this.#core.with(4 * pointers.length, (array) => {
+      this.#core.view(Uint32Array, array, pointers.length).set(pointers);
+      return this.#fill(out, length, (at) => call(array, pointers.length, at));
+    });
+  }
+
+  #pointer(segment) {
+    const at = segment ? this.#pointers.get(segment) : 0;
+    if (at !== undefined) return at;
+    if (segment instanceof Segment && segment.freed) return 0;
+    throw new TypeError("segments: got something else, expected what prepare() of this file returned");
+  }
+
+  // The largest of column `k` of #cutSize over the segments' levels.
+  #most(segments, k) {
+    const levels = new Set(Array.from(segments, (segment) => segment?.level ?? 0));
+    return Math.max(0, ...Array.from(levels, (level) => this.#cutSize(this.#level(level))[k]));
+  }
+
+  positions(segments, frame, { out, order = "source" } = {}) {
+    const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+    const result = asOut(out, length, [Float32Array, Float64Array]);
+    return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
+      ? c.ath_positions_wide(this.#at, array, count, frame, which, at, 24)
+      : c.ath_positions(this.#at, array, count, frame, which, at, 12));
+  }
+
+  matrices(segments, frame, { out } = {}) {
+    const c = this.#c, length = 12 * this.#most(segments, 1);
+    const result = asOut(out, length, [Float32Array, Float64Array]);
+    return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
+      ? c.ath_matrices_wide(this.#at, array, count, frame, at, 96)
+      : c.ath_matrices(this.#at, array, count, frame, at, 48));
+  }
+
+  exact(segments, frame, { out } = {}) {
+    const c = this.#c, length = 3 * this.#most(segments, 2);
+    const result = asOut(out, length, [Float32Array]);
+    return this.#show(segments, frame, result, length, (array, count, at) =>
+      c.ath_exact(this.#at, array, count, frame, at, 12));
+  }
+
+  dispose() {
+    this.#own = null;
+  }
+}

@@ -1,0 +1,127 @@
+"""Builds ath_decoder.mjs: the C decoder compiled to WebAssembly, put into ath_decoder.template.mjs as text.
+
+The compiler is Zig's, a pip package, at one version: the WebAssembly that it makes is the same on every
+machine. Exported is what the template calls, nothing is imported. The module is written only if its text or
+its WebAssembly would change: what zlib packs may differ between versions of zlib, what it unpacks does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import re
+import subprocess
+import sys
+import tempfile
+import zlib
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+VIEWER = Path(__file__).resolve().parent
+CORE = VIEWER.parent / "core"
+TEMPLATE = VIEWER / "ath_decoder.template.mjs"
+MODULE = VIEWER / "ath_decoder.mjs"
+
+ZIG = "0.17.1"
+"""Version of the package ziglang that the committed module was built with."""
+
+STACK_BYTES = 64 << 10
+FLAGS = [
+    "-target", "wasm32-freestanding",
+    "-mcpu=generic+bulk_memory+bulk_memory_opt+nontrapping_fptoint+sign_ext+simd128",
+    "-std=c11", "-O3", "-fno-unroll-loops", "-DATH_STATIC",  # unrolled it is larger, and no faster
+    # the bits of positions are part of the format, as in core/CMakeLists.txt
+    "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
+    "-Wall", "-Wextra", "-Werror",
+    # Zig puts the stack below the data, where an overflow traps
+    "-nostdlib", "-s", "-Wl,--no-entry", f"-Wl,-z,stack-size={STACK_BYTES}",
+]
+
+PAYLOAD = re.compile(r'(const WASM = ")([^"]*)(";)')
+
+
+class BuildError(Exception):
+    """One line for the user."""
+
+
+def decoder_sources() -> list[Path]:
+    """The C files that a player needs, as core/CMakeLists.txt lists them."""
+    found = re.search(r"set\(ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
+    if not found:
+        raise BuildError(f"{CORE / 'CMakeLists.txt'}: got no ATH_DECODER_SOURCES, expected a list of C files")
+    return [CORE / name for name in found[1].split()]
+
+
+def exports(template: str) -> list[str]:
+    """The C functions that the template calls."""
+    return sorted(set(re.findall(r"\bc\.(ath_\w+)\(", template)))
+
+
+def check_compiler() -> None:
+    try:
+        found = version("ziglang")
+    except PackageNotFoundError:
+        found = "none"
+    if found != ZIG:
+        raise BuildError(f"package ziglang: got version {found}, expected {ZIG}; pip install ziglang=={ZIG}")
+
+
+def compile_decoder(template: str) -> bytes:
+    """The decoder as a WebAssembly module."""
+    check_compiler()
+    wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, *wanted, "-I", str(CORE),
+                   *map(str, [*decoder_sources(), VIEWER / "wasm.c"]), "-o", "decoder.wasm"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise BuildError(f"zig cc: got exit status {done.returncode}, expected 0:\n{done.stderr}")
+        return (Path(folder) / "decoder.wasm").read_bytes()
+
+
+def pack(template: str, wasm: bytes) -> str:
+    """The module's text."""
+    payload = base64.b64encode(zlib.compress(wasm, 9)).decode("ascii")
+    head, code = template.split("\n\n", 1)
+    # comments and indentation stay in the template, none of whose strings goes over several lines
+    lean = re.sub(r"^ +|^ *//.*\n|^\n", "", code, flags=re.MULTILINE)
+    return PAYLOAD.sub(lambda found: found[1] + payload + found[3], f"{head}\n\n{lean}", count=1)
+
+
+def unpack(module: str) -> tuple[str, bytes]:
+    """(text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
+    found = PAYLOAD.search(module)
+    try:
+        return PAYLOAD.sub("", module, count=1), zlib.decompress(base64.b64decode(found[2]))
+    except (TypeError, ValueError, zlib.error):
+        return "", b""
+
+
+def differences(built: str, committed: str) -> list[str]:
+    names = ("text", "WebAssembly")
+    return [name for name, a, b in zip(names, unpack(built), unpack(committed), strict=True) if a != b]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Builds athcodec/viewer/ath_decoder.mjs from the C decoder.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if the module differs")
+    arguments = parser.parse_args()
+    template = TEMPLATE.read_text("utf-8")
+    try:
+        built = pack(template, compile_decoder(template))
+    except BuildError as error:
+        print(f"build_decoder: {error}", file=sys.stderr)
+        return 1
+    different = differences(built, MODULE.read_text("utf-8") if MODULE.exists() else "")
+    if different and arguments.check:
+        print(f"build_decoder: {MODULE.name}: got other {' and '.join(different)} than the sources make; "
+              "run python athcodec/viewer/build_decoder.py and commit the result", file=sys.stderr)
+        return 1
+    if different:
+        MODULE.write_text(built, "utf-8", newline="\n")
+    print(f"{MODULE.name}: {len(built.encode()):,} bytes, {'written' if different else 'up to date'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,21 @@
+/* What the C decoder needs in WebAssembly beside its own sources: the memory functions, which become one
+ * instruction each, and a look that ath.h's structs are as ath_decoder.template.mjs reads them. */
+#include "ath.h"
+
+void *memcpy(void *restrict to, const void *restrict from, size_t size)
+{
+    return __builtin_memcpy(to, from, size);
+}
+
+void *memset(void *to, int value, size_t size) { return __builtin_memset(to, value, size); }
+
+_Static_assert(sizeof(size_t) == 4 && sizeof(void *) == 4, "pointers and sizes are read as 32 bits");
+_Static_assert(offsetof(ath_info, rest_wide) == 108 && sizeof(ath_info) == 112, "INFO");
+_Static_assert(offsetof(ath_chunk, level) == 30 && sizeof(ath_chunk) == 32, "CHUNK");
+_Static_assert(offsetof(ath_branch, depth) == 28 && sizeof(ath_branch) == 32, "BRANCH");
+_Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
+_Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
+_Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67
+               && ATH_NO_MEMORY == 68, "result codes");
+_Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
+_Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2, "WRAPS");

@@ -1,0 +1,524 @@
+"""What a web page relies on: the decoder in WebAssembly shows the same bits as the C library, plays files
+that arrive in pieces, names what is wrong with a damaged one, and is what the sources make."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from ctypes import POINTER, byref, c_double, c_int, c_int32, c_size_t, c_void_p, create_string_buffer
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec._library import load_library
+from plants import awkward, clip_of, grow, plant, random_hierarchy
+
+VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
+MODULE = VIEWER / "ath_decoder.mjs"
+MOST_BYTES = 80_000
+OK, HELD, NOT_PREPARED = 0, 65, 67
+
+
+# ---- Node ----
+
+# Names that every script below can use.
+SCRIPT = """
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+const { AthError, AthFile, ready, supported } = await import(%s);
+await ready;
+const read = (path) => new Uint8Array(readFileSync(path));
+const digest = (...arrays) => {
+  const hash = createHash("sha256");
+  for (const array of arrays) hash.update(new Uint8Array(array.buffer, array.byteOffset, array.byteLength));
+  return hash.digest("hex");
+};
+const each = (count, call) => Array.from({ length: count }, (_, i) => call(i));
+const prepareAll = (file, level) => each(file.info.segmentCount, (i) => file.prepare(i, level));
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const frames = (file, segments, out = new Float32Array(3 * file.info.vertexCount)) => digest(
+  ...each(file.info.frameCount, (t) => file.positions(segments, t, { out }).slice()));
+const thrown = (call) => {
+  try { call(); } catch (error) { return { ...error, type: error.constructor.name, message: error.message }; }
+  return null;
+};
+const answer = (value) => console.log(JSON.stringify(value));
+const [path, option] = process.argv.slice(2);
+%s
+"""
+
+
+def run_node(tmp_path, script: str, *words):
+    """What a script answers, run with `words` as its arguments."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
+    file = tmp_path / "script.mjs"
+    file.write_text(SCRIPT % (json.dumps(MODULE.as_uri()), script), "utf-8")
+    done = subprocess.run([node, str(file), *map(str, words)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+# ---- the C library, by ath.h ----
+
+
+class Info(ctypes.Structure):
+    """The front of ath_info."""
+
+    _fields_ = [(name, ctypes.c_uint64) for name in ("file_length", "prelude_length")]
+    _fields_ += [("max_error", c_double), ("origin", c_double * 3), ("duration", c_double)]
+    _fields_ += [(name, c_int32) for name in (
+        "vertex_count", "branch_count", "frame_count", "segment_count", "level_count", "full_level_count",
+        "node_count", "chunk_count", "wide")]
+    _fields_ += [("more", c_int32 * 16)]
+
+
+class Native:
+    """A file opened by the C library, all of it fed."""
+
+    def __init__(self, data: bytes):
+        self.lib = load_library()
+        for name in ("ath_build_size", "ath_work_size", "ath_segment_size"):
+            getattr(self.lib, name).restype = c_size_t
+        for name in ("ath_times", "ath_branches"):
+            getattr(self.lib, name).restype = c_void_p
+        self.lib.ath_frame_at.restype = c_double
+        self.kept = [create_string_buffer(data, len(data))]
+        front, size = c_size_t(), c_size_t()
+        assert self.lib.ath_front(self.kept[0], c_size_t(len(data)), None, byref(front), byref(size)) == OK
+        self.file = self.block(size.value)
+        assert self.lib.ath_open(self.file, size, self.kept[0], c_size_t(len(data)), None) == OK
+        size = c_size_t(self.lib.ath_build_size(self.file))
+        assert self.lib.ath_build(self.file, self.block(size.value), size) == OK
+        self.info = Info()
+        self.lib.ath_get_info(self.file, byref(self.info))
+
+    def block(self, size: int) -> c_void_p:
+        """Memory aligned to 16."""
+        memory = create_string_buffer(size + 16)
+        self.kept.append(memory)
+        return c_void_p(ctypes.addressof(memory) + -ctypes.addressof(memory) % 16)
+
+    def prepare(self, level: int):
+        """Pointers to all segments."""
+        work, size = c_size_t(self.lib.ath_work_size(self.file)), c_size_t(
+            self.lib.ath_segment_size(self.file, c_int32(level)))
+        segments = [self.block(size.value) for _ in range(self.info.segment_count)]
+        scratch = self.block(work.value)
+        for i, segment in enumerate(segments):
+            assert self.lib.ath_prepare(scratch, work, self.file, i, level, segment, size) == OK
+        return (c_void_p * len(segments))(*segments)
+
+    def cut(self, level: int) -> tuple[int, int]:
+        """(nodes, exact vertices)."""
+        nodes, exact = c_int32(), c_int32()
+        self.lib.ath_cut_size(self.file, level, None, byref(nodes), byref(exact))
+        return nodes.value, exact.value
+
+    def show(self, function: str, shape, dtype, segments, frame: float, *order) -> np.ndarray:
+        out = np.zeros(shape, dtype)
+        result = getattr(self.lib, function)(
+            self.file, segments, c_int32(len(segments)), c_double(frame), *order, c_void_p(out.ctypes.data),
+            c_size_t(out[:1].nbytes))
+        assert result == OK
+        return out
+
+    def positions(self, segments, frame: float, order: int = 1, dtype=np.float32) -> np.ndarray:
+        name = "ath_positions" if dtype == np.float32 else "ath_positions_wide"
+        return self.show(name, (self.info.vertex_count, 3), dtype, segments, frame, c_int(order))
+
+    def level_error(self, level: int, segment: int) -> dict:
+        most, rms = c_double(), c_double()
+        self.lib.ath_level_error(self.file, level, segment, byref(most), byref(rms))
+        return {"max": most.value, "rms": rms.value}
+
+
+def digest(*arrays) -> str:
+    whole = hashlib.sha256()
+    for array in arrays:
+        whole.update(np.ascontiguousarray(array).tobytes())
+    return whole.hexdigest()
+
+
+def times_between(frame_count: int) -> list[float]:
+    """Places on the frames, most of them between two."""
+    return [0.0, 0.3, (frame_count - 1) / 2 + 0.25, frame_count - 1.125, frame_count - 0.375]
+
+
+# ---- files ----
+
+
+def key_framed(seed: int = 3):
+    """A plant whose every vertex follows three rough signals, so that a learned time basis pays."""
+    rng = np.random.default_rng(seed)
+    labels, parents = random_hierarchy(rng, branches=20, longest=9)
+    rest = grow(rng, labels, parents)
+    signals, reach = rng.normal(size=(48, 3)), 0.3 * rng.normal(size=(3, len(rest), 3))
+    return clip_of(rest + np.einsum("tk,knc->tnc", signals, reach), rest, labels, parents)
+
+
+def first_chunk(data: bytes) -> int:
+    """Where the first chunk begins (FORMAT.md, "Header")."""
+    chunks, segments = (int.from_bytes(data[at: at + 4], "little") for at in (24, 40))
+    return 64 + 16 * chunks + 8 * segments * data[44]
+
+
+def learned_chunks(data: bytes) -> int:
+    """How many STEMS chunks bring a time basis of their own (FORMAT.md, "STEMS")."""
+    offset, learned = first_chunk(data), 0
+    for i in range(int.from_bytes(data[24:28], "little")):
+        kind, length = data[64 + 16 * i], int.from_bytes(data[72 + 16 * i: 76 + 16 * i], "little")
+        learned += kind == 16 and data[offset + 5] > 0
+        offset += length
+    return learned
+
+
+@pytest.fixture(scope="module", params=["sample", "bushy", "uneven", "wide", "exact rest", "key-framed"])
+def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath):
+    """Files that use different parts of the decoder, all but one in several segments."""
+    kept = {"sample": sample_ath, "bushy": bushy_ath, "uneven": full_ath}
+    if request.param in kept:
+        return kept[request.param]
+    path = tmp_path_factory.mktemp("wasm") / "plant.ath"
+    if request.param == "wide":
+        clip = awkward(seed=8, branches=9, frames=40, dtype=np.float64, offset=1e3, motion="sway")
+        athcodec.encode(clip, path, rel_error=1e-5, segment_frames=16, effort="fast")
+        assert Native(path.read_bytes()).info.wide == 1
+    elif request.param == "exact rest":
+        athcodec.encode(plant(seed=2, roots=2, offset=50.0), path, exact_rest=True, effort="fast")
+    else:
+        athcodec.encode(key_framed(), path, rel_error=1e-4, segment_frames=24)
+        assert learned_chunks(path.read_bytes()) > 0
+    return path
+
+
+def damaged(path: Path, tmp_path: Path, at: int) -> Path:
+    data = bytearray(path.read_bytes())
+    data[at] ^= 0x10
+    copy = tmp_path / "damaged.ath"
+    copy.write_bytes(data)
+    return copy
+
+
+# ---- the same bits ----
+
+SHOW = """
+const file = AthFile.open(read(path));
+const levels = [];
+for (let level = 0; level < file.info.levelCount; level++) {
+  const segments = prepareAll(file, level);
+  levels.push({
+    frames: frames(file, segments),
+    wide: frames(file, segments, new Float64Array(3 * file.info.vertexCount)),
+    between: JSON.parse(option).map((t) => digest(
+      file.positions(segments, t, { order: "file" }), file.matrices(segments, t), file.exact(segments, t),
+      file.matrices(segments, t, { out: new Float64Array(12 * file.parts(level).nodeCount) }))),
+  });
+  for (const segment of segments) segment.free();
+}
+answer(levels);
+"""
+
+
+def test_every_level_shows_the_bits_of_the_c_library_at_and_between_frames(any_ath, tmp_path):
+    native = Native(any_ath.read_bytes())
+    times = times_between(native.info.frame_count)
+    wanted = []
+    for level in range(native.info.level_count):
+        segments = native.prepare(level)
+        (nodes, exact), all_frames = native.cut(level), range(native.info.frame_count)
+        wanted.append({
+            "frames": digest(*(native.positions(segments, t) for t in all_frames)),
+            "wide": digest(*(native.positions(segments, t, dtype=np.float64) for t in all_frames)),
+            "between": [digest(
+                native.positions(segments, t, order=0),
+                native.show("ath_matrices", (nodes, 12), np.float32, segments, t),
+                native.show("ath_exact", (exact, 3), np.float32, segments, t),
+                native.show("ath_matrices_wide", (nodes, 12), np.float64, segments, t)) for t in times]})
+    assert run_node(tmp_path, SHOW, any_ath, json.dumps(times)) == wanted
+
+
+DESCRIBE = """
+const file = AthFile.open(read(path)), { info } = file, levels = [...Array(info.levelCount).keys()];
+const b = file.branches();
+const seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, NaN];
+answer({
+  info: [info.fileLength, info.preludeLength, info.maxError, info.origin, info.duration, info.vertexCount,
+         info.branchCount, info.frameCount, info.segmentCount, info.levelCount, info.fullLevelCount,
+         info.nodeCount, info.chunkCount, info.wide],
+  branches: digest(...each(info.branchCount, (i) => Int32Array.of(
+    b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i]))),
+  times: [...file.times()],
+  rest: [digest(file.rest()), digest(file.rest("file", { out: new Float64Array(3 * info.vertexCount) }))],
+  errors: levels.map((level) => [-1, info.segmentCount - 1].map((s) => file.levelError(level, s))),
+  frameAt: ["clamp", "loop", "pingpong"].map((wrap) => seconds.map((s) => file.frameAt(s, wrap))),
+  depthFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.depthFor(d, 0.8, 1080, 1)),
+});
+"""
+
+
+def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
+    native = Native(any_ath.read_bytes())
+    lib, file, info = native.lib, native.file, native.info
+    rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))
+    lib.ath_rest(file, 1, c_void_p(rest.ctypes.data), c_size_t(12))
+    lib.ath_rest_wide(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
+    seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
+    wanted = {
+        "info": [info.file_length, info.prelude_length, info.max_error, list(info.origin), info.duration,
+                 info.vertex_count, info.branch_count, info.frame_count, info.segment_count, info.level_count,
+                 info.full_level_count, info.node_count, info.chunk_count, bool(info.wide)],
+        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 32 * info.branch_count))),
+        "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
+        "rest": [digest(rest), digest(wide)],
+        "errors": [[native.level_error(level, segment) for segment in (-1, info.segment_count - 1)]
+                   for level in range(info.level_count)],
+        "frameAt": [[lib.ath_frame_at(file, c_double(s), wrap) for s in seconds] for wrap in range(3)],
+        "depthFor": [lib.ath_depth_for(file, -1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
+                     for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
+    assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
+
+
+STEPS = """
+const file = AthFile.open(read(path)), deepest = file.info.levelCount - 1;
+const whole = frames(file, prepareAll(file, deepest));
+const waiting = Array.from({ length: file.info.segmentCount }, (_, i) => file.preparation(i, deepest));
+waiting.push(file.preparation(0, 0));
+waiting.pop().cancel();
+let rounds = 0;
+while (waiting.map((preparation) => preparation.step(3)).includes(false)) rounds++;
+answer({ whole, steps: frames(file, waiting.map(({ segment }) => segment)), rounds });
+"""
+
+
+def test_segments_prepared_side_by_side_in_steps_show_the_same_bits(sample_ath, tmp_path):
+    result = run_node(tmp_path, STEPS, sample_ath)
+    assert result["steps"] == result["whole"] and result["rounds"] > 10
+
+
+# ---- bytes that arrive ----
+
+STREAM = """
+const bytes = read(path), whole = AthFile.open(bytes);
+const wanted = each(whole.info.levelCount, (level) => frames(whole, prepareAll(whole, level)));
+let file = null, fed = 0, asked = 0, played = 0;
+const wrong = [];
+for (let end = 10; fed < bytes.length; end = Math.min(end + 701, bytes.length)) {
+  if (file) {
+    file.feed(bytes.subarray(fed, end), fed);
+  } else {
+    const front = AthFile.front(bytes.subarray(0, end));
+    const error = thrown(() => { file = AthFile.open(bytes.subarray(0, end)); });
+    if (front.ready !== (error === null)) wrong.push(["ready", end]);
+    const helpful = error?.codeName === "MISSING" && error.needed > end && error.needed === front.needed;
+    if (error && !helpful) wrong.push(error);
+    if (error) asked = Math.max(asked, error.needed);
+  }
+  fed = end;
+  const ready = file ? Math.min(...each(file.info.segmentCount, (segment) => file.readyLevel(segment))) : -1;
+  if (ready < played) continue;
+  if (frames(file, prepareAll(file, ready)) !== wanted[ready]) wrong.push(["frames", end, ready]);
+  played = ready + 1;
+}
+answer({ wrong, played, levels: wanted.length, asked, prelude: file.info.preludeLength });
+"""
+
+
+def test_a_file_that_arrives_in_pieces_plays_each_level_as_soon_as_it_is_there(sample_ath, tmp_path):
+    result = run_node(tmp_path, STREAM, sample_ath)
+    assert result["wrong"] == []
+    assert result["played"] == result["levels"] > 2
+    assert result["asked"] == result["prelude"]
+
+
+PIECES = """
+const bytes = read(path), whole = AthFile.open(bytes);
+const last = whole.info.segmentCount - 1, deepest = whole.info.levelCount - 1;
+const middle = whole.segmentStart(last) + 1;
+const file = AthFile.open(bytes.subarray(0, whole.info.preludeLength));
+const feed = (ranges) => {
+  for (const { offset, size } of ranges) file.feed(bytes.subarray(offset, offset + size), offset);
+};
+const shown = (of, level) => digest(of.positions([of.prepare(last, level)], middle));
+const result = { before: thrown(() => file.prepare(last, 1)), none: file.readyLevel(last) };
+const wanted = file.ranges(1, last, last);
+feed([...wanted].reverse());
+Object.assign(result, {
+  left: file.ranges(1, last, last), all: same(file.ranges(1, last, last, true), wanted),
+  ready: file.readyLevel(last), others: file.readyLevel(0), same: shown(file, 1) === shown(whole, 1),
+  deeper: thrown(() => file.prepare(last, deepest)), elsewhere: file.positions([file.prepare(last, 1)], 0),
+});
+feed(file.ranges(deepest).reverse());
+result.deepest = shown(file, deepest) === shown(whole, deepest);
+const preparation = file.preparation(0, deepest);
+result.busy = thrown(() => file.drop(0, bytes.length));
+preparation.cancel();
+file.drop(0, bytes.length);
+result.dropped = [file.readyLevel(last), same(file.ranges(1, last, last), wanted)];
+answer(result);
+"""
+
+
+def test_ranges_fed_in_any_order_are_enough_and_dropped_ones_are_missing(sample_ath, tmp_path):
+    result = run_node(tmp_path, PIECES, sample_ath)
+    assert result["before"]["codeName"] == result["deeper"]["codeName"] == "MISSING"
+    assert (result["none"], result["ready"], result["others"]) == (-1, 1, -1)
+    assert result["left"] == [] and result["all"] and result["same"] and result["deepest"]
+    assert result["elsewhere"] is None
+    assert "segment 0" in result["busy"]["message"]
+    assert result["dropped"] == [-1, True]
+
+
+MEMORY = """
+let pages = 0;
+const grow = WebAssembly.Memory.prototype.grow;
+WebAssembly.Memory.prototype.grow = function (more) { pages += more; return grow.call(this, more); };
+const bytes = read(path), file = AthFile.open(bytes), deepest = file.info.levelCount - 1, after = [];
+for (let round = 0; round < 12; round++) {
+  for (const segment of prepareAll(file, round % 2 ? deepest : 1)) segment.free();
+  file.preparation(0, deepest).cancel();
+  file.drop(0, bytes.length);
+  file.feed(bytes, 0);
+  after.push(pages);
+}
+answer(after);
+"""
+
+
+def test_freed_segments_and_dropped_bytes_leave_room_for_the_next(sample_ath, tmp_path):
+    after = run_node(tmp_path, MEMORY, sample_ath)
+    assert after[0] > 0 and set(after[2:]) == {after[-1]}
+
+
+# ---- what is wrong ----
+
+DAMAGE = """
+const bytes = read(path), good = read(option), file = AthFile.open(bytes), deepest = file.info.levelCount - 1;
+const error = thrown(() => prepareAll(file, deepest));
+const { offset, length } = file.chunks()[error.chunk];
+const read_back = thrown(() => file.chunkBytes(error.chunk));
+file.drop(offset, length);
+file.feed(good, 0);
+const undamaged = AthFile.open(good);
+answer({ error, read_back, offset, length, chunk: digest(file.chunkBytes(error.chunk)),
+         repaired: frames(file, prepareAll(file, deepest)),
+         undamaged: frames(undamaged, prepareAll(undamaged, deepest)) });
+"""
+
+
+def test_a_damaged_chunk_is_named_and_can_be_fed_anew(sample_ath, tmp_path):
+    data = sample_ath.read_bytes()
+    at = len(data) * 2 // 3
+    result = run_node(tmp_path, DAMAGE, damaged(sample_ath, tmp_path, at), sample_ath)
+    first, length = result["offset"], result["length"]
+    assert first <= at < first + length
+    for error in (result["error"], result["read_back"]):
+        assert (error["type"], error["codeName"], error["code"]) == ("AthError", "BAD_CHECKSUM", 5)
+    assert result["chunk"] == hashlib.sha256(data[first: first + length]).hexdigest()
+    assert result["repaired"] == result["undamaged"]
+
+
+OPEN = "answer(thrown(() => AthFile.open(read(path))));"
+
+
+@pytest.mark.parametrize("at, name, in_chunk", [
+    (0, "NOT_AN_ATH_FILE", False), (8, "UNSUPPORTED_VERSION", False), (70, "BAD_CHECKSUM", False),
+    (-1, "BAD_CHECKSUM", True)])
+def test_a_file_that_cannot_be_opened_is_an_error_with_a_code(sample_ath, tmp_path, at, name, in_chunk):
+    """at: the byte that is damaged; -1: one of the hierarchy."""
+    at = first_chunk(sample_ath.read_bytes()) + 20 if at < 0 else at
+    error = run_node(tmp_path, OPEN, damaged(sample_ath, tmp_path, at))
+    assert error["type"] == "AthError" and error["codeName"] == name and (error["chunk"] >= 0) == in_chunk
+
+
+MISUSE = """
+const file = AthFile.open(read(path)), { levelCount, segmentCount } = file.info;
+const foreign = AthFile.open(read(path)).prepare(0, 0);
+const segment = file.prepare(0, 0), freed = file.prepare(0, 1);
+freed.free();
+freed.free();
+const calls = [
+  () => file.prepare(0, levelCount), () => file.prepare(segmentCount, 0), () => file.prepare(0.5, 0),
+  () => file.levelError(-1), () => file.ranges(0, 0, segmentCount), () => file.positions([foreign], 0),
+  () => file.positions([segment], 0, { out: new Float32Array(3) }),
+  () => file.matrices([segment], 0, { out: new Float32Array(11) }),
+  () => file.exact([segment], 0, { out: new Int8Array(99999) }),
+  () => file.positions([segment], 0, { order: "random" }), () => file.frameAt(0, "twice"),
+  () => file.feed([1, 2, 3], 0), () => file.chunkBytes(-1), () => file.segmentOf(file.info.frameCount),
+];
+const result = {
+  errors: calls.map((call) => thrown(call)?.type ?? String(call)), freed: file.positions([freed, null], 0),
+  held: [0.25, file.segmentStart(1) - 0.25].map((t) => [file.positions([segment], t) !== null, file.held]),
+};
+file.dispose();
+result.disposed = thrown(() => file.times()).message;
+segment.free();
+answer(result);
+"""
+
+
+def test_arguments_out_of_range_are_refused_before_they_reach_the_memory(sample_ath, tmp_path):
+    result = run_node(tmp_path, MISUSE, sample_ath)
+    assert set(result["errors"]) == {"RangeError", "TypeError"}
+    assert result["freed"] is None
+    assert result["held"] == [[True, False], [True, True]]
+    assert "dispose" in result["disposed"]
+
+
+# ---- the module ----
+
+
+def test_the_module_is_small_imports_nothing_and_fetches_nothing():
+    text = MODULE.read_text("utf-8")
+    assert len(text.encode()) <= MOST_BYTES
+    assert not re.search(r"\bimport\b|\bfetch\b|\brequire\b", re.sub(r'const WASM = "[^"]*"|//.*', "", text))
+
+
+MEMBERS = """
+const file = AthFile.open(read(path)), segment = file.prepare(0, 0), preparation = file.preparation(0, 0);
+const of = (value) => [value, Object.getPrototypeOf(value)].flatMap((one) => Object.getOwnPropertyNames(one))
+  .filter((name) => name !== "constructor").sort();
+answer({ AthFile: [...of(file), "front", "open"].sort(), Segment: of(segment), Preparation: of(preparation),
+         AthInfo: Object.keys(file.info).sort(), Branches: Object.keys(file.branches()).sort(),
+         Parts: Object.keys(file.parts(0)).sort(), Chunk: Object.keys(file.chunks()[0]).sort(),
+         ByteRange: Object.keys(file.ranges(0, 0, 0, true)[0]).sort() });
+"""
+
+
+def test_every_member_is_declared_for_typescript_and_no_others(sample_ath, tmp_path):
+    text = (VIEWER / "ath_decoder.d.ts").read_text("utf-8")
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    declared = {}
+    for name, body in re.findall(r"(?:class|interface) (\w+)[^{]*\{\n(.*?)\n\}", code, flags=re.S):
+        members = re.findall(r"^  (?:(?:readonly|static) )*(\w+)(?:<[^(]*>)?[(:?]", body, flags=re.M)
+        declared[name] = sorted(set(members) - {"private", "constructor"})
+    del declared["AthError"]
+    assert run_node(tmp_path, MEMBERS, sample_ath) == declared
+
+
+def check_build(viewer: Path) -> subprocess.CompletedProcess:
+    command = [sys.executable, str(viewer / "build_decoder.py"), "--check"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_the_module_is_what_the_sources_make():
+    done = check_build(VIEWER)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_module_that_the_sources_do_not_make_is_noticed(tmp_path):
+    copy = tmp_path / "athcodec"
+    for name in ("core", "viewer"):
+        shutil.copytree(VIEWER.parent / name, copy / name)
+    source = copy / "core" / "play.c"
+    source.write_text(source.read_text("utf-8").replace('"INVALID"', '"DAMAGED"'), "utf-8")
+    done = check_build(copy / "viewer")
+    assert done.returncode == 1 and "WebAssembly" in done.stderr and "build_decoder.py" in done.stderr
