@@ -12,9 +12,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench import levels, memory, picture, report, sizes, speed
+from bench import decode, levels, memory, picture, report, sizes, speed
 
-VERBS = {"sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "picture": picture}
+VERBS = {"sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
+         "picture": picture}
 
 
 def main(argv: Sequence[str]) -> int:

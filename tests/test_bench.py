@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import athcodec
+from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 
 KINDS = {*KIND_NAMES.values(), "HEADER"}
+MEMORY_PARTS = ("file", "opened", "bases", "work", "segments")
 ROOT = Path(__file__).resolve().parent.parent
 
 def run_bench(tmp_path, *words):
@@ -72,3 +75,21 @@ def test_the_picture_has_a_panel_for_every_level(tmp_path):
     with athcodec.read_hdf5(athcodec.sample_path()) as clip:
         levels = athcodec.build_ath(clip, max_error=1e-4 * 10.657).height + 2
     assert [caption.split()[1] for caption in captions[::2]] == [str(level) for level in range(levels)]
+
+
+def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_less(tmp_path, sample_ath):
+    quick = ("--rounds", "1", "--seeks", "2", "--instances", "3")
+    text, result = run_bench(tmp_path, "decode", str(sample_ath), *quick)
+    asked, whole, levels, memory, instances = tables_of(result)
+    with athcodec.open(sample_ath) as decoder:
+        crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
+        assert [row["level"] for row in levels] == [depth.depth for depth in decoder.depths]
+    assert levels[-1]["CRC-32C"] == f"{crc:08x}" and result["broken"] == []
+    assert len({row["CRC-32C"] for row in levels}) == len(levels)
+    size = sample_ath.stat().st_size
+    assert 0 < levels[0]["bytes"] < levels[1]["bytes"] < levels[-1]["bytes"] <= size == memory[0]["file"]
+    assert memory[0]["sum"] < memory[-1]["sum"] == sum(memory[-1][part] for part in MEMORY_PARTS)
+    assert [row["level"] for row in instances] == ["0", "1", "2", "3", "even mix"]
+    assert cells_of(text, "Decoding")["asked"] == "<= 100"
+    assert {"athcodec", "HDF5 gzip 4"} <= {row["reader"] for row in whole}
+    assert all(row["error/bound"] <= 1 for row in whole if "ms" in row)

@@ -1,0 +1,436 @@
+/* Times the decoder for decode.py, which says what is measured and why. One thread, no Python in any loop.
+ * Prints one JSON object. Hosted C11 over ath.h alone. Judges nothing.
+ *
+ *     decode FILE.ath once                        one whole decode, the second of this process
+ *     decode FILE.ath all ROUNDS SEEKS INSTANCES  the rest: medians over ROUNDS, and one round before them */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "ath.h"
+
+enum { LEVELS = 32, TICKS = 30, RING_BYTES = 64 << 20 };
+
+static const double BETWEEN = 0.37; /* of the way to the next frame: what is shown is a blend */
+
+typedef struct {
+    uint8_t *bytes;
+    size_t size, open_bytes, build_bytes, work_bytes;
+    ath_file *file;
+    ath_info info;
+    void *work;
+    double open_ms, build_ms;
+} opened;
+
+typedef struct {
+    ath_segment **segments;
+    float *matrices, *exact;
+    size_t matrix_floats, shown_floats; /* matrices; these and exact vertices */
+    double *prepare_ms, *frames_ms, *positions_us, *matrices_us; /* one per round */
+    uint32_t crc;
+} level_run;
+
+/* ---- helpers ---- */
+
+static double now_ms(void)
+{
+    struct timespec time;
+    timespec_get(&time, TIME_UTC);
+    return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
+}
+
+static void *memory_of(size_t size)
+{
+    void *memory = aligned_alloc(64, (size + 64) & ~(size_t)63);
+    if (!memory) {
+        fprintf(stderr, "memory: got none, expected %zu bytes\n", size);
+        exit(1);
+    }
+    return memory;
+}
+
+static double *figures(int count) { return (double *)memory_of((size_t)count * sizeof(double)); }
+
+static void expect_ok(const char *what, int result)
+{
+    if (result == ATH_OK) return;
+    fprintf(stderr, "%s: got %s, expected OK\n", what, ath_result_name(result));
+    exit(1);
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The value below which `share` of them lie; sorts them. */
+static double quantile(double *values, int count, double share)
+{
+    qsort(values, (size_t)count, sizeof *values, ascending);
+    int at = (int)ceil(share * count) - 1;
+    return values[at < 0 ? 0 : at];
+}
+
+static double median(double *values, int count) { return quantile(values, count, 0.5); }
+
+/* One name and number of a JSON object, behind what opens it or separates them. */
+static void put(const char *before, const char *name, double number)
+{
+    printf("%s\"%s\": %.15g", before, name, number);
+}
+
+/* ---- opening ---- */
+
+static void read_file(const char *path, opened *clip)
+{
+    FILE *stream = fopen(path, "rb");
+    long size = -1;
+    if (stream && fseek(stream, 0, SEEK_END) == 0) size = ftell(stream);
+    if (size >= 0) {
+        clip->size = (size_t)size;
+        clip->bytes = (uint8_t *)memory_of(clip->size);
+        rewind(stream);
+    }
+    if (size < 0 || fread(clip->bytes, 1, clip->size, stream) != clip->size) {
+        fprintf(stderr, "%s: cannot be read\n", path);
+        exit(1);
+    }
+    fclose(stream);
+}
+
+/* Opens the bytes in memory of its own, as a player does once per file. */
+static void open_and_build(opened *clip)
+{
+    size_t front;
+    double start = now_ms();
+    expect_ok("ath_front", ath_front(clip->bytes, clip->size, 0, &front, &clip->open_bytes));
+    clip->file = (ath_file *)memory_of(clip->open_bytes);
+    expect_ok("ath_open", ath_open(clip->file, clip->open_bytes, clip->bytes, clip->size, 0));
+    double middle = now_ms();
+    clip->build_bytes = ath_build_size(clip->file);
+    expect_ok("ath_build", ath_build(clip->file, memory_of(clip->build_bytes), clip->build_bytes));
+    clip->build_ms = now_ms() - middle;
+    clip->open_ms = middle - start;
+    ath_get_info(clip->file, &clip->info);
+    clip->work_bytes = ath_work_size(clip->file);
+    clip->work = memory_of(clip->work_bytes);
+}
+
+static void time_opening(opened *clip, int rounds, double *open_ms, double *build_ms)
+{
+    double *opens = figures(rounds), *builds = figures(rounds);
+    for (int round = 0; round < rounds; round++) {
+        opened again = *clip;
+        open_and_build(&again);
+        opens[round] = again.open_ms;
+        builds[round] = again.build_ms;
+    }
+    *open_ms = median(opens, rounds);
+    *build_ms = median(builds, rounds);
+}
+
+/* ---- decoding ---- */
+
+static void prepare(const opened *clip, int32_t segment, int32_t level, ath_segment *memory)
+{
+    size_t size = ath_segment_size(clip->file, level);
+    int result = ath_prepare(clip->work, clip->work_bytes, clip->file, segment, level, memory, size);
+    expect_ok("ath_prepare", result);
+}
+
+static void write_frame(const opened *clip, ath_segment *const *segments, int32_t count, double frame,
+                        ath_order order, float *xyz)
+{
+    const ath_segment *const *given = (const ath_segment *const *)segments;
+    expect_ok("ath_positions", ath_positions(clip->file, given, count, frame, order, xyz, 3 * sizeof(float)));
+}
+
+static void write_matrices(const opened *clip, ath_segment *const *segments, double frame, float *matrices,
+                           float *exact)
+{
+    const ath_segment *const *given = (const ath_segment *const *)segments;
+    int32_t count = clip->info.segment_count;
+    expect_ok("ath_matrices", ath_matrices(clip->file, given, count, frame, matrices, 12 * sizeof(float)));
+    expect_ok("ath_exact", ath_exact(clip->file, given, count, frame, exact, 3 * sizeof(float)));
+}
+
+static size_t frame_floats(const opened *clip) { return 3 * (size_t)clip->info.vertex_count; }
+
+/* All frames in the source's order, segment by segment in one segment's memory. */
+static void decode_all(const opened *clip, ath_segment *segment, float *out)
+{
+    for (int32_t s = 0; s < clip->info.segment_count; s++) {
+        int32_t stop = ath_segment_start(clip->file, s + 1);
+        prepare(clip, s, clip->info.level_count - 1, segment);
+        for (int32_t t = ath_segment_start(clip->file, s); t < stop; t++)
+            write_frame(clip, &segment, 1, (double)t, ATH_SOURCE_ORDER, out + (size_t)t * frame_floats(clip));
+    }
+}
+
+static uint32_t crc_of(const opened *clip, const float *frames)
+{
+    size_t bytes = (size_t)clip->info.frame_count * frame_floats(clip) * sizeof(float);
+    return ath_crc32c(0, (const uint8_t *)frames, bytes);
+}
+
+/* The result's memory has been written before. */
+static void once(opened *clip)
+{
+    size_t bytes = (size_t)clip->info.frame_count * frame_floats(clip) * sizeof(float);
+    ath_segment *segment = (ath_segment *)memory_of(ath_segment_size(clip->file, clip->info.level_count - 1));
+    float *out = (float *)memory_of(bytes);
+    decode_all(clip, segment, out);
+    double start = now_ms();
+    open_and_build(clip);
+    double middle = now_ms();
+    decode_all(clip, segment, out);
+    double stop = now_ms();
+    put("{", "decode_ms", stop - middle);
+    put(", ", "opening_ms", middle - start);
+    printf("}\n");
+}
+
+/* ---- levels ---- */
+
+static void ready_level(const opened *clip, int32_t level, int rounds, level_run *run)
+{
+    int32_t nodes, vertices, count = clip->info.segment_count;
+    ath_cut_size(clip->file, level, 0, &nodes, &vertices);
+    run->segments = (ath_segment **)memory_of((size_t)count * sizeof *run->segments);
+    for (int32_t s = 0; s < count; s++)
+        run->segments[s] = (ath_segment *)memory_of(ath_segment_size(clip->file, level));
+    run->matrix_floats = 12 * (size_t)nodes;
+    run->shown_floats = run->matrix_floats + 3 * (size_t)vertices;
+    run->matrices = (float *)memory_of(run->shown_floats * sizeof(float));
+    run->exact = run->matrices + run->matrix_floats;
+    run->prepare_ms = figures(rounds + 1);
+    run->frames_ms = figures(rounds + 1);
+    run->positions_us = figures(rounds + 1);
+    run->matrices_us = figures(rounds + 1);
+}
+
+static void measure_level(const opened *clip, int32_t level, int round, level_run *run, float *xyz)
+{
+    int32_t segments = clip->info.segment_count, frames = clip->info.frame_count;
+    double start = now_ms();
+    for (int32_t s = 0; s < segments; s++) prepare(clip, s, level, run->segments[s]);
+    double prepared = now_ms();
+    for (int32_t t = 0; t < frames; t++)
+        write_frame(clip, run->segments, segments, t, ATH_SOURCE_ORDER, xyz + (size_t)t * frame_floats(clip));
+    double written = now_ms();
+    if (round == 0) run->crc = crc_of(clip, xyz);
+    double playing = now_ms();
+    for (int32_t t = 0; t < frames; t++)
+        write_frame(clip, run->segments, segments, t + BETWEEN, ATH_FILE_ORDER, xyz);
+    double played = now_ms();
+    for (int32_t t = 0; t < frames; t++)
+        write_matrices(clip, run->segments, t + BETWEEN, run->matrices, run->exact);
+    double skinned = now_ms();
+    run->prepare_ms[round] = prepared - start;
+    run->frames_ms[round] = written - prepared;
+    run->positions_us[round] = (played - playing) * 1e3 / frames;
+    run->matrices_us[round] = (skinned - played) * 1e3 / frames;
+}
+
+/* What a reader fetches to show a level of the whole clip. */
+static uint64_t level_bytes(const opened *clip, int32_t level)
+{
+    const ath_file *file = clip->file;
+    int32_t last = clip->info.segment_count - 1, count = ath_ranges(file, level, 0, last, 1, 0, 0);
+    ath_range *ranges = (ath_range *)memory_of((size_t)count * sizeof *ranges);
+    uint64_t bytes = clip->info.prelude_length;
+    ath_ranges(file, level, 0, last, 1, ranges, count);
+    for (int32_t i = 0; i < count; i++) bytes += ranges[i].size;
+    free(ranges);
+    return bytes;
+}
+
+static void print_level(const opened *clip, int32_t level, int rounds, const level_run *run)
+{
+    int32_t nodes, vertices;
+    ath_cut_size(clip->file, level, 0, &nodes, &vertices);
+    put(level ? ",\n  {" : "\n  {", "level", level);
+    put(", ", "nodes", nodes);
+    put(", ", "exact_vertices", vertices);
+    put(", ", "bytes", (double)level_bytes(clip, level));
+    put(", ", "segment_bytes", (double)ath_segment_size(clip->file, level));
+    put(",\n   ", "prepare_ms", median(run->prepare_ms + 1, rounds));
+    put(", ", "frames_ms", median(run->frames_ms + 1, rounds));
+    put(", ", "positions_us", median(run->positions_us + 1, rounds));
+    put(", ", "matrices_us", median(run->matrices_us + 1, rounds));
+    put(", ", "crc", run->crc);
+    printf("}");
+}
+
+static void measure_levels(const opened *clip, int rounds, level_run *runs)
+{
+    int32_t levels = clip->info.level_count;
+    float *xyz = (float *)memory_of((size_t)clip->info.frame_count * frame_floats(clip) * sizeof(float));
+    for (int32_t level = 0; level < levels; level++) ready_level(clip, level, rounds, runs + level);
+    for (int round = 0; round <= rounds; round++)
+        for (int32_t level = 0; level < levels; level++) measure_level(clip, level, round, runs + level, xyz);
+    printf(",\n \"levels\": [");
+    for (int32_t level = 0; level < levels; level++) print_level(clip, level, rounds, runs + level);
+    printf("]");
+    free(xyz);
+}
+
+/* ---- seeking ---- */
+
+/* The same frames in every run and on every machine. */
+static int32_t random_frame(uint64_t *state, int32_t frames)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (int32_t)((*state >> 33) % (uint64_t)frames);
+}
+
+static void measure_seeks(const opened *clip, int seeks)
+{
+    int32_t deepest = clip->info.level_count - 1;
+    ath_segment *segment = (ath_segment *)memory_of(ath_segment_size(clip->file, deepest));
+    float *xyz = (float *)memory_of(frame_floats(clip) * sizeof(float));
+    double *whole = figures(seeks), *preparing = figures(seeks);
+    uint64_t state = 1;
+    for (int i = 0; i < seeks; i++) {
+        int32_t frame = random_frame(&state, clip->info.frame_count);
+        double start = now_ms();
+        prepare(clip, ath_segment_of(clip->file, frame), deepest, segment);
+        preparing[i] = now_ms() - start;
+        write_frame(clip, &segment, 1, (double)frame, ATH_SOURCE_ORDER, xyz);
+        whole[i] = now_ms() - start;
+    }
+    put(",\n \"seeks\": {", "median_ms", quantile(whole, seeks, 0.5));
+    put(", ", "p99_ms", quantile(whole, seeks, 0.99));
+    put(", ", "prepare_ms", quantile(preparing, seeks, 0.5));
+    printf("}");
+}
+
+/* ---- instances ---- */
+
+typedef struct {
+    const opened *clip;
+    const level_run *runs;
+    const int32_t *levels; /* of instance i: levels[i % level_count] */
+    int level_count, count;
+    float *ring;           /* where what is shown goes, one instance behind the other */
+    size_t ring_floats;
+} crowd;
+
+/* Where an instance is in the loop when all start, as a part of it. */
+static double offset_of(int instance)
+{
+    double turns = 0.6180339887498949 * instance;
+    return turns - floor(turns);
+}
+
+/* One second at TICKS pictures a second. */
+static double show_crowd(const crowd *crowd)
+{
+    double start = now_ms(), loop = crowd->clip->info.duration;
+    size_t at = 0;
+    for (int tick = 0; tick < TICKS; tick++)
+        for (int i = 0; i < crowd->count; i++) {
+            const level_run *run = crowd->runs + crowd->levels[i % crowd->level_count];
+            float *out;
+            double seconds = (double)tick / TICKS + loop * offset_of(i);
+            double frame = ath_frame_at(crowd->clip->file, seconds, ATH_LOOP);
+            if (at + run->shown_floats > crowd->ring_floats) at = 0;
+            out = crowd->ring + at;
+            write_matrices(crowd->clip, run->segments, frame, out, out + run->matrix_floats);
+            at += run->shown_floats;
+        }
+    return now_ms() - start;
+}
+
+static void measure_crowd(const crowd *crowd, int rounds)
+{
+    double *runs = figures(rounds + 1);
+    for (int round = 0; round <= rounds; round++) runs[round] = show_crowd(crowd);
+    int32_t level = crowd->level_count > 1 ? -1 : crowd->levels[0];
+    double ms = median(runs + 1, rounds);
+    put("{", "level", level);
+    put(", ", "instances", crowd->count);
+    put(", ", "pictures", TICKS);
+    put(", ", "ms", ms);
+    put(", ", "per_ms", (double)crowd->count * TICKS / ms);
+    printf("}");
+}
+
+/* Levels 0, 1 and 2 and the deepest, and all of them in turn (level -1). */
+static void measure_instances(const opened *clip, int rounds, int instances, const level_run *runs)
+{
+    int32_t levels[4], count = 0, deepest = clip->info.level_count - 1;
+    size_t largest = 0, most = (size_t)RING_BYTES / sizeof(float);
+    for (int32_t level = 0; level < deepest && level < 3; level++) levels[count++] = level;
+    levels[count++] = deepest;
+    for (int32_t i = 0; i < count; i++)
+        if (runs[levels[i]].shown_floats > largest) largest = runs[levels[i]].shown_floats;
+    crowd crowd = {clip, runs, levels, 1, instances, 0, largest > most ? largest : most};
+    crowd.ring = (float *)memory_of(crowd.ring_floats * sizeof(float));
+    printf(",\n \"instances\": [");
+    for (int32_t i = 0; i < count; i++, crowd.levels++) {
+        measure_crowd(&crowd, rounds);
+        printf(",\n  ");
+    }
+    crowd.levels = levels;
+    crowd.level_count = count;
+    measure_crowd(&crowd, rounds);
+    printf("]");
+}
+
+/* ---- everything ---- */
+
+static int32_t longest_segment(const ath_file *file, int32_t segments)
+{
+    int32_t longest = 0;
+    for (int32_t s = 0; s < segments; s++) {
+        int32_t frames = ath_segment_start(file, s + 1) - ath_segment_start(file, s);
+        if (frames > longest) longest = frames;
+    }
+    return longest;
+}
+
+static void print_facts(const opened *clip)
+{
+    put("{", "vertices", clip->info.vertex_count);
+    put(", ", "frames", clip->info.frame_count);
+    put(", ", "segments", clip->info.segment_count);
+    put(", ", "longest_segment", longest_segment(clip->file, clip->info.segment_count));
+    put(",\n ", "file_bytes", (double)clip->size);
+    put(", ", "opened_bytes", (double)clip->open_bytes);
+    put(", ", "bases_bytes", (double)clip->build_bytes);
+    put(", ", "work_bytes", (double)clip->work_bytes);
+}
+
+static void all(opened *clip, int rounds, int seeks, int instances)
+{
+    level_run runs[LEVELS];
+    double open_ms, build_ms;
+    print_facts(clip);
+    time_opening(clip, rounds, &open_ms, &build_ms);
+    put(",\n ", "open_ms", open_ms);
+    put(", ", "build_ms", build_ms);
+    measure_levels(clip, rounds, runs);
+    measure_seeks(clip, seeks);
+    measure_instances(clip, rounds, instances, runs);
+    printf("}\n");
+}
+
+int main(int argc, char **argv)
+{
+    opened clip;
+    if (argc < 3 || (strcmp(argv[2], "once") != 0 && (strcmp(argv[2], "all") != 0 || argc != 6))) {
+        fprintf(stderr, "usage: decode FILE.ath once | all ROUNDS SEEKS INSTANCES\n");
+        return 2;
+    }
+    read_file(argv[1], &clip);
+    open_and_build(&clip);
+    if (strcmp(argv[2], "once") == 0)
+        once(&clip);
+    else
+        all(&clip, atoi(argv[3]), atoi(argv[4]), atoi(argv[5]));
+    return 0;
+}
