@@ -38,20 +38,20 @@ except ImportError:
     pysz = None
 
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
-TABLES = ("asked", "whole", "levels", "memory", "instances")
+TABLES = ("target", "whole", "levels", "memory", "instances")
 GZIP_CHUNK = 1 << 20
 SZ3_LAYOUTS = {"T,N,3": (0, 1, 2), "N,T,3": (1, 0, 2), "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0),
                "T,3N": (0, 1, 2), "3N,T": (1, 2, 0)}
 SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 
-ASKED_NOTE = """
-Asked: for tree_8k at a bound of 1e-4; printed for every clip. Whole decoding: every segment prepared at the
+TARGET_NOTE = """
+Targets: for tree_8k at a bound of 1e-4; printed for every clip. Whole decoding: every segment prepared at the
 deepest level, entropy decoding included, and every frame written as float32 in the source's order; the file
 is open. Playing with decoding: a segment's preparation spread over
 its frames, and showing each between two frames. Prepared: showing alone. Vertices: ath_positions, all of
 them, in the file's order; matrices: ath_matrices and ath_exact, what a renderer needs. Bytes of level 1:
 prelude and what ath_ranges names. Seek: a random frame, its segment prepared from nothing and the frame
-written; asked is that this costs one segment's preparation, whose mean is given. Memory over positions: all
+written; the target is that this costs one segment's preparation, whose mean is given. Memory over positions: all
 that playing takes (table Memory) over one segment's float32 positions.
 """
 
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             case = _Case(path, folder, args.rel_error, program)
             whole = _whole(case, folder, args.rounds)
             figures = case.program("all", args.rounds, args.seeks, args.instances)
-            rows = {"asked": _asked_rows(figures, whole), "whole": whole, "levels": _level_rows(figures),
+            rows = {"target": _target_rows(figures, whole), "whole": whole, "levels": _level_rows(figures),
                     "memory": _memory_rows(figures), "instances": _instance_rows(figures)}
             for key, added in rows.items():
                 tables[key] += [{"clip": path.stem} | row for row in added]
@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     setups = {"layouts": len(SZ3_LAYOUTS), "algorithms": len(SZ3_ALGORITHMS)}
     whole_note = WHOLE_NOTE.format(rounds=args.rounds, **setups)
     return {"tables": [
-        table(f"Decoding, bound {args.rel_error:g}, beside what was asked", tables["asked"], ASKED_NOTE),
+        table(f"Decoding, bound {args.rel_error:g}, beside the targets", tables["target"], TARGET_NOTE),
         table("Whole decoding, medians in ms", tables["whole"], whole_note),
         table("Levels, medians", tables["levels"], LEVELS_NOTE),
         table("Memory", tables["memory"], MEMORY_NOTE),
@@ -285,7 +285,7 @@ class _Sz3:
 # ---- tables ----
 
 
-def _asked_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _target_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[dict[str, Any]]:
     levels = _level_rows(figures)
     deep, coarse = levels[-1], levels[min(1, len(levels) - 1)]
     decode, seeks = whole[0], figures["seeks"]
@@ -314,7 +314,7 @@ def _asked_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[di
         ("memory over positions, one segment", one["over positions"], "times", "<= 2"),
         ("memory over positions, two segments", two["over positions"], "times", None),
     ]
-    return [dict(zip(("what", "figure", "unit", "asked"), row, strict=True)) for row in rows]
+    return [dict(zip(("what", "figure", "unit", "target"), row, strict=True)) for row in rows]
 
 
 def _level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:

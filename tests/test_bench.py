@@ -80,7 +80,7 @@ def test_the_picture_has_a_panel_for_every_level(tmp_path):
 def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_less(tmp_path, sample_ath):
     quick = ("--rounds", "1", "--seeks", "2", "--instances", "3")
     text, result = run_bench(tmp_path, "decode", str(sample_ath), *quick)
-    asked, whole, levels, memory, instances = tables_of(result)
+    targets, whole, levels, memory, instances = tables_of(result)
     with athcodec.open(sample_ath) as decoder:
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
         assert [row["level"] for row in levels] == [depth.depth for depth in decoder.depths]
@@ -90,6 +90,6 @@ def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_
     assert 0 < levels[0]["bytes"] < levels[1]["bytes"] < levels[-1]["bytes"] <= size == memory[0]["file"]
     assert memory[0]["sum"] < memory[-1]["sum"] == sum(memory[-1][part] for part in MEMORY_PARTS)
     assert [row["level"] for row in instances] == ["0", "1", "2", "3", "even mix"]
-    assert cells_of(text, "Decoding")["asked"] == "<= 100"
+    assert cells_of(text, "Decoding")["target"] == "<= 100"
     assert {"athcodec", "HDF5 gzip 4"} <= {row["reader"] for row in whole}
     assert all(row["error/bound"] <= 1 for row in whole if "ms" in row)

@@ -11,8 +11,8 @@
  * pointers into the bytes that it was fed: these stay where they are until they are fed anew or dropped.
  *
  * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time;
- * any number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop need the ath_file
- * to themselves.
+ * any number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop run alone among those
+ * that look at bytes: preparations and the functions on chunks and ranges; playing may go on.
  *
  * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need
  * no more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over
