@@ -103,7 +103,8 @@ static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t fram
             int32_t *own = row + axis * frames + k;
             uint32_t *near = last[axis];
             uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
-            *own = code_signed(coder, &model->number, ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16, *own);
+            uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
+            *own = code_signed(coder, &model->number, expected, *own);
             near[2] = near[1];
             near[1] = near[0];
             near[0] = clipped(*own);

@@ -40,7 +40,8 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, branches, branch_source, vertex_source);
+    int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, branches, branch_source,
+                               vertex_source);
     valid = valid && is_permutation(branch_count, branch_source) && is_permutation(vertex_count, vertex_source);
     valid = valid && ath_count_pieces(branches, branch_count, vertex_count) > 0;
     valid = valid && whole_are_nodes(branches, branch_count);

@@ -280,9 +280,11 @@ static uint64_t carve_build(ath_file *file, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    for (int32_t i = 0; i < 2; i++)
-        file->cosines[i] = i == 1 && file->frames[0] == file->frames[1] ? file->cosines[0]
-                           : (double *)ath_take(&arena, (uint64_t)file->frames[i] * (uint64_t)file->frames[i] * sizeof(double));
+    for (int32_t i = 0; i < 2; i++) {
+        uint64_t size = (uint64_t)file->frames[i] * (uint64_t)file->frames[i] * sizeof(double);
+        int same = i == 1 && file->frames[0] == file->frames[1];
+        file->cosines[i] = same ? file->cosines[0] : (double *)ath_take(&arena, size);
+    }
     return arena.used;
 }
 
@@ -351,17 +353,16 @@ void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t st
 void ath_level_error(const ath_file *file, int32_t level, int32_t segment, double *max_error, double *rms_error)
 {
     int32_t first = segment < 0 ? 0 : segment, last = segment < 0 ? file->info.segment_count - 1 : segment;
+    const float *errors = file->errors + 2 * (size_t)level * (size_t)file->info.segment_count;
     double largest = 0.0, squares = 0.0, frames = 0.0;
     for (int32_t s = first; s <= last; s++) {
-        const float *entry = file->errors + 2 * ((size_t)level * (size_t)file->info.segment_count + (size_t)s);
-        double count = (double)ath_file_frames(file, s);
-        if ((double)entry[0] > largest) largest = (double)entry[0];
-        squares = squares + (double)entry[1] * (double)entry[1] * count;
+        double max = (double)errors[2 * s], rms = (double)errors[2 * s + 1], count = (double)ath_file_frames(file, s);
+        if (max > largest) largest = max;
+        squares = squares + rms * rms * count;
         frames = frames + count;
     }
     if (max_error) *max_error = largest;
-    if (rms_error) *rms_error = first == last ? (double)file->errors[2 * ((size_t)level * (size_t)file->info.segment_count + (size_t)first) + 1]
-                                : ath_sqrt(squares / frames);
+    if (rms_error) *rms_error = first == last ? (double)errors[2 * first + 1] : ath_sqrt(squares / frames);
 }
 
 int32_t ath_segment_start(const ath_file *file, int32_t segment)
@@ -442,7 +443,8 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
     uint64_t end = 0;
     for (uint32_t i = 0; i < file->header.chunk_count; i++) {
         const ath_chunk *chunk = file->chunks + i;
-        if (chunk->length == 0 || (chunk->bytes && !all) || !is_needed(file, chunk, level, first_segment, last_segment)) continue;
+        if (chunk->length == 0 || (chunk->bytes && !all)) continue;
+        if (!is_needed(file, chunk, level, first_segment, last_segment)) continue;
         int joined = count > 0 && chunk->offset == end;
         end = chunk->offset + chunk->length;
         if (!joined) count++;

@@ -171,7 +171,8 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, voi
         const int32_t *row = corrections + 5 * i;
         for (size_t k = 0; k < 3; k++) {
             size_t at = ((size_t)row[0] * 3 + k) * T + (size_t)row[1];
-            if (row[2 + k] != 0) set_position(wide, positions, at, ath_corrected(position_at(wide, positions, at), row[2 + k], step));
+            double here = position_at(wide, positions, at);
+            if (row[2 + k] != 0) set_position(wide, positions, at, ath_corrected(here, row[2 + k], step));
         }
     }
     return count;

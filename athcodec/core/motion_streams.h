@@ -133,7 +133,8 @@ static void code_correction(ath_coder *coder, correction_model *model, const int
         }
         any = 1;
         int negative = coder_bit(coder, &model->sign[axis][sign], q[axis] < 0);
-        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, clipped(like[axis]) * 16, magnitude_of(q[axis]) - 1) + 1;
+        uint32_t expected = clipped(like[axis]) * 16;
+        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, expected, magnitude_of(q[axis]) - 1) + 1;
         q[axis] = negative ? -magnitude : magnitude;
     }
 }

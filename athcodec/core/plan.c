@@ -60,7 +60,8 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
     int32_t parts = pieces_of(branch->count);
     for (int32_t j = 0; j < parts; j++) {
         ath_piece *piece = pieces + next + j;
-        int32_t from = (int32_t)((int64_t)branch->count * j / parts), to = (int32_t)((int64_t)branch->count * (j + 1) / parts);
+        int32_t from = (int32_t)((int64_t)branch->count * j / parts);
+        int32_t to = (int32_t)((int64_t)branch->count * (j + 1) / parts);
         memset(piece, 0, sizeof *piece);
         piece->first = branch->first + from;
         piece->count = to - from;

@@ -52,9 +52,9 @@ enum { ATH_CARRIER_FRAMES = 4 };
 ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
 ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
 
-/* Fills pieces and nodes, and height, longest and carrier_rows of `shape`, whose branches and counts are set. Carriers are kept for
- * the whole pass over the pieces (keep), or until the last piece that hangs on them has come. `memory`: scratch,
- * vertex_count. */
+/* Fills pieces and nodes, and height, longest and carrier_rows of `shape`, whose branches and counts are set. Carriers
+ * are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has come. `memory`:
+ * scratch, vertex_count. */
 ATH_ENCODER_API void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */

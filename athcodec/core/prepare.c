@@ -333,7 +333,8 @@ static int read_piece(ath_work *work, int32_t p, int32_t level)
 {
     stems_reader *reader = work->stems + level;
     ath_coder coder = reader->coder;
-    code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level, &work->piece);
+    code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level,
+               &work->piece);
     reader->coder = coder;
     return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
 }
