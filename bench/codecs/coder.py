@@ -1,0 +1,449 @@
+"""Entropy coders of the baselines: athcodec's own (coder.c, compiled here with the core's flags) and zstd
+-19.
+
+Both take the same arrays of integers: rows of three axes over frequency, and tables of anything else.
+`Writer` strings such arrays and a few numbers together, each with its own shape and length, and `Reader`
+takes them apart again, so that nothing reaches a decoder that was not counted. Hierarchy and corrections are
+coded as athcodec codes them, whatever the entropy coder. Integers of any size up to 64 bits are taken; those
+of 30 bits or more are split, which baselines never need.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import os
+import re
+import shutil
+import struct
+import subprocess
+import tempfile
+from ctypes import c_double, c_int32, c_int64, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import zstandard
+
+from athcodec import entropy, quantize
+from athcodec._native import BRANCH, SEGMENT_FRAMES
+from athcodec.hierarchy import Hierarchy
+
+CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
+LARGEST = 1 << 30
+LOW_BITS = 24
+
+
+class DamagedStream(Exception):
+    """Bytes that no writer of this module makes."""
+
+
+# ---- coder.c ----
+
+
+def compiler() -> list[str] | None:
+    """The C compiler and its first options, from CC or the usual names."""
+    found = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
+    return found.split() if found else None
+
+
+@cache
+def library(writes: bool) -> ctypes.CDLL:
+    """coder.c for one direction; compiled once per process."""
+    command = compiler()
+    if command is None:
+        raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
+    flags = re.findall(r"^\s*(-f[\w=-]+)", (CORE / "CMakeLists.txt").read_text(), re.MULTILINE)
+    folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    file = folder / ("writer.so" if writes else "reader.so")
+    options = [
+        "-std=c11",
+        "-O3",
+        *flags,
+        f"-I{CORE}",
+        "-shared",
+        "-fPIC",
+        *(["-DATH_ENCODING"] if writes else []),
+    ]
+    subprocess.run([*command, *options, "-o", file, Path(__file__).with_name("coder.c"), "-lm"], check=True)
+    loaded = ctypes.CDLL(str(file))
+    arguments = {
+        "bench_rows": [c_int32] * 3 + [c_void_p],
+        "bench_table": [c_int32] * 2 + [c_void_p],
+        "bench_hierarchy": [c_int32] * 2 + [c_void_p] * 3,
+    }
+    if not writes:
+        arguments["bench_corrections"] = [c_int32, c_int32, c_double, c_int32, c_void_p]
+    for name, rest in arguments.items():
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = c_int64, [c_void_p, c_int64, *rest]
+    return loaded
+
+
+def _written(name: str, capacity: int, *arguments) -> bytes:
+    while True:
+        buffer = np.empty(capacity, np.uint8)
+        size = getattr(library(True), name)(buffer.ctypes.data, capacity, *arguments)
+        if size >= 0:
+            return buffer[:size].tobytes()
+        if size < -1:
+            raise ValueError(f"{name}: got numbers that the stream cannot hold")
+        capacity *= 4
+
+
+def _read(name: str, data: bytes, *arguments) -> None:
+    array = np.frombuffer(data, np.uint8) if data else np.zeros(1, np.uint8)
+    if not getattr(library(False), name)(array.ctypes.data, len(data), *arguments):
+        raise DamagedStream(f"{name}: got {len(data)} bytes that are no such stream")
+
+
+# ---- entropy coders ----
+
+
+class EntropyCoder(Protocol):
+    name: str
+
+    def rows(self, rows: np.ndarray, unit: int) -> bytes:
+        """(R, 3, F) int32 below 2^30; `unit` rows belong together."""
+
+    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray: ...
+
+    def table(self, table: np.ndarray) -> bytes:
+        """(R, C) int32 below 2^30."""
+
+    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray: ...
+
+
+class RangeCoder:
+    """The entropy coder of .ath files."""
+
+    name = "range coder"
+
+    def quick(self) -> RangeCoder:
+        return self
+
+    def rows(self, rows: np.ndarray, unit: int) -> bytes:
+        """As motion coefficients, or as a table, whatever is smaller."""
+        streams = [self._motion_rows(rows, unit), self.table(rows.reshape(len(rows), -1))]
+        smaller = int(len(streams[1]) < len(streams[0]))
+        return bytes([smaller]) + streams[smaller]
+
+    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
+        if data[0]:
+            return self.read_table(data[1:], (shape[0], 3 * shape[2])).reshape(shape)
+        return self._read_motion_rows(data[1:], shape, unit)
+
+    def _motion_rows(self, rows: np.ndarray, unit: int) -> bytes:
+        parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
+        streams = [
+            _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data)
+            for part in parts
+        ]
+        return _join(streams)
+
+    def _read_motion_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
+        rows = np.zeros(shape, np.int32)
+        for at, stream in zip(_blocks(shape[2]), _split(data, len(_blocks(shape[2]))), strict=True):
+            part = np.zeros((*shape[:2], min(SEGMENT_FRAMES, shape[2] - at)), np.int32)
+            _read("bench_rows", stream, len(part), part.shape[2], unit, part.ctypes.data)
+            rows[:, :, at : at + SEGMENT_FRAMES] = part
+        return rows
+
+    def table(self, table: np.ndarray) -> bytes:
+        table = table.copy()
+        return _written("bench_table", 4096 + 2 * table.size, *table.shape, table.ctypes.data)
+
+    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray:
+        table = np.zeros(shape, np.int32)
+        _read("bench_table", data, *shape, table.ctypes.data)
+        return table
+
+
+class Zstd:
+    """zstd after a layout that serves it.
+
+    Every line of numbers is in as few bytes as its largest one needs, plane by plane. Lines are vertices or
+    frequencies, whatever is smaller.
+    """
+
+    name = "zstd -19"
+
+    def __init__(self, level: int = 19):
+        self.level = level
+
+    def quick(self) -> Zstd:
+        """Fast enough for a search: what is smaller there is nearly always smaller at 19."""
+        return Zstd(3)
+
+    def rows(self, rows: np.ndarray, unit: int) -> bytes:
+        return self.table(rows.reshape(len(rows), -1))
+
+    def read_rows(self, data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
+        return self.read_table(data, (shape[0], shape[1] * shape[2])).reshape(shape)
+
+    def table(self, table: np.ndarray) -> bytes:
+        layouts = [_byte_lines(table), _byte_lines(np.ascontiguousarray(table.T))]
+        sizes = [len(zstandard.compress(layout, 3)) for layout in layouts]
+        turned = int(sizes[1] < sizes[0])
+        return bytes([turned]) + zstandard.ZstdCompressor(
+            level=self.level, write_checksum=False, write_content_size=True
+        ).compress(layouts[turned])
+
+    def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray:
+        raw = zstandard.decompress(data[1:])
+        return (
+            np.ascontiguousarray(_from_byte_lines(raw, shape[::-1]).T)
+            if data[0]
+            else _from_byte_lines(raw, shape)
+        )
+
+
+def _byte_lines(table: np.ndarray) -> bytes:
+    """Bytes per number of each line, then its numbers, signs in the lowest bit: all lowest bytes, then the
+    next.
+    """
+    folded = ((table.astype(np.int64) << 1) ^ (table.astype(np.int64) >> 63)).astype("<u4")
+    largest = folded.max(axis=1, initial=0)
+    widths = (largest > 0).astype(np.uint8) + (largest > 0xFF) + (largest > 0xFFFF) + (largest > 0xFFFFFF)
+    planes = folded.view(np.uint8).reshape(*folded.shape, 4)
+    lines = [planes[i, :, byte] for i in range(len(folded)) for byte in range(widths[i])]
+    return widths.tobytes() + (np.concatenate(lines).tobytes() if lines else b"")
+
+
+def _from_byte_lines(raw: bytes, shape: tuple[int, int]) -> np.ndarray:
+    widths = np.frombuffer(raw, np.uint8, shape[0])
+    planes = np.zeros((*shape, 4), np.uint8)
+    at = shape[0]
+    for i, width in enumerate(widths.tolist()):
+        planes[i, :, :width] = np.frombuffer(raw, np.uint8, width * shape[1], at).reshape(width, shape[1]).T
+        at += width * shape[1]
+    folded = planes.view("<u4")[:, :, 0].astype(np.int64)
+    return ((folded >> 1) ^ -(folded & 1)).astype(np.int32)
+
+
+def _blocks(frames: int) -> range:
+    return range(0, max(1, frames), SEGMENT_FRAMES)
+
+
+def _join(streams: list[bytes]) -> bytes:
+    """Streams behind each other; all but the last with their length."""
+    return b"".join(varint(len(stream)) + stream for stream in streams[:-1]) + streams[-1]
+
+
+def _split(data: bytes, count: int) -> list[bytes]:
+    streams, at = [], 0
+    for _ in range(count - 1):
+        size, at = read_varint(data, at)
+        streams.append(data[at : at + size])
+        at += size
+    return [*streams, data[at:]]
+
+
+def varint(value: int) -> bytes:
+    if value < 0:
+        raise ValueError(f"varint: got {value}; expected a number >= 0")
+    result = bytearray()
+    while value > 127:
+        result.append(value & 127 | 128)
+        value >>= 7
+    result.append(value)
+    return bytes(result)
+
+
+def read_varint(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        if at >= len(data):
+            raise DamagedStream(f"varint: got the end of the data at byte {at}; expected more")
+        value |= (data[at] & 127) << shift
+        shift, at = shift + 7, at + 1
+        if data[at - 1] < 128:
+            return value, at
+
+
+# ---- what an encoding consists of ----
+
+
+class Writer:
+    """Parts of an encoding, in the order in which they are read. Each method gives back what a reader will
+    get.
+    """
+
+    def __init__(self, coder: EntropyCoder):
+        self.coder = coder
+        self.parts: list[bytes] = []
+        self.values: list[object] = []
+
+    def _add(self, part: bytes, value):
+        self.parts.append(part)
+        self.values.append(value)
+        return value
+
+    def data(self) -> bytes:
+        return b"".join(self.parts)
+
+    def echo(self) -> Echo:
+        """A reader of what was written, without decoding it."""
+        return Echo(self.values)
+
+    def count(self, value: int) -> int:
+        return self._add(varint(value), value)
+
+    def single(self, value: float) -> float:
+        value = quantize.single(value)
+        return self._add(struct.pack("<f", value), value)
+
+    def rows(self, rows: np.ndarray, unit: int = 1) -> np.ndarray:
+        """(R, 3, F) integers, coded as motion coefficients are; see bench_rows for `unit`."""
+        head = b"".join(map(varint, (len(rows), rows.shape[2], unit)))
+        coded, wide = self._integers(rows, lambda part: self.coder.rows(part, unit))
+        return self._add(head + coded, wide)
+
+    def table(self, table: np.ndarray) -> np.ndarray:
+        """(R, C) integers of any kind; neighbours of like magnitude are best."""
+        head = b"".join(map(varint, table.shape))
+        coded, wide = self._integers(table, self.coder.table)
+        return self._add(head + coded, wide)
+
+    def _integers(self, integers: np.ndarray, code) -> tuple[bytes, np.ndarray]:
+        integers = np.asarray(integers, np.int64)
+        if not integers.size:
+            return b"", integers
+        if integers.min() > -LARGEST and integers.max() < LARGEST:
+            streams = [code(np.ascontiguousarray(integers, np.int32))]
+        else:
+            limbs = [
+                integers & (1 << LOW_BITS) - 1,
+                integers >> LOW_BITS & (1 << LOW_BITS) - 1,
+                integers >> 2 * LOW_BITS,
+            ]
+            streams = [code(np.ascontiguousarray(limb, np.int32)) for limb in limbs]
+        return varint(len(streams)) + b"".join(varint(len(stream)) + stream for stream in streams), integers
+
+    def hierarchy(self, hierarchy: Hierarchy) -> Hierarchy:
+        branches = np.zeros(hierarchy.branch_count, BRANCH)
+        branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
+        branches["attach"] = hierarchy.attach
+        stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+        head = varint(hierarchy.branch_count) + varint(hierarchy.vertex_count) + varint(len(stream))
+        return self._add(head + stream, hierarchy)
+
+
+class Echo:
+    """The values of a Writer, one after the other."""
+
+    def __init__(self, values: list[object]):
+        self._values = iter(values)
+
+    def _next(self):
+        return next(self._values)
+
+    count = single = rows = table = hierarchy = _next
+
+
+class Reader:
+    """The parts of an encoding, from its bytes alone."""
+
+    def __init__(self, coder: EntropyCoder, data: bytes, at: int = 0):
+        self.coder, self._data, self.at = coder, data, at
+
+    def count(self) -> int:
+        value, self.at = read_varint(self._data, self.at)
+        return value
+
+    def take(self, size: int) -> bytes:
+        if self.at + size > len(self._data):
+            raise DamagedStream(f"encoding: got {len(self._data)} bytes; expected {self.at + size} at least")
+        self.at += size
+        return self._data[self.at - size : self.at]
+
+    def single(self) -> float:
+        return struct.unpack("<f", self.take(4))[0]
+
+    def rows(self) -> np.ndarray:
+        shape, unit = (self.count(), 3, self.count()), self.count()
+        return self._integers(shape, lambda data: self.coder.read_rows(data, shape, unit))
+
+    def table(self) -> np.ndarray:
+        shape = self.count(), self.count()
+        return self._integers(shape, lambda data: self.coder.read_table(data, shape))
+
+    def _integers(self, shape: tuple[int, ...], decode) -> np.ndarray:
+        result = np.zeros(shape, np.int64)
+        if result.size:
+            for limb in range(self.count()):
+                result += decode(self.take(self.count())).astype(np.int64) << limb * LOW_BITS
+        return result
+
+    def hierarchy(self) -> Hierarchy:
+        branch_count, vertex_count = self.count(), self.count()
+        stream = self.take(self.count())
+        branches = np.zeros(branch_count, BRANCH)
+        branch_source, vertex_source = np.zeros(branch_count, np.int32), np.zeros(vertex_count, np.int32)
+        _read(
+            "bench_hierarchy",
+            stream,
+            branch_count,
+            vertex_count,
+            branches.ctypes.data,
+            branch_source.ctypes.data,
+            vertex_source.ctypes.data,
+        )
+        return Hierarchy.from_parts(
+            branches["parent"], branches["count"], branches["attach"], vertex_source, branch_source
+        )
+
+
+# ---- corrections ----
+
+
+def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -> bytes:
+    """Brings every vertex of (N, 3, T) float32 positions within `limit` of `wanted`, float64.
+
+    In place, as athcodec does it. Segments of SEGMENT_FRAMES frames: the step, then per segment a length and
+    the stream.
+    """
+    starts = range(0, positions.shape[2], SEGMENT_FRAMES)
+    factor = 1.0
+    while factor > 1e-3:
+        step = quantize.single(quantize.CORRECTION_STEP * limit * factor)
+        parts = [np.ascontiguousarray(positions[:, :, at : at + SEGMENT_FRAMES]) for at in starts]
+        found = [
+            entropy.find_corrections(
+                part, np.ascontiguousarray(wanted[:, :, at : at + SEGMENT_FRAMES]), np.zeros(3), limit, step
+            )
+            for at, part in zip(starts, parts, strict=True)
+        ]
+        if all(rows is not None for rows in found):
+            break
+        factor *= 0.5
+    else:
+        raise ValueError(
+            f"corrections: got a limit of {limit:.3g}; expected one that float32 positions can keep"
+        )
+    result = struct.pack("<f", step)
+    for at, part, rows in zip(starts, parts, found, strict=True):
+        positions[:, :, at : at + SEGMENT_FRAMES] = part
+        stream = entropy.encode_corrections(rows, len(part), part.shape[2]) if len(rows) else b""
+        result += varint(len(stream)) + stream
+    return result
+
+
+def read_corrections(positions: np.ndarray, reader: Reader) -> None:
+    """Applies them in place to contiguous (N, 3, T) float32."""
+    vertices, _, frames = positions.shape
+    step = reader.single()
+    for at in range(0, frames, SEGMENT_FRAMES):
+        stream = reader.take(reader.count())
+        if stream:
+            _read(
+                "bench_corrections",
+                stream,
+                vertices,
+                min(SEGMENT_FRAMES, frames - at),
+                step,
+                frames,
+                positions.ctypes.data + positions.itemsize * at,
+            )

@@ -1,0 +1,410 @@
+"""Baselines on principal components: global PCA, PCA with linear prediction in time, clustered PCA.
+
+* Alexa and Mueller, "Representing animations by principal components", Computer Graphics Forum 19(3), 2000:
+  the matrix of all frames is a sum of products of a shape and a track in time. Either factor is quantised
+  first, the other fitted to it by least squares; trajectories are one per coordinate (shared basis of T
+  numbers) or one per vertex (of 3T).
+* Karni and Gotsman, "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004: the
+  same with the tracks coded by linear prediction in time.
+* Sattler, Sarlette and Klein, "Simple and efficient compression of animation sequences", SCA 2005:
+  trajectories in clusters with a basis each (Lloyd's algorithm with the distance to a cluster's basis).
+
+Left out of all: rigid motion taken off before (a plant is rooted), and meshes' connectivity (the order of
+vertices does). The mean of each vertex is subtracted and coded. Of the two factors the larger has one step
+for all (what is uniform error in the positions); each component of the smaller one gets the precision that it
+needs. Basis vectors are coded as they are, or by the cosines of their own (for the smooth ones), whatever is
+smaller. None of the papers predicts coefficients from a neighbour's; here each component may be, by
+differences of the integers along the order of vertices, because that halves the sizes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from bench.codecs import Source
+from bench.codecs.coder import Reader, Writer
+from bench.codecs.tree import (
+    ORDERS,
+    VertexOrder,
+    differences,
+    memo,
+    ordered,
+    read_order,
+    read_pose,
+    sums,
+    vertex_order,
+    write_order,
+    write_pose,
+)
+from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
+
+COARSEST_BASIS = -2  # half octaves
+STEPS = Ladder.geometric(0.5, 12, 2.0, 4)
+DEAD_ZONES = Ladder((0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8), 2)
+
+
+# ---- trajectories and bases ----
+
+
+@cache
+def cosines(frames: int) -> np.ndarray:
+    """(T, T) orthonormal rows."""
+    angles = np.pi / frames * np.outer(np.arange(frames), np.arange(frames) + 0.5)
+    basis = np.sqrt(2 / frames) * np.cos(angles)
+    basis[0] /= np.sqrt(2)
+    return basis
+
+
+@dataclass
+class Trajectories:
+    """Rows that share a basis: (3N, T) one per coordinate, or, `joint`, (N, 3T) one per vertex."""
+
+    joint: bool
+    frames: int
+
+    def rows(self, motion: np.ndarray) -> np.ndarray:
+        """Of (N, 3, T)."""
+        return motion.reshape(-1, 3 * self.frames if self.joint else self.frames)
+
+    def motion(self, rows: np.ndarray) -> np.ndarray:
+        return rows.reshape(-1, 3, self.frames)
+
+    def to_axes(self, coefficients: np.ndarray) -> np.ndarray:
+        """(N, 3, F) for code_row of coefficients (rows, K): joint components take the axes by turns."""
+        if not self.joint:
+            return coefficients.reshape(-1, 3, coefficients.shape[1])
+        missing = -coefficients.shape[1] % 3
+        padded = np.pad(coefficients, ((0, 0), (0, missing)))
+        return padded.reshape(len(padded), -1, 3).transpose(0, 2, 1)
+
+    def from_axes(self, axes: np.ndarray, count: int) -> np.ndarray:
+        if not self.joint:
+            return axes.reshape(-1, axes.shape[2])
+        return axes.transpose(0, 2, 1).reshape(len(axes), -1)[:, :count]
+
+
+def principal(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Singular values, descending, and orthonormal rows (min(shape), length)."""
+    values, vectors = np.linalg.eigh(rows.T @ rows)
+    count = min(rows.shape)
+    return np.sqrt(np.maximum(values[::-1][:count], 0)), np.ascontiguousarray(vectors[:, ::-1][:, :count].T)
+
+
+def mean_motion(source: Source, order: VertexOrder) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) mean of each vertex and (N, 3, T) motion about it."""
+
+    def make() -> tuple[np.ndarray, np.ndarray]:
+        positions = ordered(source, order)
+        mean = positions.mean(axis=2)
+        return mean, positions - mean[:, :, None]
+
+    return memo(source, ("motion", order.hierarchy is not None), make)
+
+
+def source_basis(
+    source: Source, order: VertexOrder, trajectories: Trajectories
+) -> tuple[np.ndarray, np.ndarray]:
+    return memo(
+        source,
+        ("principal", trajectories.joint),
+        lambda: principal(trajectories.rows(mean_motion(source, order)[1])),
+    )
+
+
+def write_basis(
+    writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories, lpc: int = 0
+) -> np.ndarray:
+    """Basis rows (K, length), each at about its step; returns what a reader will have."""
+    exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
+    writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
+    steps = 2.0 ** (exponents / 2)
+    tracks = basis.reshape(len(basis), -1, trajectories.frames)
+    if lpc:
+        writer.count(2)
+        return _write_predicted(writer, tracks[:, 0], steps, lpc)
+    plain = np.rint(tracks / steps[:, None, None])
+    waves = np.rint(tracks @ cosines(trajectories.frames).T / steps[:, None, None])
+    kind = writer.count(int(np.log2(1 + np.abs(waves)).sum() < np.log2(1 + np.abs(plain)).sum()))
+    writer.rows(_in_threes((plain, waves)[kind].reshape(-1, trajectories.frames)))
+    tracks = waves @ cosines(trajectories.frames) if kind else plain
+    return (tracks * steps[:, None, None]).reshape(basis.shape)
+
+
+def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
+    steps = 2.0 ** ((np.cumsum(reader.table()[0]) + COARSEST_BASIS) / 2)
+    kind = reader.count()
+    if kind == 2:
+        return _read_predicted(reader, steps)
+    width = 3 if trajectories.joint else 1
+    tracks = reader.rows().reshape(-1, trajectories.frames)[: width * len(steps)].astype(np.float64)
+    tracks = tracks.reshape(len(steps), width, -1)
+    if kind:
+        tracks = tracks @ cosines(trajectories.frames)
+    return (tracks * steps[:, None, None]).reshape(len(steps), -1)
+
+
+def _in_threes(tracks: np.ndarray) -> np.ndarray:
+    """(R, T) as rows of three axes."""
+    return np.pad(tracks, ((0, -len(tracks) % 3), (0, 0))).reshape(-1, 3, tracks.shape[1])
+
+
+# ---- linear prediction in time ----
+
+LPC_BITS = 8
+
+
+def _write_predicted(writer: Writer, tracks: np.ndarray, steps: np.ndarray, degree: int) -> np.ndarray:
+    """Tracks (K, T) quantised, each predicted by the least-squares weights of its own last integers."""
+    q = np.rint(tracks / steps[:, None])
+    past = np.stack([np.pad(q, ((0, 0), (lag, 0)))[:, : q.shape[1]] for lag in range(1, degree + 1)], axis=1)
+    normal = past @ past.transpose(0, 2, 1) + 1e-3 * np.eye(degree)
+    weights = np.linalg.solve(normal, past @ q[:, :, None])[:, :, 0]
+    coded = writer.table(np.clip(np.rint(weights * 2**LPC_BITS), -1 << 20, 1 << 20).astype(np.int64))
+    expected = (past * coded[:, :, None]).sum(axis=1) / 2**LPC_BITS
+    writer.rows(_in_threes(q - np.rint(expected)))
+    return q * steps[:, None]
+
+
+def _read_predicted(reader: Reader, steps: np.ndarray) -> np.ndarray:
+    weights = reader.table()
+    residual = reader.rows()
+    residual = residual.reshape(-1, residual.shape[2])[: len(weights)]
+    degree = weights.shape[1]
+    q = np.zeros((len(weights), residual.shape[1] + degree), np.int64)
+    for t in range(residual.shape[1]):
+        past = q[:, t : t + degree][:, ::-1]
+        q[:, t + degree] = residual[:, t] + np.rint((past * weights).sum(axis=1) / 2**LPC_BITS).astype(
+            np.int64
+        )
+    return q[:, degree:] * steps[:, None]
+
+
+# ---- one group of trajectories ----
+
+
+def write_coefficients(
+    writer: Writer, q: np.ndarray, order: VertexOrder, trajectories: Trajectories, most: int
+) -> None:
+    """Integers (rows, K), each component by the differences between vertices that make it smallest, of degree
+    <= most.
+    """
+    q = q.reshape(len(order.source), -1, q.shape[1])
+    options = [differences(q, order, degree) for degree in range(most + 1)]
+    costs = [np.log2(1 + np.abs(option)).sum(axis=(0, 1)) for option in options]
+    degrees = writer.table(np.argmin(costs, axis=0)[None])[0]
+    chosen = np.empty_like(q)
+    for degree, option in enumerate(options):
+        chosen[:, :, degrees == degree] = option[:, :, degrees == degree]
+    writer.rows(trajectories.to_axes(chosen.reshape(-1, q.shape[2])))
+
+
+def read_coefficients(reader: Reader, order: VertexOrder, trajectories: Trajectories) -> np.ndarray:
+    degrees = reader.table()[0]
+    q = (
+        trajectories.from_axes(reader.rows(), len(degrees))
+        .reshape(len(order.source), -1, len(degrees))
+        .copy()
+    )
+    for degree in (1, 2):
+        q[:, :, degrees == degree] = sums(q[:, :, degrees == degree], order, degree)
+    return q.reshape(-1, len(degrees))
+
+
+def write_group(
+    writer: Writer,
+    motion: np.ndarray,
+    order: VertexOrder,
+    spectrum: tuple[np.ndarray, np.ndarray],
+    step: float,
+    settings: Settings,
+    trajectories: Trajectories,
+    lpc: int = 0,
+) -> np.ndarray:
+    """Motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
+
+    Returns what a reader will have.
+    """
+    values, basis = spectrum
+    rows = trajectories.rows(motion)
+    count = writer.count(int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
+    if count == 0:
+        return np.zeros_like(motion)
+    values, basis = values[:count], basis[:count]
+    steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / values
+    if settings["first"] == "shapes":
+        q = quantised(rows @ basis.T / step, settings["dead_zone"])
+        shapes = q.astype(np.float64)
+        fitted = _inverse(shapes.T @ shapes) @ (shapes.T @ rows) / step
+        decoded = write_basis(writer, fitted, steps, trajectories, lpc)
+    else:
+        decoded = write_basis(writer, basis, steps, trajectories, lpc)
+        q = quantised(fitted_to(decoded, rows) / step, settings["dead_zone"])
+    write_coefficients(writer, q, order, trajectories, settings["differences"])
+    return trajectories.motion((q * step) @ decoded)
+
+
+def _inverse(normal: np.ndarray) -> np.ndarray:
+    """Of a matrix that least squares solve with; components that quantised to nothing stay out."""
+    return np.linalg.inv(normal + max(1e-12 * np.trace(normal) / len(normal), 1e-30) * np.eye(len(normal)))
+
+
+def fitted_to(basis: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Least-squares coefficients of rows."""
+    return rows @ (basis.T @ _inverse(basis @ basis.T))
+
+
+def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Trajectories) -> np.ndarray:
+    count = reader.count()
+    if count == 0:
+        return np.zeros((len(order.source), 3, trajectories.frames))
+    basis = read_basis(reader, trajectories)
+    coefficients = read_coefficients(reader, order, trajectories)
+    return trajectories.motion((coefficients * step) @ basis)
+
+
+# ---- the baselines ----
+
+
+class GlobalPca(Baseline):
+    title = "global PCA"
+    degrees: tuple[int, ...] = (0,)  # of linear prediction
+
+    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        return {
+            "step": STEPS,
+            "keep": Ladder.geometric(0.01, 2.5, 0.15),
+            "basis": Ladder.geometric(0.05, 4, 0.7),
+            "joint": Split((0, 1)),
+            "differences": Choice((0, 1, 2), 2),
+            "first": Choice(("tracks", "shapes")),
+            "dead_zone": DEAD_ZONES,
+            "pose": Ladder.geometric(0.05, 2, 0.5),
+            "lpc": Choice(self.degrees),
+            "order": Choice(ORDERS, 1),
+        }
+
+    def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        order = vertex_order(source, settings["order"])
+        write_order(writer, order)
+        mean, motion = mean_motion(source, order)
+        frames = writer.count(motion.shape[2])
+        trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
+        pose = write_pose(writer, order, mean, settings["pose"] * bound)
+        step = writer.single(settings["step"] * bound)
+        motion = motion + (mean - pose)[:, :, None]
+        write_group(
+            writer,
+            motion,
+            order,
+            source_basis(source, order, trajectories),
+            step,
+            settings,
+            trajectories,
+            settings["lpc"],
+        )
+        return order
+
+    def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        order = read_order(reader)
+        frames = reader.count()
+        trajectories = Trajectories(bool(reader.count()), frames)
+        pose = read_pose(reader, order)
+        return read_group(reader, order, reader.single(), trajectories) + pose[:, :, None], order
+
+
+class PredictedPca(GlobalPca):
+    title = "PCA + linear prediction (Karni-Gotsman)"
+    degrees = (2, 1, 3, 4)
+
+    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        return super().grid(source, bound) | {"joint": Choice((0,)), "first": Choice(("shapes", "tracks"))}
+
+
+class ClusteredPca(Baseline):
+    title = "clustered PCA (Sattler)"
+    counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96)
+    rank = 8  # of the bases that the clusters are formed by
+    turns = 8
+
+    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        return {
+            "step": STEPS,
+            "clusters": Ladder(self.counts, 4),
+            "keep": Ladder.geometric(0.01, 2.5, 0.15),
+            "basis": Ladder.geometric(0.05, 4, 0.7),
+            "joint": Split((0, 1)),
+            "differences": Choice((0, 1, 2), 2),
+            "first": Choice(("tracks", "shapes")),
+            "dead_zone": DEAD_ZONES,
+            "pose": Ladder.geometric(0.05, 2, 0.5),
+            "order": Choice(ORDERS, 1),
+        }
+
+    def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        order = vertex_order(source, settings["order"])
+        write_order(writer, order)
+        mean, motion = mean_motion(source, order)
+        trajectories = Trajectories(bool(settings["joint"]), writer.count(motion.shape[2]))
+        writer.count(settings["joint"])
+        pose = write_pose(writer, order, mean, settings["pose"] * bound)
+        step = writer.single(settings["step"] * bound)
+        motion = motion + (mean - pose)[:, :, None]
+        groups, spectra = self._clusters(source, order, settings["clusters"], trajectories)
+        writer.count(len(spectra))
+        writer.table(np.diff(groups, prepend=0)[:, None])
+        for group, spectrum in enumerate(spectra):
+            members = motion[groups == group]
+            write_group(
+                writer, members, VertexOrder(np.arange(len(members))), spectrum, step, settings, trajectories
+            )
+        return order
+
+    def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        order = read_order(reader)
+        frames = reader.count()
+        trajectories = Trajectories(bool(reader.count()), frames)
+        pose, step, count = read_pose(reader, order), reader.single(), reader.count()
+        groups = np.cumsum(reader.table()[:, 0])
+        positions = np.repeat(pose[:, :, None], frames, axis=2)
+        for group in range(count):
+            members = np.flatnonzero(groups == group)
+            positions[members] += read_group(reader, VertexOrder(members), step, trajectories)
+        return positions, order
+
+    def _clusters(self, source: Source, order: VertexOrder, count: int, trajectories: Trajectories):
+        """Cluster of each vertex (N,), and the spectrum of each cluster."""
+
+        def make():
+            motion = mean_motion(source, order)[1]
+            groups = self._lloyd(
+                trajectories.rows(motion), count, 1 if trajectories.joint else 3, len(motion)
+            )
+            spectra = [
+                principal(trajectories.rows(motion[groups == group])) for group in range(groups.max() + 1)
+            ]
+            return groups, spectra
+
+        return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
+
+    def _lloyd(self, rows: np.ndarray, count: int, rows_per_vertex: int, vertices: int) -> np.ndarray:
+        """Vertices by the basis that leaves the least of them; starts from runs of neighbours."""
+        groups = np.arange(vertices) * count // vertices
+        coefficients = (
+            rows @ principal(rows)[1][:24].T
+        )  # what matters of the motion, small enough to iterate on
+        for _ in range(self.turns):
+            left = np.full((count, vertices), np.inf)
+            for group in range(count):
+                mine = coefficients[np.repeat(groups == group, rows_per_vertex)]
+                if len(mine):
+                    basis = principal(mine)[1][: self.rank]
+                    rest = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
+                    left[group] = rest.reshape(vertices, -1).sum(axis=1)
+            moved = left.argmin(axis=0)
+            if np.array_equal(moved, groups):
+                break
+            groups = moved
+        return np.unique(groups, return_inverse=True)[1]

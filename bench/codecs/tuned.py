@@ -1,0 +1,174 @@
+"""What all baselines share: the search for the settings of the smallest encoding, and corrections.
+
+A baseline writes and reads its lossy part; here its positions are decoded as a reader will, and vertices that
+are beyond the bound are corrected as athcodec corrects them. So a baseline's step may be coarser than its
+worst vertex allows, and step and corrections are searched together. Settings are found one after the other,
+each along its ladder from where it stands, two rungs at a time and then one, until a round changes nothing: a
+local search, not a full one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from athcodec import quantize
+from bench.codecs import Source
+from bench.codecs.coder import EntropyCoder, Reader, Writer, compiler, read_corrections, write_corrections
+from bench.codecs.tree import VertexOrder, ordered
+
+FINALISTS = 3
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Numbers in order: what is between two good ones is good too."""
+
+    values: tuple[float, ...]
+    start: int
+
+    @classmethod
+    def geometric(cls, low: float, high: float, start: float, per_octave: int = 2) -> Ladder:
+        count = round(np.log2(high / low) * per_octave)
+        values = tuple(round(low * 2 ** (i / per_octave), 6) for i in range(count + 1))
+        return cls(values, int(np.argmin(np.abs(np.log(np.array(values) / start)))))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Names or numbers that have nothing to do with each other; all are tried."""
+
+    values: tuple
+    start: int = 0
+
+
+@dataclass(frozen=True)
+class Split(Choice):
+    """A choice that changes where the others are best: a round over those is made for each of its values."""
+
+
+Settings = dict[str, float | int | str]
+
+
+@dataclass
+class Search:
+    """Coordinate descent over named settings."""
+
+    cost: Callable[[Settings], float]
+    grid: dict[str, Ladder | Choice]
+    known: dict[tuple[int, ...], float] = field(default_factory=dict)
+
+    def settings(self, at: tuple[int, ...]) -> Settings:
+        return {name: axis.values[i] for (name, axis), i in zip(self.grid.items(), at, strict=True)}
+
+    def _cost(self, at: tuple[int, ...]) -> float:
+        if at not in self.known:
+            self.known[at] = self.cost(self.settings(at))
+        return self.known[at]
+
+    def run(self, rounds: int) -> list[Settings]:
+        """Settings that were tried, the best first."""
+        splits = [
+            range(len(axis.values)) if isinstance(axis, Split) else (axis.start,)
+            for axis in self.grid.values()
+        ]
+        best = min((self._round(first, True) for first in product(*splits)), key=self._cost)
+        for _ in range(rounds - 1):
+            before, best = best, self._round(best, False)
+            if best == before:
+                break
+        return [self.settings(at) for at in sorted(self.known, key=self.known.get)]
+
+    def _round(self, best: tuple[int, ...], first: bool) -> tuple[int, ...]:
+        for axis, values in enumerate(self.grid.values()):
+            if isinstance(values, Ladder):
+                for stride in (2, 1) if first else (1,):
+                    best = self._walk(best, axis, stride)
+            elif not (first and isinstance(values, Split)):
+                best = min((self._moved(best, axis, i) for i in range(len(values.values))), key=self._cost)
+        return best
+
+    def _walk(self, at: tuple[int, ...], axis: int, stride: int) -> tuple[int, ...]:
+        last = len(list(self.grid.values())[axis].values) - 1
+        for direction in (stride, -stride):
+            start = at
+            while 0 <= at[axis] + direction <= last:
+                further = self._moved(at, axis, at[axis] + direction)
+                if self._cost(further) >= self._cost(at):
+                    break
+                at = further
+            if at != start:
+                break
+        return at
+
+    @staticmethod
+    def _moved(at: tuple[int, ...], axis: int, value: int) -> tuple[int, ...]:
+        return *at[:axis], value, *at[axis + 1 :]
+
+
+class Baseline(ABC):
+    """A codec of the literature in two variants, by entropy coder."""
+
+    kind = "baseline"
+    title = ""
+    rounds = 3  # of the search over all settings
+
+    def __init__(self, coder: EntropyCoder):
+        self.coder = coder
+        self.name = f"{self.title}, {coder.name}"
+        self.settings: Settings = {}
+
+    def missing(self) -> str | None:
+        return None if compiler() else "no C compiler: expected cc, gcc or clang, or its name in CC"
+
+    @abstractmethod
+    def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        """The settings that are searched, in the order of the search."""
+
+    @abstractmethod
+    def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        """The lossy part, in the order of vertices that is returned."""
+
+    @abstractmethod
+    def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        """(N, 3, T) float64 positions of the lossy part, and their order."""
+
+    def encode(self, source: Source, bound: float) -> bytes:
+        quick = self.coder.quick()
+        search = Search(
+            lambda settings: len(self._trial(source, bound, settings, quick)), self.grid(source, bound)
+        )
+        tried = search.run(self.rounds)
+        finalists = tried[:1] if quick is self.coder else tried[:FINALISTS]
+        encodings = [(self._trial(source, bound, settings, self.coder), settings) for settings in finalists]
+        data, self.settings = min(encodings, key=lambda encoding: len(encoding[0]))
+        return data
+
+    def _trial(self, source: Source, bound: float, settings: Settings, coder: EntropyCoder) -> bytes:
+        writer = Writer(coder)
+        order = self.write(writer, source, bound, settings)
+        lossy, _ = self.read(writer.echo())
+        positions = np.ascontiguousarray(lossy, np.float32)
+        limit = quantize.error_limit(bound, source.diagonal)
+        return writer.data() + write_corrections(positions, ordered(source, order), limit)
+
+    def decode(self, data: bytes) -> np.ndarray:
+        reader = Reader(self.coder, data)
+        lossy, order = self.read(reader)
+        positions = np.ascontiguousarray(lossy, np.float32)
+        read_corrections(positions, reader)
+        result = np.empty((positions.shape[2], len(positions), 3), np.float32)
+        result[:, order.source] = positions.transpose(2, 0, 1)
+        return result
+
+
+def quantised(units: np.ndarray, dead_zone: float) -> np.ndarray:
+    """Integers of numbers in steps: 0 below the dead zone, rounding biased towards 0 by as much."""
+    magnitude = np.abs(units)
+    magnitude += 1 - dead_zone
+    np.floor(magnitude, out=magnitude)
+    return np.copysign(magnitude, units).astype(np.int64)
