@@ -1,0 +1,245 @@
+"""The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
+
+The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
+vertices; render meshes with leaves; and any HDF5 clip by its path. All are seeded and differ between machines
+by rounding only. A file says in its attribute "recipe" what it was made from, and is made again where that
+has changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import h5py
+import numpy as np
+
+import athcodec
+from athcodec.hierarchy import branch_orders
+from bench.tables import table
+from bench.trees.mesh import dress
+from bench.trees.plant import grow
+from bench.trees.refine import refine
+from bench.trees.simulate import MissingEngine, Unstable, simulate
+from bench.trees.wind import Wind
+
+FOLDER_VARIABLE = "ATHCODEC_BENCH_DATA"
+DEFAULT_FOLDER = Path("~/.cache/athcodec-bench")
+RECIPE_VERSION = 1  # goes up when the code below or in bench/trees gives other motion
+SAMPLE = "sample"
+
+NOTE = """
+Seconds: to make the clip just now, without what it is made from; "-" where it was there. Tips: RMS distance
+of the branches' ends from their mean places, in per cent of the plant's height. Orders: of the branches,
+trunk 0.
+"""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A tree of so many nodes with branches of the orders 0 to `orders`, simulated in turbulent wind."""
+
+    nodes: int
+    orders: int
+    frames: int
+    height: float
+    wind_speed: float
+    seed: int
+    source: ClassVar[None] = None
+
+    @property
+    def wind(self) -> Wind:
+        return Wind(self.wind_speed, self.height, seed=self.seed)
+
+    def make(self, source: None) -> athcodec.MotionClip:
+        plant = grow(self.nodes, self.orders, self.height, self.seed)
+        motion = simulate(plant, self.wind, self.frames)
+        return athcodec.MotionClip(
+            motion.positions, motion.time, plant.branch, plant.branch_parent,
+            rest=plant.position.astype(np.float32), edges=plant.edges,
+            attributes={"radius": plant.radius.astype(np.float32)},
+            metadata={"unit": "m", "up_axis": "y", "fps": 30} | motion.settings)
+
+    def __str__(self) -> str:
+        return f"MuJoCo, {self.height:g} m tree in wind of {self.wind_speed:g} m/s"
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A simulated clip with `factor` vertices per element, and twigs that ride on it."""
+
+    source: str
+    frames: int
+    factor: int
+    twigs: int
+    twig_vertices: int
+    seed: int
+
+    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
+        wind = RECIPES[self.source].wind
+        return refine(source, wind, self.frames, self.factor, self.twigs, self.twig_vertices, self.seed)
+
+    def __str__(self) -> str:
+        return f"{self.source}, {self.factor} vertices per element by splines, {self.twigs:,} twigs riding"
+
+
+@dataclass(frozen=True)
+class Dressed:
+    """A simulated clip as a render mesh: bark tubes, and leaf cards that flutter."""
+
+    source: str
+    frames: int
+    leaves: int
+    seed: int
+
+    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
+        return dress(source, RECIPES[self.source].wind, self.frames, self.leaves, self.seed)
+
+    def __str__(self) -> str:
+        return f"{self.source} as a mesh: bark tubes and {self.leaves:,} leaf cards"
+
+
+Recipe = Simulated | Refined | Dressed
+
+RECIPES: dict[str, Recipe] = {
+    "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
+    "mj_1k_1200f": Simulated(1000, 3, 1200, 8.0, 11.0, seed=2),
+    "mj_4k_200f": Simulated(4000, 3, 200, 10.0, 9.0, seed=3),
+    "mj_4k_1200f": Simulated(4000, 6, 1200, 10.0, 6.5, seed=4),
+    # the paper's case: 3 levels of branches, about 8,000 nodes, 200 steps, wind along (-1, 0, 1)
+    "mj_8k_200f": Simulated(8000, 2, 200, 12.0, 9.0, seed=5),
+    "mj_8k_1200f": Simulated(8000, 6, 1200, 12.0, 6.5, seed=6),
+    "refined_50k_200f": Refined("mj_4k_200f", 200, 6, 2600, 10, seed=7),
+    "refined_200k_60f": Refined("mj_8k_200f", 60, 12, 10400, 10, seed=8),
+    "leaves_8k_60f": Dressed("mj_1k_200f", 60, 500, seed=9),
+    "leaves_67k_200f": Dressed("mj_4k_200f", 200, 10000, seed=10),
+}
+
+SUITES = {"quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"), "full": (SAMPLE, *RECIPES)}
+
+
+def clips(suite: str, folder: Path | None = None) -> list[tuple[str, Path, str]]:
+    """(name, path, description) of every clip of "quick" or "full", made where it is not there yet."""
+    return [(name, path_of(name, folder), describe(name)) for name in SUITES[suite]]
+
+
+def path_of(name: str, folder: Path | None = None) -> Path:
+    """The file of a clip by name, made where it is not there yet, or of any HDF5 clip by its path.
+
+    Raises KeyError for a name that is neither, MissingEngine where MuJoCo is needed and not installed.
+    """
+    return _found_or_made(name, folder or default_folder())[0]
+
+
+def describe(name: str) -> str:
+    if name == SAMPLE:
+        return "ships with athcodec: finite-element tree in wind"
+    return str(RECIPES[name]) if name in RECIPES else "given by its path"
+
+
+def default_folder() -> Path:
+    return Path(os.environ.get(FOLDER_VARIABLE) or DEFAULT_FOLDER).expanduser()
+
+
+def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
+    """The file, and how long it took to make; None where it was there."""
+    if name == SAMPLE:
+        return athcodec.sample_path(), None
+    if name not in RECIPES:
+        if Path(name).is_file():
+            return Path(name), None
+        names = ", ".join([SAMPLE, *RECIPES])
+        raise KeyError(f"clip: got {name!r}, expected the path of an HDF5 file or one of {names}")
+    path = folder / f"{name}.h5"
+    if _recipe_in(path) == recipe_text(name):
+        return path, None
+    recipe = RECIPES[name]
+    source = _found_or_made(recipe.source, folder)[0] if recipe.source else None
+    folder.mkdir(parents=True, exist_ok=True)
+    return path, _make(name, source, path)
+
+
+def _make(name: str, source_path: Path | None, path: Path) -> float:
+    start = time.perf_counter()
+    source = athcodec.read_hdf5(source_path) if source_path else None
+    try:
+        clip = RECIPES[name].make(source)
+    finally:
+        if source:
+            source.close()
+    clip.metadata["recipe"] = recipe_text(name)
+    athcodec.write_hdf5(path, clip)
+    return time.perf_counter() - start
+
+
+def recipe_text(name: str) -> str:
+    """All that the clip is made from, its sources' recipes included."""
+    recipe = RECIPES[name]
+    words = {"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe)
+    if recipe.source:
+        words["source"] = json.loads(recipe_text(recipe.source))
+    return json.dumps(words, sort_keys=True)
+
+
+def _recipe_in(path: Path) -> str | None:
+    """The recipe that a file was made by; None where there is no such file."""
+    if not path.is_file():
+        return None
+    try:
+        with h5py.File(path, "r") as file:
+            return str(file.attrs.get("recipe"))
+    except OSError:
+        return None
+
+
+def tip_motion(clip: athcodec.MotionClip) -> float:
+    """RMS distance of the stems' last vertices from their mean places, over the plant's height."""
+    order = np.arange(clip.vertex_count) if clip.stem_index is None else clip.stem_index
+    last = np.lexsort((order, clip.vertex_branch))
+    ends = last[np.flatnonzero(np.diff(clip.vertex_branch[last], append=clip.branch_count))]
+    motion = np.concatenate([frames[:, ends].astype(np.float64) for _, frames in clip.blocks()])
+    up = {"x": 0, "y": 1, "z": 2}.get(str(clip.metadata.get("up_axis", "y")).lower(), 1)
+    square = ((motion - motion.mean(axis=0)) ** 2).sum(axis=2).mean()
+    return float(np.sqrt(square) / max(np.ptp(clip.rest[:, up]), 1e-30))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="*", metavar="NAME",
+                        help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or HDF5 clips by path")
+    parser.add_argument("--suite", choices=tuple(SUITES),
+                        help="a set of clips (quick, where nothing is named)")
+    parser.add_argument("--folder", type=Path, metavar="DIR",
+                        help=f"where clips are kept (default ${FOLDER_VARIABLE} or {DEFAULT_FOLDER})")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    names = _wanted(args.names, args.suite)
+    folder = args.folder or default_folder()
+    rows = []
+    for name in names:
+        try:
+            path, seconds = _found_or_made(name, folder)
+        except (MissingEngine, Unstable, KeyError) as error:
+            raise SystemExit(f"bench data: {error.args[0]}") from error
+        with athcodec.read_hdf5(path) as clip:
+            rows.append({"name": Path(name).stem} | _row(clip) | {"made": describe(name), "seconds": seconds})
+    where = args.folder.name if args.folder else f"${FOLDER_VARIABLE} or {DEFAULT_FOLDER}"
+    return {"tables": [table("Clips", rows, NOTE, f"In {where}, as NAME.h5.")], "broken": []}
+
+
+def _wanted(names: Sequence[str], suite: str | None) -> list[str]:
+    chosen = [*names, *(SUITES[suite or "quick"] if suite or not names else ())]
+    return list(dict.fromkeys(chosen))
+
+
+def _row(clip: athcodec.MotionClip) -> dict[str, Any]:
+    return {"vertices": clip.vertex_count, "frames": clip.frame_count, "branches": clip.branch_count,
+            "orders": f"0-{int(branch_orders(clip.branch_parent).max())}",
+            "faces": None if clip.faces is None else len(clip.faces),
+            "float32 MB": 12e-6 * clip.vertex_count * clip.frame_count, "tips %": 100 * tip_motion(clip)}

@@ -1,0 +1,155 @@
+"""A branching plant of a chosen number of nodes: where its nodes are, which stem each is on, how thick it is
+there.
+
+Every stem shares what nodes it is given between its own elements and its side stems. These stand at the
+golden angle around it (137.5 degrees, as buds do) and bend upwards. Thickness follows the pipe model
+(Shinozaki, Yoda, Hozumi and Kira, "A quantitative analysis of plant form: the pipe model theory", Japanese
+Journal of Ecology 14(3), 1964): the cross-section is proportional to the foliage above it. No species is
+meant, and there are no roots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+UP = np.array([0.0, 1.0, 0.0])
+GOLDEN_ANGLE = np.radians(137.508)
+FORK_ANGLE = np.radians(55.0)
+FIRST_FORK = 0.25  # bare part of a stem, as a fraction of its elements
+BASE_RADIUS = 0.0065  # over the plant's height
+SMALLEST_STEM = 2  # elements
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """N nodes on B stems; a node's element is the straight piece between it and its parent.
+
+    parent         (N,) node below, -1 for the root; always a lower number
+    branch         (N,) the stem of each node; along a stem, nodes run from base to tip
+    branch_parent  (B,) -1 for the trunk
+    position       (N, 3) metres, y up, the root at 0
+    radius         (N,) metres
+    foliage        (N,) share of all foliage that the node carries
+    """
+
+    parent: np.ndarray
+    branch: np.ndarray
+    branch_parent: np.ndarray
+    position: np.ndarray
+    radius: np.ndarray
+    foliage: np.ndarray
+
+    @property
+    def height(self) -> float:
+        return float(self.position[:, 1].max())
+
+    @property
+    def elements(self) -> np.ndarray:
+        """(N, 3) from parent to node, zero for the root."""
+        return self.position - self.position[np.maximum(self.parent, 0)]
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(N - 1, 2) node below and node."""
+        return np.stack([self.parent[1:], np.arange(1, len(self.parent))], axis=1).astype(np.int32)
+
+    def preorder(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, each followed at once by all that it carries; (N,) how many these are, itself included."""
+        sizes = _sum_above(self.parent, np.ones(len(self.parent))).astype(int)
+        place, free = np.zeros(len(sizes), int), np.ones(len(sizes), int)
+        for node in range(1, len(sizes)):
+            below = self.parent[node]
+            place[node] = place[below] + free[below]
+            free[below] += sizes[node]
+        return np.argsort(place), sizes
+
+
+def grow(nodes: int, orders: int, height: float, seed: int) -> Plant:
+    """A plant of exactly `nodes` nodes with stems of the orders 0 to `orders`. ValueError for too few."""
+    fewest = 1 + SMALLEST_STEM * (orders + 1)
+    if nodes < fewest:
+        raise ValueError(f"plant: got {nodes} nodes for orders 0 to {orders}, expected at least {fewest}")
+    grower = _Grower(orders, np.random.default_rng(seed))
+    grower.stem(0, -1, UP, 1.0, nodes - 1, 0)
+    parent, branch = np.array(grower.parent, np.int32), np.array(grower.branch, np.int32)
+    position = np.array(grower.position)
+    position *= height / position[:, 1].max()
+    leafy = np.array(grower.order) == orders
+    leafy |= np.bincount(parent[1:], minlength=nodes) == 0  # tips of stems whose last fork is lower
+    foliage = leafy / leafy.sum()
+    radius = BASE_RADIUS * height * np.sqrt(_sum_above(parent, foliage))
+    return Plant(parent, branch, np.array(grower.branch_parent, np.int32), position, radius, foliage)
+
+
+class _Grower:
+    """The lists that stems are appended to, depth first, so that every subtree is one range of nodes."""
+
+    def __init__(self, orders: int, rng: np.random.Generator) -> None:
+        self.orders, self.rng = orders, rng
+        self.parent, self.branch, self.order, self.position = [-1], [0], [0], [np.zeros(3)]
+        self.branch_parent: list[int] = []
+        # about a tenth of the trunk's length at the last order, however many orders there are
+        self.shortening = 0.1 ** (1.0 / max(2, orders))
+
+    def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int,
+             order: int) -> None:
+        """A stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
+        branch = len(self.branch_parent)
+        self.branch_parent.append(below)
+        count, budgets = self._share(budget, self.orders - order)
+        nodes, directions = self._elements(base, branch, direction, length, count, order)
+        forks = np.linspace(max(1, round(FIRST_FORK * count)), count - 1, len(budgets)).round().astype(int)
+        azimuth = self.rng.uniform(0, 2 * np.pi)
+        for fork, side_budget in zip(forks, budgets, strict=True):
+            azimuth += GOLDEN_ANGLE
+            side = _side_direction(directions[fork], azimuth, FORK_ANGLE + self.rng.normal(0, 0.12))
+            side_length = length * self.shortening * (1.15 - 0.6 * fork / count)
+            side_length *= self.rng.uniform(0.85, 1.15)
+            self.stem(nodes[fork], branch, side, side_length, int(side_budget), order + 1)
+
+    def _share(self, budget: int, levels_above: int) -> tuple[int, np.ndarray]:
+        """Elements of the stem itself, and of each of its side stems with all they carry."""
+        if levels_above == 0:
+            return budget, np.zeros(0, int)
+        reserve = SMALLEST_STEM * levels_above
+        fan = budget ** (1.0 / (levels_above + 1))
+        count = int(np.clip(round(1.5 * fan), SMALLEST_STEM, budget - reserve))
+        sides = int(np.clip(round(fan), 1, (budget - count) // reserve))
+        weights = self.rng.uniform(0.6, 1.4, sides)
+        spare = budget - count - sides * reserve
+        ends = np.round(np.cumsum(weights) / weights.sum() * spare).astype(int)
+        return count, reserve + np.diff(ends, prepend=0)
+
+    def _elements(self, base: int, branch: int, direction: np.ndarray, length: float, count: int,
+                  order: int) -> tuple[list[int], list[np.ndarray]]:
+        """Appends the stem's nodes; gives their numbers and the directions of their elements."""
+        nodes, directions = [], []
+        for _ in range(count):
+            upwards = 0.0 if order == 0 else 0.6 / count
+            direction = direction + upwards * UP + self.rng.normal(0, 0.25 / np.sqrt(count), 3)
+            direction = direction / np.linalg.norm(direction)
+            self.parent.append(base)
+            self.position.append(self.position[base] + direction * length / count)
+            self.branch.append(branch)
+            self.order.append(order)
+            base = len(self.parent) - 1
+            nodes.append(base)
+            directions.append(direction)
+        return nodes, directions
+
+
+def _side_direction(direction: np.ndarray, azimuth: float, angle: float) -> np.ndarray:
+    first = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[2]) < 0.9 else [1.0, 0.0, 0.0])
+    first /= np.linalg.norm(first)
+    outwards = np.cos(azimuth) * first + np.sin(azimuth) * np.cross(direction, first)
+    return np.cos(angle) * direction + np.sin(angle) * outwards
+
+
+def _sum_above(parent: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(N,) each node's value and those of all nodes that it carries."""
+    total = values.astype(np.float64).copy()
+    for node in range(len(parent) - 1, 0, -1):
+        total[parent[node]] += total[node]
+    return total

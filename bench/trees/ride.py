@@ -1,0 +1,117 @@
+"""What the nodes of a moving plant carry: rigid frames along the stems, and sway in the wind about them.
+
+A frame follows its element by the smallest turn from the rest pose, so twist about the element's own axis is
+left out. Sway is a damped oscillator per rider, driven by the drag of the wind at its foot and stepped
+exactly (forces constant within a frame). Riders do not push back on what carries them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec import MotionClip
+from bench.trees.wind import Wind
+
+BLOCK_FRAMES = 16
+LARGEST_SWAY = 1.0  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The nodes of a simulated clip: positions (T, N, 3), rest (N, 3), parent (N,), and so on."""
+
+    positions: np.ndarray
+    rest: np.ndarray
+    parent: np.ndarray
+    branch: np.ndarray
+    branch_parent: np.ndarray
+    radius: np.ndarray
+    time: np.ndarray
+
+    @classmethod
+    def of(cls, clip: MotionClip, frames: int) -> Skeleton:
+        """The first `frames` frames of a clip as bench.data makes it from a simulation."""
+        parent = np.full(clip.vertex_count, -1)
+        parent[clip.edges[:, 1]] = clip.edges[:, 0]
+        return cls(clip.block(0, frames), clip.rest, parent, clip.vertex_branch, clip.branch_parent,
+                   clip.attributes["radius"], clip.time[:frames])
+
+    @property
+    def height(self) -> float:
+        return float(self.rest[:, 1].max())
+
+    def direction(self, positions: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """(..., M, 3) unit vectors along the nodes' elements; the root has that of the node after it."""
+        nodes = np.maximum(nodes, 1)
+        along = positions[..., nodes, :] - positions[..., self.parent[nodes], :].astype(np.float64)
+        return along / np.linalg.norm(along, axis=-1, keepdims=True)
+
+    def turns(self, positions: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """(..., M, 3, 3) the smallest rotations of the nodes' elements from the rest pose."""
+        return smallest_turns(self.direction(self.rest, nodes), self.direction(positions, nodes))
+
+    def outer_nodes(self) -> np.ndarray:
+        """Nodes on stems that carry no others."""
+        return np.flatnonzero(~np.isin(self.branch, self.branch_parent))
+
+
+def smallest_turns(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations that take unit vectors to unit vectors, by Rodrigues' formula without angles."""
+    axis, cosine = np.cross(start, end), (start * end).sum(axis=-1)
+    cross = cross_matrices(axis)
+    return np.eye(3) + cross + cross @ cross / np.maximum(1.0 + cosine, 1e-6)[..., None, None]
+
+
+def rotations(vectors: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations by rotation vectors (axis times angle)."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    cross = cross_matrices(vectors)
+    half = np.sinc(angle / (2 * np.pi))
+    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross)
+
+
+def cross_matrices(vectors: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) matrices that multiply as cross products."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+
+
+def sideways(direction: np.ndarray, azimuth: np.ndarray, angle: float) -> np.ndarray:
+    """(M, 3) unit vectors at an angle to unit vectors, turned around them by azimuths."""
+    helper = np.eye(3)[np.abs(direction).argmin(axis=1)]
+    first = np.cross(direction, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    across = np.cos(azimuth)[:, None] * first + np.sin(azimuth)[:, None] * np.cross(direction, first)
+    return np.cos(angle) * direction + np.sin(angle) * across
+
+
+def drag_at(wind: Wind, feet: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """(T, M, 3) wind speed times velocity over the square of the mean speed, at (T, M, 3) points."""
+    air = np.stack([wind.at(points, seconds) for points, seconds in zip(feet, time, strict=True)])
+    return np.linalg.norm(air, axis=-1, keepdims=True) * air / wind.speed**2
+
+
+def sway(drive: np.ndarray, hertz: np.ndarray, damping: float, step: float) -> np.ndarray:
+    """(T, M, k) responses of M oscillators to (T, M, k) drives, which they follow where these are steady."""
+    omega = 2 * np.pi * hertz[:, None]
+    fast = omega * np.sqrt(1.0 - damping**2)
+    decay = np.exp(-damping * omega * step)
+    cosine, sine = np.cos(fast * step), np.sin(fast * step)
+    lag, speed = np.zeros(drive.shape[1:]), np.zeros(drive.shape[1:])
+    response = np.empty(drive.shape)
+    for frame, target in enumerate(drive):
+        lag = lag - (target - drive[max(0, frame - 1)])
+        pull = (speed + damping * omega * lag) / fast
+        lag, speed = (decay * (cosine * lag + sine * pull),
+                      decay * (cosine * speed - sine * (damping * speed + omega * lag) * omega / fast))
+        response[frame] = target + lag
+    return response
+
+
+def limited(vectors: np.ndarray) -> np.ndarray:
+    """Rotation vectors no longer than LARGEST_SWAY, small ones as they are."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors * np.tanh(length / LARGEST_SWAY) * LARGEST_SWAY / np.maximum(length, 1e-12)

@@ -1,0 +1,230 @@
+"""Baselines of the benchmark keep their bound and count what they need; their entropy coders give back every
+integer.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from athcodec.clip import MotionClip
+from bench.codecs import Source, check
+from bench.codecs.baselines import BASELINES
+from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, compiler, read_varint, varint
+from bench.codecs.lengyel import Parts, _rotation_vectors, _rotations
+from bench.codecs.ours import Athcodec
+from bench.codecs.tree import VertexOrder, differences, sums, vertex_order
+from bench.codecs.tuned import Choice, Ladder, Search
+
+ROOT = Path(__file__).resolve().parent.parent
+BOUND = 3e-4  # over the diagonal
+CODERS = [RangeCoder(), Zstd()]
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="needs a C compiler")
+
+
+@pytest.fixture(autouse=True)
+def short_search(monkeypatch):
+    monkeypatch.setattr("bench.codecs.tuned.Baseline.rounds", 1)
+
+
+@pytest.fixture(scope="module")
+def piece():
+    """A short piece of the sample."""
+    from athcodec.sources import read_hdf5, sample_path
+
+    with read_hdf5(sample_path()) as clip:
+        return Source(
+            MotionClip(
+                clip.block(40, 56),
+                clip.time[40:56],
+                clip.vertex_branch,
+                clip.branch_parent,
+                clip.rest,
+                clip.edges,
+            )
+        )
+
+
+@pytest.fixture(scope="module")
+def encodings(piece):
+    """What each baseline encoded, and what it decodes to in the same process."""
+    return {}
+
+
+@pytest.mark.parametrize("codec", BASELINES, ids=lambda codec: codec.name)
+def test_a_piece_of_the_sample_comes_back_within_the_bound(codec, piece, encodings):
+    assert codec.missing() is None
+    encodings[codec.name] = check(codec, piece, BOUND * piece.diagonal)
+    data, _ = encodings[codec.name]
+    assert 0 < len(data) < piece.positions.nbytes / 3
+    assert set(codec.settings) == set(codec.grid(piece, BOUND * piece.diagonal))
+
+
+def test_bytes_alone_decode_in_another_process(piece, encodings, tmp_path):
+    for index, codec in enumerate(BASELINES):
+        if codec.name not in encodings:
+            encodings[codec.name] = check(codec, piece, BOUND * piece.diagonal)
+        (tmp_path / f"{index}.bin").write_bytes(encodings[codec.name][0])
+    script = (
+        "import sys, pathlib, numpy\nfrom bench.codecs.baselines import BASELINES\n"
+        "folder = pathlib.Path(sys.argv[1])\n"
+        "for index, codec in enumerate(BASELINES):\n"
+        "    numpy.save(folder / f'{index}.npy', codec.decode((folder / f'{index}.bin').read_bytes()))\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(tmp_path)], cwd=ROOT, check=True, timeout=120)
+    for index, codec in enumerate(BASELINES):
+        decoded = np.load(tmp_path / f"{index}.npy")
+        np.testing.assert_allclose(decoded, encodings[codec.name][1], rtol=0, atol=1e-6 * piece.diagonal)
+
+
+@pytest.mark.parametrize("codec", BASELINES[::2], ids=lambda codec: codec.name)
+def test_vertices_numbered_at_random_come_back_in_the_order_of_the_source(codec, bushy_clip):
+    source = Source(bushy_clip)
+    check(codec, source, 1e-3 * source.diagonal)
+
+
+def test_clips_longer_than_a_segment_are_coded_in_parts(piece):
+    some = np.linspace(0, 15, 270)
+    start = np.minimum(some.astype(int), 14)
+    frames = piece.positions[start] + (some - start)[:, None, None] * (
+        piece.positions[start + 1] - piece.positions[start]
+    )
+    clip = piece.clip
+    longer = MotionClip(
+        frames.astype(np.float32), np.arange(270.0), clip.vertex_branch, clip.branch_parent, clip.rest
+    )
+    source = Source(longer)
+    codec = BASELINES[0]
+    settings = {name: axis.values[axis.start] for name, axis in codec.grid(source, 1.0).items()}
+    bound = 1e-3 * source.diagonal
+    decoded = codec.decode(codec._trial(source, bound, settings, codec.coder))
+    assert np.linalg.norm(decoded - source.positions, axis=2).max() <= bound
+
+
+@pytest.mark.parametrize("single_depth", (False, True))
+def test_athcodec_takes_part_as_a_codec(piece, single_depth):
+    codec = Athcodec(single_depth)
+    data, _ = check(codec, piece, BOUND * piece.diagonal)
+    assert (
+        data[:3] != b""
+        and codec.kind == "athcodec"
+        and len(codec.settings["rotations"]) == (2 if single_depth else 4)
+    )
+
+
+@pytest.mark.parametrize("codec", BASELINES[::2], ids=lambda codec: codec.name)
+def test_a_missing_end_is_noticed(codec, piece, encodings):
+    data = (
+        encodings[codec.name][0] if codec.name in encodings else codec.encode(piece, BOUND * piece.diagonal)
+    )
+    with pytest.raises(DamagedStream):
+        codec.decode(data[: len(data) // 2])
+
+
+# ---- entropy coders ----
+
+
+def arrays(seed):
+    random = np.random.default_rng(seed)
+    decaying = (random.laplace(size=(200, 3, 50)) * 40 / np.arange(1, 51)).astype(np.int64)
+    return [
+        decaying,
+        random.integers(-3, 4, (40, 3, 300)),
+        np.zeros((5, 3, 7), np.int64),
+        np.zeros((0, 3, 4), np.int64),
+        np.zeros((4, 3, 0), np.int64),
+        random.integers(-(2**30) + 1, 2**30, (6, 3, 5)),
+        random.integers(-(2**62), 2**62, (3, 3, 2)),
+        np.array([[[-(2**63)], [2**63 - 1], [0]]]),
+    ]
+
+
+@pytest.mark.parametrize("coder", CODERS, ids=lambda coder: coder.name)
+@pytest.mark.parametrize("unit", (1, 3, 66))
+def test_integers_come_back(coder, unit):
+    rows = arrays(unit)
+    tables = [array.reshape(array.shape[0], array.shape[1] * array.shape[2]) for array in rows]
+    writer = Writer(coder)
+    for array in rows:
+        np.testing.assert_array_equal(writer.rows(array, unit), array)
+    for array in tables:
+        writer.table(array)
+    writer.count(300)
+    step = writer.single(0.1)
+    reader = Reader(coder, writer.data())
+    for array in rows:
+        np.testing.assert_array_equal(reader.rows(), array)
+    for array in tables:
+        np.testing.assert_array_equal(reader.table(), array)
+    assert reader.count() == 300 and reader.single() == step and reader.at == len(writer.data())
+
+
+def test_coefficients_cost_about_what_athcodecs_own_rows_cost():
+    rows = arrays(0)[0]
+    entropy = sum(
+        -(p * np.log2(p)).sum()
+        for axis in rows.reshape(-1, 50).T
+        for p in [np.unique(axis, return_counts=True)[1] / len(axis)]
+    )
+    writer = Writer(RangeCoder())
+    writer.rows(rows)
+    assert len(writer.data()) < 1.15 * entropy * 600 / 8, entropy * 600 / 8
+
+
+def test_a_hierarchy_comes_back(bushy_clip):
+    hierarchy = Source(bushy_clip).hierarchy
+    for coder in CODERS:
+        writer = Writer(coder)
+        writer.hierarchy(hierarchy)
+        found = Reader(coder, writer.data()).hierarchy()
+        for name in ("branch_parent", "stem_count", "attach", "vertex_source", "branch_source"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(hierarchy, name))
+
+
+def test_varints():
+    for value in (0, 127, 128, 2**40):
+        assert read_varint(varint(value), 0) == (value, len(varint(value)))
+    with pytest.raises(DamagedStream):
+        read_varint(b"\x80", 0)
+
+
+# ---- parts ----
+
+
+@pytest.mark.parametrize("name", ("source", "hierarchy"))
+@pytest.mark.parametrize("degree", (0, 1, 2))
+def test_differences_add_up_again(bushy_clip, name, degree):
+    order = vertex_order(Source(bushy_clip), name)
+    q = np.random.default_rng(0).integers(-1000, 1000, (len(order.source), 3, 4))
+    np.testing.assert_array_equal(sums(differences(q, order, degree), order, degree), q)
+
+
+def test_straight_motion_has_no_second_differences():
+    q = np.arange(12)[:, None] * np.array([[3, -1, 2]])
+    assert not differences(q, VertexOrder(np.arange(12)), 2)[2:].any()
+
+
+def test_rigid_parts_are_placed_by_their_tracks():
+    random = np.random.default_rng(1)
+    pose = random.normal(size=(20, 3))
+    turns = np.cumsum(random.normal(size=(1, 9, 3)) * 0.5, axis=1)
+    np.testing.assert_allclose(
+        _rotations(_rotation_vectors(_rotations(turns))), _rotations(turns), atol=1e-12
+    )
+    positions = np.moveaxis(pose @ np.swapaxes(_rotations(turns)[0], 1, 2), 0, 2)
+    parts = Parts(np.zeros(20, int), pose)
+    np.testing.assert_allclose(parts.place_rigid(parts.fit_rigid(positions)), positions, atol=0.02)
+    np.testing.assert_allclose(parts.place_affine(parts.fit_affine(positions)), positions, atol=1e-12)
+
+
+def test_a_search_ends_in_the_valley():
+    grid = {"x": Ladder(tuple(range(20)), 3), "name": Choice(("a", "b")), "y": Ladder.geometric(0.1, 10, 1)}
+    search = Search(lambda s: (s["x"] - 14) ** 2 + (s["name"] == "a") + np.log(s["y"] / 5) ** 2, grid)
+    best = search.run(3)[0]
+    assert best["x"] == 14 and best["name"] == "b" and 4 < best["y"] < 6.5
+    assert len(search.known) < 40

@@ -1,0 +1,233 @@
+"""The benchmark's clips are what they are said to be: plants that hang together, move, and come out alike."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import athcodec
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+
+from bench import data  # noqa: E402
+from bench.trees import simulate as simulation  # noqa: E402
+from bench.trees.mesh import SIDES, dress  # noqa: E402
+from bench.trees.plant import grow  # noqa: E402
+from bench.trees.refine import refine  # noqa: E402
+from bench.trees.ride import rotations, smallest_turns, sway  # noqa: E402
+from bench.trees.wind import DIRECTION, Wind  # noqa: E402
+
+SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
+BREEZE = Wind(8.0, 8.0, seed=2)
+
+
+@pytest.fixture
+def recipes(monkeypatch):
+    """The catalogue, to be changed at will."""
+    monkeypatch.setattr(data, "RECIPES", dict(data.RECIPES))
+    return data.RECIPES
+
+
+@dataclass(frozen=True)
+class Still:
+    """A recipe that needs no engine: two vertices."""
+
+    frames: int
+    source: ClassVar[None] = None
+
+    def make(self, source):
+        positions = np.zeros((self.frames, 2, 3), np.float32) + [[0, 0, 0], [0, 1, 0]]
+        return athcodec.MotionClip(positions, np.arange(self.frames), np.zeros(2, int), np.array([-1]))
+
+
+def lengths(positions, edges):
+    ends = positions.astype(np.float64)[..., edges, :]
+    return np.linalg.norm(ends[..., 0, :] - ends[..., 1, :], axis=-1)
+
+
+@pytest.mark.parametrize(("nodes", "orders"), [(100, 2), (1000, 2), (1000, 6), (15, 6), (3, 0)])
+def test_a_plant_has_the_nodes_and_orders_asked_for_and_thins_towards_its_tips(nodes, orders):
+    plant = grow(nodes, orders, 5.0, seed=3)
+    athcodec.MotionClip(plant.position[None], [0.0], plant.branch, plant.branch_parent, edges=plant.edges)
+    assert len(plant.parent) == nodes and plant.height == pytest.approx(5.0)
+    assert data.branch_orders(plant.branch_parent).max() == orders
+    assert (plant.parent[1:] < np.arange(1, nodes)).all() and plant.foliage.sum() == pytest.approx(1.0)
+    assert (plant.radius > 0).all()
+    assert (plant.radius[1:] <= plant.radius[plant.parent[1:]] * (1 + 1e-9)).all()
+    order, sizes = plant.preorder()
+    assert order[0] == 0 and sizes[0] == nodes
+    for node in order[:20]:
+        begin = int(np.flatnonzero(order == node)[0])
+        carried = order[begin:begin + sizes[node]]
+        assert set(plant.parent[carried[1:]]) <= set(carried)
+
+
+def test_a_plant_refuses_fewer_nodes_than_its_orders_need():
+    with pytest.raises(ValueError, match="got 6 nodes for orders 0 to 2, expected at least 7"):
+        grow(6, 2, 5.0, seed=1)
+
+
+def test_gusts_have_the_intensity_asked_for_and_travel_with_the_wind():
+    wind = Wind(10.0, 10.0, intensity=0.2, seed=4)
+    points = np.random.default_rng(1).uniform(0, 2000, (4000, 3)) * [1, 0, 1] + [0, 10, 0]
+    gusts = wind.at(points, 0.0) - 10.0 * DIRECTION
+    assert np.sqrt((gusts**2).mean()) == pytest.approx(2.0, rel=0.15)
+    later = wind.at(points[:50] + 3.0 * 10.0 * DIRECTION, 3.0)
+    assert np.abs(later - wind.at(points[:50], 0.0)).max() < 0.05
+    near = wind.at(points[:50] + [0.1, 0, 0], 0.0)
+    assert np.abs(near - wind.at(points[:50], 0.0)).max() < np.abs(gusts).max() / 5
+
+
+def test_a_simulated_plant_moves_keeps_its_lengths_and_comes_out_the_same_again(recipes, tmp_path):
+    recipes["small"] = SMALL
+    if find_spec("mujoco") is None:
+        with pytest.raises(simulation.MissingEngine, match="pip install mujoco"):
+            data.path_of("small", tmp_path)
+        return
+    files = [data.path_of("small", tmp_path / folder) for folder in ("one", "two")]
+    with athcodec.read_hdf5(files[0]) as clip, athcodec.read_hdf5(files[1]) as again:
+        clip.check()
+        positions = clip.block(0, 20)
+        assert np.array_equal(positions, again.block(0, 20))
+        assert (clip.vertex_count, clip.frame_count, clip.metadata["unit"]) == (100, 20, "m")
+        assert np.allclose(lengths(positions, clip.edges), lengths(clip.rest, clip.edges), rtol=1e-4)
+        assert 0.001 < data.tip_motion(clip) < 0.1
+        assert (positions[:, 0] == 0).all() and 0.2 < clip.metadata["lowest_hz"] < 5
+        down_wind = (positions - clip.rest).mean(axis=(0, 1)) @ DIRECTION
+        assert down_wind > 0.01
+
+
+def test_without_the_engine_a_message_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(simulation.MissingEngine, match="not installed, expected `pip install mujoco`"):
+        data.path_of("mj_1k_200f", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_forces_around_hinges_are_those_of_the_engine():
+    if find_spec("mujoco") is None:
+        with pytest.raises(simulation.MissingEngine):
+            simulation.engine()
+        return
+    mujoco = simulation.engine()
+    plant = grow(60, 2, 4.0, seed=5)
+    links = simulation._Links(plant)
+    model, bodies, _ = links.model(mujoco)
+    state, rng = mujoco.MjData(model), np.random.default_rng(0)
+    state.qpos[:] = rng.normal(0, 0.2, model.nq)
+    mujoco.mj_forward(model, state)
+    run = simulation._Run(mujoco, model, state, links, bodies, BREEZE, 0.1)
+    force = rng.normal(size=(60, 3))
+    force[0] = 0
+    expected = np.zeros(model.nv)
+    for body, push in zip(bodies[1:], force[1:], strict=True):
+        mujoco.mj_applyFT(model, state, push, np.zeros(3), state.xipos[body], body, expected)
+    assert np.allclose(run._around_hinges(state.xipos[bodies], force), expected, atol=1e-12)
+
+
+def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
+    if find_spec("mujoco") is None:
+        with pytest.raises(simulation.MissingEngine):
+            simulation.engine()
+        return
+    mujoco = simulation.engine()
+    grown = grow(31, 0, 3.0, seed=1)
+    upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
+    pole = replace(grown, position=upright, radius=np.full(31, 0.02))
+    links = simulation._Links(pole)
+    model, bodies, stiffness = links.model(mujoco)
+    state = mujoco.MjData(model)
+    model.dof_damping[:] = 0.2 * stiffness
+    run = simulation._Run(mujoco, model, state, links, bodies, BREEZE, 0.0)
+    force = np.zeros((31, 3))
+    force[30, 0] = 2.0
+    for _ in range(2000):
+        mujoco.mj_step1(model, state)
+        state.qfrc_applied[:] = run._around_hinges(run.nodes(), force)
+        mujoco.mj_step2(model, state)
+    expected = 2.0 * 3.0**3 / (3 * simulation.YOUNG * np.pi / 4 * 0.02**4)
+    assert run.nodes()[30, 0] == pytest.approx(expected, rel=0.06)  # 1 + 3 / (2 * 30) by the hinges
+    assert 0.01 < expected < 0.1 and abs(run.nodes()[30, 2]) < 1e-6
+
+
+def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip):
+    fine = refine(sample_clip, BREEZE, frames=12, factor=3, twigs=40, twig_vertices=4, seed=6)
+    stems = 3 * 1000 + 1
+    assert (fine.vertex_count, fine.frame_count) == (stems + 160, 12)
+    assert np.allclose(fine.positions[:, :stems:3], sample_clip.block(0, 12), atol=1e-6)
+    ratio = lengths(fine.positions, fine.edges) / lengths(fine.rest, fine.edges)
+    assert np.abs(ratio[:, stems - 1:] - 1).max() < 1e-3, "twigs are torn off"
+    assert np.abs(ratio - 1).max() < 0.3, "stems are torn apart"
+    twig_tips = fine.positions[:, stems + 3::4] - fine.positions[:, stems::4]
+    assert np.ptp(twig_tips, axis=0).max() > 0.01
+    assert len(fine.edges) == fine.vertex_count - 1
+
+
+def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sample_clip):
+    mesh = dress(sample_clip, BREEZE, frames=12, leaves=50, seed=7)
+    rings = 1001 + 98
+    tubes = SIDES * rings
+    assert mesh.vertex_count == tubes + 200 and mesh.branch_count == 99 + 50
+    assert len(mesh.faces) == SIDES * (rings - 99) + 50
+    circles = mesh.positions[:, :tubes].reshape(12, rings, SIDES, 3).astype(np.float64)
+    radius = np.linalg.norm(circles - circles.mean(axis=2, keepdims=True), axis=-1)
+    assert np.abs(np.ptp(radius, axis=0)).max() < 1e-5, "a ring changes its size"
+    cards = mesh.faces[-50:]
+    sides = lengths(mesh.positions, cards[:, :2])
+    assert np.ptp(sides, axis=0).max() < 1e-5
+    assert np.array_equal(np.unique(mesh.faces), np.arange(mesh.vertex_count))
+    athcodec.build_ath(mesh, max_error=1.0)
+
+
+def test_rotations_turn_by_the_angle_about_the_axis():
+    quarter = rotations(np.array([0.0, 0.0, np.pi / 2]))
+    assert np.allclose(quarter @ [1, 0, 0], [0, 1, 0])
+    assert np.allclose(smallest_turns(np.array([1.0, 0, 0]), np.array([0.0, 1, 0])), quarter)
+
+
+def test_sway_follows_a_step_with_an_overshoot_and_settles():
+    drive = np.ones((300, 1, 1))
+    drive[0] = 0
+    response = sway(drive, np.array([1.0]), 0.1, 1 / 30)[:, 0, 0]
+    assert response[0] == 0 and 1.6 < response.max() < 1.8
+    assert response.argmax() == pytest.approx(16, abs=1) and response[-1] == pytest.approx(1, abs=0.02)
+
+
+def test_a_clip_is_made_once_and_again_where_its_recipe_changed(recipes, tmp_path):
+    recipes["still"] = Still(3)
+    path, seconds = data._found_or_made("still", tmp_path)
+    assert seconds is not None and path == tmp_path / "still.h5"
+    assert data._found_or_made("still", tmp_path) == (path, None)
+    recipes["still"] = Still(4)
+    assert data._found_or_made("still", tmp_path)[1] is not None
+    with athcodec.read_hdf5(path) as clip:
+        assert clip.frame_count == 4
+    path.write_bytes(b"half a file")
+    assert data._found_or_made("still", tmp_path)[1] is not None
+
+
+def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
+    sample = athcodec.sample_path()
+    assert data.path_of("sample") == sample == data.path_of(str(sample))
+    with pytest.raises(KeyError, match="got 'nothing', expected the path of an HDF5 file or one of sample,"):
+        data.path_of("nothing")
+    monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
+    recipes["still"] = Still(2)
+    monkeypatch.setitem(data.SUITES, "quick", ("sample", "still"))
+    assert [(name, path) for name, path, _ in data.clips("quick")] == [("sample", sample),
+                                                                       ("still", tmp_path / "still.h5")]
+
+
+def test_the_verb_prints_a_table_of_the_clips(tmp_path):
+    words = [sys.executable, "-m", "bench", "data", "sample", "--folder", str(tmp_path)]
+    done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "| sample |    1,001 |    120 |       99 | 0-2" in done.stdout
