@@ -1,8 +1,8 @@
 """Figures on athcodec's files and speed: `python -m bench VERB` from the repository's root.
 
-Needs athcodec installed and nothing else. One module per verb (sizes, levels, speed, memory), each with
-`add_arguments(parser)` and `run(args) -> dict`; see report.py for what the dictionary holds. The package
-athcodec never imports this one.
+Needs athcodec installed; other codecs, simulated clips and pictures take part where they are installed too
+(the extra `bench`). One module per verb, each with `add_arguments(parser)` and `run(args) -> dict`; see
+tables.py for what the dictionary holds. The package athcodec never imports this one.
 """
 
 import sys

@@ -7,35 +7,36 @@ modules.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench import decode, levels, memory, picture, report, sizes, speed
+from bench import data, decode, levels, memory, paper, picture, quick, rd, report, scale, sizes, speed, tables
 
-VERBS = {"sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
+VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
+         "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture}
 
 
 def main(argv: Sequence[str]) -> int:
-    args = _parser().parse_args(argv)
-    result = report.environment(argv) | VERBS[args.verb].run(args)
-    print(report.as_text(result))
+    args = parser().parse_args(argv)
+    args.argv = list(argv)
+    result = tables.environment(argv) | VERBS[args.verb].run(args)
+    print(tables.as_text(result))
     if args.json:
-        args.json.write_text(json.dumps(result, indent=1) + "\n")
+        tables.write_json(result, args.json)
     return 1 if result["broken"] else 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m bench", description="Measures athcodec on motion clips.")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+def parser() -> argparse.ArgumentParser:
+    whole = argparse.ArgumentParser(prog="python -m bench", description="Measures athcodec on motion clips.")
+    verbs = whole.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, module in VERBS.items():
         first_line = module.__doc__.splitlines()[0]
         verb = verbs.add_parser(name, help=first_line, description=first_line)
         module.add_arguments(verb)
         verb.add_argument("--json", type=Path, metavar="FILE", help="write the unrounded figures to FILE too")
-    return parser
+    return whole
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_rel_error
-from bench.report import table
+from bench.tables import table
 
 try:
     import pysz
@@ -100,13 +100,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     broken = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        program = _compile(folder)
+        program = compile_program(folder)
         for path in args.clips:
-            case = _Case(path, folder, args.rel_error, program)
+            case = Case(path, folder, args.rel_error, program)
             whole = _whole(case, folder, args.rounds)
             figures = case.program("all", args.rounds, args.seeks, args.instances)
-            rows = {"target": _target_rows(figures, whole), "whole": whole, "levels": _level_rows(figures),
-                    "memory": _memory_rows(figures), "instances": _instance_rows(figures)}
+            rows = {"target": _target_rows(figures, whole), "whole": whole, "levels": level_rows(figures),
+                    "memory": memory_rows(figures), "instances": _instance_rows(figures)}
             for key, added in rows.items():
                 tables[key] += [{"clip": path.stem} | row for row in added]
             broken += case.broken(figures["levels"][-1]["crc"])
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 # ---- what is measured ----
 
 
-class _Case:
+class Case:
     """A clip's float32 positions and its file, with the program that times the decoder on it."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float, program: Path) -> None:
@@ -160,7 +160,7 @@ class _Case:
         return lines
 
 
-def _compile(folder: Path) -> Path:
+def compile_program(folder: Path) -> Path:
     """decode.c with the decoder's sources, as CMakeLists.txt names and compiles them."""
     here = Path(__file__).resolve().parent
     core = here.parent / "athcodec" / "core"
@@ -192,7 +192,7 @@ class _Reader:
     read: Callable[[], float]
 
 
-def _whole(case: _Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
+def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     others = [*_sz3_readers(case), _hdf5_reader(case, folder)]
     decode, opening, read = [], [], {other.name: [] for other in others}
     for number in range(rounds + 1):  # the first one does not count
@@ -213,7 +213,7 @@ def _whole(case: _Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _whole_row(case: _Case, name: str, runs: list[float], ours: list[float], size: int,
+def _whole_row(case: Case, name: str, runs: list[float], ours: list[float], size: int,
                max_error: float) -> dict[str, Any]:
     middle = median(runs)
     return {
@@ -223,7 +223,7 @@ def _whole_row(case: _Case, name: str, runs: list[float], ours: list[float], siz
     }
 
 
-def _hdf5_reader(case: _Case, folder: Path) -> _Reader:
+def _hdf5_reader(case: Case, folder: Path) -> _Reader:
     file, out = folder / "clip.h5", np.zeros_like(case.positions)
     frames = max(1, min(len(out), GZIP_CHUNK // out[0].nbytes))
     with h5py.File(file, "w") as target:
@@ -240,7 +240,7 @@ def _hdf5_reader(case: _Case, folder: Path) -> _Reader:
     return _Reader("HDF5 gzip 4", size, 0.0, read)
 
 
-def _sz3_readers(case: _Case) -> list[_Reader]:
+def _sz3_readers(case: Case) -> list[_Reader]:
     """The set-up with the smallest file, and the one that is decoded fastest."""
     if pysz is None:
         return []
@@ -253,7 +253,7 @@ def _sz3_readers(case: _Case) -> list[_Reader]:
 class _Sz3:
     """The clip compressed by SZ3 in one set-up."""
 
-    def __init__(self, case: _Case, displaced: bool, layout: str, algorithm: str) -> None:
+    def __init__(self, case: Case, displaced: bool, layout: str, algorithm: str) -> None:
         self.name = f"{'displacements' if displaced else 'positions'} {layout} {algorithm}"
         self._rest = case.rest if displaced else np.float32(0)
         self._axes = SZ3_LAYOUTS[layout]
@@ -268,7 +268,7 @@ class _Sz3:
         config.cmprAlgo = getattr(pysz.szAlgorithm, algorithm)
         self.compressed = pysz.sz.compress(values, config)[0]
 
-    def reader(self, case: _Case, why: str) -> _Reader:
+    def reader(self, case: Case, why: str) -> _Reader:
         name = f"SZ3 (pysz {version('pysz')}), {why}: {self.name}"
         return _Reader(name, self.compressed.nbytes, self._max_error(case), self.read)
 
@@ -277,7 +277,7 @@ class _Sz3:
         pysz.sz.decompress(self.compressed, np.float32, self._shape)
         return 1e3 * (time.perf_counter() - start)
 
-    def _max_error(self, case: _Case) -> float:
+    def _max_error(self, case: Case) -> float:
         values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0].reshape(self._unfolded)
         return case.error_of(values.transpose(np.argsort(self._axes)) + self._rest)
 
@@ -286,10 +286,10 @@ class _Sz3:
 
 
 def _target_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    levels = _level_rows(figures)
+    levels = level_rows(figures)
     deep, coarse = levels[-1], levels[min(1, len(levels) - 1)]
     decode, seeks = whole[0], figures["seeks"]
-    one, two = _memory_rows(figures)[-2:]
+    one, two = memory_rows(figures)[-2:]
     frames, segment = figures["frames"], deep["prepare"] / figures["segments"]
     whole_ms = deep["prepare"] + deep["write"]
     matrices_ms = coarse["prepare"] + coarse["matrices"] * frames / 1e3
@@ -317,7 +317,7 @@ def _target_rows(figures: dict[str, Any], whole: list[dict[str, Any]]) -> list[d
     return [dict(zip(("what", "figure", "unit", "target"), row, strict=True)) for row in rows]
 
 
-def _level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
+def level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
     rows = []
     for level in figures["levels"]:
         share = 1e3 * level["prepare_ms"] / figures["frames"]
@@ -332,7 +332,7 @@ def _level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-def _memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
+def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Level 1 and the deepest, each with one segment and with two."""
     levels, rows = figures["levels"], []
     positions = 12 * figures["vertices"] * figures["longest_segment"]

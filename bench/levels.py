@@ -19,7 +19,7 @@ from athcodec.ath import Ath, Gaps
 from athcodec.decoder import Depth
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
-from bench.report import table
+from bench.tables import table
 
 GAP_FRAMES = 9
 ROUNDING = 1e-6  # the error table holds float32

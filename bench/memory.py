@@ -19,7 +19,7 @@ from typing import Any
 import athcodec
 from athcodec.transform import MIN_SEGMENT, split_segments
 from bench.clips import add_clips, add_rel_error
-from bench.report import table
+from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 REPEATS = (4, 8)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bench.clips import Encoded, add_clips, add_rel_error, encoded
-from bench.report import table
+from bench.tables import table
 
 PANEL, MARGIN, CAPTION, LEAST_WIDTH = 320, 16, 44, 190
 FADED, NEAR, FAR = "#c9cfd6", (32, 44, 56), (214, 64, 41)

@@ -1,86 +1,87 @@
-"""Results as aligned Markdown tables, and what is said about the machine that they come from.
+"""One page from all results: what the clips are, every table with the command that made it, pictures.
 
-A verb's result is a dictionary that JSON can hold: "tables", each {"title", "rows", "notes"} with rows as
-dictionaries of unrounded figures by column, and "broken", one line for every promise that was not kept.
-Nothing is measured here.
+Reads the JSON files of a folder (of any verb) and writes report.md and, where matplotlib is installed, the
+pictures of plots.py beside them. Measures nothing: a verb that has no file there has no section.
 """
 
 from __future__ import annotations
 
-import os
-import platform
-import shlex
-from collections.abc import Sequence
-from importlib.metadata import version
+import argparse
+import json
 from pathlib import Path
 from typing import Any
 
-DISTRIBUTIONS = ("athcodec", "numpy", "h5py", "zstandard")
-MISSING = "-"
+from bench import plots, rd
+from bench.tables import as_text, table
+
+RESULTS = Path(__file__).resolve().parent / "results"
+TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
+          "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
+          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding"}
+
+ORDER = {verb: place for place, verb in enumerate(TITLES)}
+
+INTRODUCTION = """# What athcodec measures
+
+Written by `python -m bench report` from the JSON files beside it, which hold the unrounded figures. Every
+section names the command that made it, with versions and machine at its end. Errors are Euclidean distances,
+over the diagonal of the bounding box of all frames where nothing else is said; 1 kB is 1,000 bytes.
+"""
+
+PICTURES = """In the pictures, thick: athcodec; full lines: baselines implemented here; dotted: those on
+principal components; dashed: programs."""
 
 
-def table(title: str, rows: list[dict[str, Any]], *notes: str) -> dict[str, Any]:
-    """A table of a result; `notes` are printed below it, one paragraph each."""
-    return {"title": title, "rows": rows, "notes": [" ".join(note.split()) for note in notes]}
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--results", type=Path, default=RESULTS, metavar="FOLDER",
+                        help="folder of the JSON files, which report.md goes to (default: bench/results)")
 
 
-def environment(argv: Sequence[str]) -> dict[str, Any]:
-    """The command (paths by their last part only), versions and machine."""
-    words = [Path(word).name if os.sep in word else word for word in argv]
-    versions = {"python": platform.python_version()} | {name: version(name) for name in DISTRIBUTIONS}
-    system = f"{platform.system()} {platform.machine()}"
-    machine = {"cpu": _cpu_model(), "cores": os.cpu_count(), "system": system}
-    if hasattr(os, "getloadavg"):
-        machine["load_before"] = round(os.getloadavg()[0], 2)
-    command = shlex.join(["python", "-m", "bench", *words])
-    return {"command": command, "versions": versions, "machine": machine}
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    return write(args.results)
 
 
-def _cpu_model() -> str:
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.exists() else []
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return models[0] if models else platform.processor() or "unknown"
+def write(folder: Path) -> dict[str, Any]:
+    """Writes report.md and pictures into the folder of the results; the verb's result says what."""
+    results = [(path.stem, json.loads(path.read_text())) for path in sorted(folder.glob("*.json"))]
+    results = sorted(((name, result) for name, result in results if "command" in result),
+                     key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)))
+    if not results:
+        raise SystemExit(f"{folder.name}: found no results; expected JSON files of `python -m bench VERB "
+                         f"--json FILE`")
+    sections, rows = [], []
+    for name, result in results:
+        pictures, missing = _pictures(name, result, folder)
+        sections.append(_section(result, pictures, missing))
+        rows += [{"file": file.name, "from": f"{name}.json"} for files in pictures.values() for file in files]
+        rows += [{"file": missing, "from": f"{name}.json"}] if missing else []
+    (folder / "report.md").write_text("\n".join([INTRODUCTION, *sections]))
+    return {"tables": [table("Written", [{"file": "report.md", "from": "all of them"}, *rows])], "broken": []}
 
 
-def as_text(result: dict[str, Any]) -> str:
-    """What a verb prints: tables, broken promises, machine."""
-    parts = [_table_text(part) for part in result["tables"]]
-    parts += [f"BROKEN: {line}" for line in result["broken"]]
-    parts.append("; ".join([_pairs(result["machine"]), _pairs(result["versions"])]))
-    return "\n\n".join([f"`{result['command']}`", *parts])
+def _verb(result: dict[str, Any]) -> str:
+    return result["command"].split()[3]
 
 
-def _pairs(values: dict[str, Any]) -> str:
-    return ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in values.items())
+def _pictures(name: str, result: dict[str, Any], folder: Path) -> tuple[dict[str, list[Path]], str]:
+    """Files by clip, and why there are none."""
+    if _verb(result) != "rd":
+        return {}, ""
+    prefix = "" if name == "rd" else f"{name}_"
+    try:
+        return {row["clip"]: plots.draw(result, row["clip"], folder, prefix) for row in result["clips"]}, ""
+    except plots.NoPlots as error:
+        return {}, str(error)
 
 
-def _table_text(part: dict[str, Any]) -> str:
-    rows = part["rows"]
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = [_column(name, [row.get(name) for row in rows]) for name in names]
-    lines = ["| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True)]
-    return "\n".join([f"### {part['title']}", "", *lines, *(f"\n{note}" for note in part["notes"])])
-
-
-def _column(name: str, values: list[Any]) -> list[str]:
-    """Header, rule and cells of one column, all of one width; numbers to the right."""
-    cells = [_cell(value) for value in values]
-    width = max(3, *map(len, [name, *cells]))
-    if all(isinstance(value, str) for value in values):
-        return [name.ljust(width), "-" * width, *(cell.ljust(width) for cell in cells)]
-    return [name.rjust(width), "-" * (width - 1) + ":", *(cell.rjust(width) for cell in cells)]
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return MISSING
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, int):
-        return f"{value:,}"
-    if isinstance(value, float):
-        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
-    if isinstance(value, (list, tuple)):
-        return " ".join(str(int(item)) if isinstance(item, bool) else _cell(item) for item in value)
-    return str(value)
+def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: str) -> str:
+    verb = _verb(result)
+    head = f"## {TITLES.get(verb, verb)}\n"
+    if verb != "rd":
+        return f"{head}\n{as_text(result)}\n"
+    contents, clips = {key: result[key] for key in rd.KEYS}, [row["clip"] for row in result["clips"]]
+    commands = dict.fromkeys(row["command"] for rows in contents.values() for row in rows)
+    whole = result | rd.summary(contents, clips, None) | {"command": "`, `".join(commands)}
+    above = {rd.title(clip): "".join(f"![{file.stem}]({file.name})\n\n" for file in files)
+             for clip, files in pictures.items()}
+    return f"{head}\n{missing or PICTURES}\n\n{as_text(whole, above)}\n"

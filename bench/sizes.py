@@ -14,7 +14,7 @@ from typing import Any
 from athcodec.encoder import EFFORTS
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from bench.clips import Encoded, add_clips, encoded, measure
-from bench.report import table
+from bench.tables import table
 
 REL_ERRORS = (1e-3, 1e-4, 1e-5)
 

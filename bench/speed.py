@@ -19,7 +19,7 @@ import h5py
 
 import athcodec
 from bench.clips import add_clips, add_rel_error
-from bench.report import table
+from bench.tables import table
 
 ENCODES, DECODES = 3, 7
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,16 +17,24 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.container import KIND_NAMES
 
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+
+from bench import compare, paper, plots  # noqa: E402
+from bench.curves import Curve, mean_saving  # noqa: E402
+from bench.store import Store  # noqa: E402
+
 KINDS = {*KIND_NAMES.values(), "HEADER"}
 MEMORY_PARTS = ("file", "opened", "bases", "work", "segments")
-ROOT = Path(__file__).resolve().parent.parent
 
-def run_bench(tmp_path, *words):
-    """(printed text, contents of the JSON file) of one run on the sample."""
+
+def run_bench(tmp_path, *words, code=0, **environment):
+    """(printed text, contents of the JSON file) of one run, on the sample where no clip is named."""
     file = tmp_path / "result.json"
+    path = {"PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run([sys.executable, "-m", "bench", *words, "--json", str(file)], cwd=ROOT, text=True,
-                          capture_output=True, timeout=120)
-    assert done.returncode == 0, done.stderr
+                          capture_output=True, timeout=120, env=os.environ | path | environment)
+    assert done.returncode == code, done.stderr
     return done.stdout, json.loads(file.read_text())
 
 
@@ -93,3 +103,176 @@ def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_
     assert cells_of(text, "Decoding")["target"] == "<= 100"
     assert {"athcodec", "HDF5 gzip 4"} <= {row["reader"] for row in whole}
     assert all(row["error/bound"] <= 1 for row in whole if "ms" in row)
+
+
+# ---- rate and distortion ----
+
+ERRORS = np.geomspace(1e-6, 1e-2, 9)
+
+
+@pytest.fixture(scope="session")
+def bushy_file(bushy_clip, tmp_path_factory):
+    path = tmp_path_factory.mktemp("bench") / "bushy.h5"
+    athcodec.write_hdf5(path, bushy_clip)
+    return str(path)
+
+
+def power_law(size, exponent, errors):
+    return Curve.of(errors, size * errors**-exponent)
+
+
+def test_the_mean_saving_of_proportional_curves_is_their_proportion_over_the_common_range():
+    saving = mean_saving(power_law(100, 0.5, ERRORS), power_law(250, 0.5, np.geomspace(1e-5, 1e-1, 4)))
+    assert saving.percent == pytest.approx(60)
+    assert (saving.low, saving.high) == pytest.approx((1e-5, 1e-2))
+
+
+def test_the_mean_saving_of_curves_of_different_slope_is_that_of_the_mean_logarithms():
+    saving = mean_saving(power_law(100, 0.5, ERRORS), power_law(100, 0.7, ERRORS))
+    middle = np.log(1e-6 * 1e-2) / 2  # where the difference of two lines over log error has its mean
+    assert saving.percent == pytest.approx(100 * (1 - np.exp(0.2 * middle)))
+
+
+def test_curves_without_a_common_range_have_no_saving():
+    assert mean_saving(power_law(1, 0.5, ERRORS), power_law(1, 0.5, ERRORS * 1e6)) is None
+
+
+def test_the_size_at_an_error_is_interpolated_between_points_that_nothing_beats():
+    curve = Curve.of([1e-5, 1e-3, 1e-4], [1000.0, 10.0, 5000.0])  # the last: more bytes and a larger error
+    assert len(curve) == 2
+    assert curve.size_at(1e-4) == pytest.approx(100)
+    assert curve.size_at(1e-5) == pytest.approx(1000)
+    assert curve.size_at(0.9e-5) is None and curve.size_at(1.1e-3) is None
+
+
+def point(codec, kind, bound, size, kg, status="ok"):
+    return {"clip": "tree", "codec": codec, "kind": kind, "bound": bound, "status": status, "bytes": size,
+            "max": bound, "rms": bound / 2, "kg": kg}
+
+
+def test_ratios_take_the_best_of_each_kind_and_the_best_pca_at_equal_rms():
+    points = [point("athcodec", "athcodec", 1e-3, 100, 0.2), point("athcodec", "athcodec", 1e-4, 400, 0.05),
+              point("Global PCA", "baseline", 1e-3, 300, 0.4),
+              point("Global PCA", "baseline", 1e-4, 1200, 0.025),
+              point("plain", "baseline", 1e-3, 150, 0.1), point("zip", "program", 1e-3, 700, 0.1),
+              point("zop", "program", 1e-3, 10, 0.1, status="bound broken")]
+    rows = {(row["against"], row["at"]): row for row in compare.ratios(points, "athcodec")}
+    assert rows["program", "max 0.001"]["ratio"] == 7 and rows["program", "max 0.001"]["met"]
+    assert rows["baseline", "max 0.001"]["best of them"] == "plain"
+    assert rows["baseline", "max 0.001"]["ratio"] == 1.5 and not rows["baseline", "max 0.001"]["met"]
+    assert rows["baseline", "max 1e-05"]["ratio"] is None
+    pca = rows["PCA", "KG 0.1 %"]  # in the middle of both curves
+    assert (pca["bytes"], pca["its bytes"], pca["ratio"]) == (200, 600, pytest.approx(3))
+    assert rows["PCA", "KG 0.01 %"]["ratio"] is None
+
+
+def test_what_goes_wrong_with_a_codec_is_a_row_that_says_so(tmp_path, bushy_file):
+    names = ("Rounded", "TooCoarse", "Aborting", "Raising", "Remembering", "Absent")
+    text, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3",
+                             "--codecs", *(f"bench_codecs:{name}" for name in names))
+    points = {point["codec"]: point for point in result["points"]}
+    assert {name: point["status"] for name, point in points.items()} == {
+        "rounded": "ok", "too coarse": "bound broken", "aborting": "failed", "raising": "failed",
+        "remembering": "failed", "absent": "missing"}
+    assert 0 < points["rounded"]["max"] <= 1e-3 < points["too coarse"]["max"]
+    assert "sizes: got 3, expected 4" in points["raising"]["why"]
+    assert all(f"{point['status'].upper()}: {point['why']}" in text for name, point in points.items()
+               if name != "rounded")
+    assert result["broken"] == []  # of programs; a baseline that breaks its bound is our own mistake
+
+
+def test_a_baseline_that_breaks_its_bound_fails_the_run(tmp_path, bushy_file):
+    codec = "bench_codecs:TooCoarseBaseline"
+    text, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", codec, code=1)
+    assert len(result["broken"]) == 1 and "BROKEN: bushy, too coarse here at 0.001: bound broken" in text
+
+
+def test_a_codec_that_takes_too_long_is_stopped(tmp_path, bushy_file):
+    _, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", "bench_codecs:Sleeping",
+                          "--timeout", "2")
+    [point] = result["points"]
+    assert (point["status"], point["why"]) == ("too slow", "encode: longer than 2 s")
+
+
+def test_a_run_measures_only_what_is_not_there_yet(tmp_path, bushy_file):
+    def run(*bounds):
+        return run_bench(tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", *bounds,
+                         COUNT=str(count))[1]["points"]
+
+    count = tmp_path / "count"
+    first = run("1e-3")
+    encodes = count.read_text()
+    again = run("1e-3")
+    assert again == first and count.read_text() == encodes
+    more = run("1e-3", "1e-2")
+    assert [point["bound"] for point in more] == [1e-3, 1e-2]
+    assert more[0] == first[0] and count.read_text().startswith(encodes) and count.read_text() != encodes
+
+
+def test_a_codec_that_is_missing_does_not_wipe_out_what_was_measured_of_it(tmp_path, bushy_file):
+    words = ("rd", bushy_file, "--bounds", "1e-3", "--codecs", "bench_codecs:Uninstallable")
+    [point] = run_bench(tmp_path, *words)[1]["points"]
+    assert point["status"] == "ok"
+    assert run_bench(tmp_path, *words, UNINSTALLED="1")[1]["points"] == [point]
+
+
+def test_results_are_kept_as_they_come_and_are_no_longer_valid_when_code_has_changed(tmp_path):
+    file = tmp_path / "results.json"
+    store = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    store.add("points", {"clip": "tree", "bytes": 3, "depends": {"zip": "1.0"}})
+    later = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    assert later.find("points", {"clip": "tree"}, {"zip": "1.0"})["bytes"] == 3
+    assert later.find("points", {"clip": "tree"}, {"zip": "1.1"}) is None
+    assert later.find("points", {"clip": "bush"}, {"zip": "1.0"}) is None
+
+
+def test_a_growing_prefix_shows_what_the_table_of_the_file_says(tmp_path, bushy_file):
+    _, result = run_bench(tmp_path, "rd", bushy_file, "--codecs", "athcodec", "--bounds", "1e-3")
+    [curve], [cost], [whole] = result["curves"], result["costs"], result["points"]
+    steps = curve["steps"]
+    assert [row["bytes"] for row in steps] == sorted(row["bytes"] for row in steps)
+    assert steps[-1]["bytes"] == whole["bytes"] == cost["bytes"]
+    assert steps[-1]["max"] == pytest.approx(whole["max"]) and steps[0]["max"] > 1e-3
+    assert all(row["max"] == pytest.approx(row["table max"], rel=1e-5) for row in steps)
+    assert all(row["rms"] == pytest.approx(row["table rms"], rel=1e-5) for row in steps)
+    assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
+
+
+# ---- the whole of it ----
+
+
+def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):
+    limits = paper.thresholds_for(sample_clip, 97)
+    nodes = athcodec.build_ath(sample_clip, limits.epsilon, limits.eta, limits.xi, limits.lam).node_count
+    assert abs(nodes - 97) <= 5 and limits.eta == 9  # 15 of 200 frames
+
+
+def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
+    folder = tmp_path / "out"
+    _, result = run_bench(tmp_path, "quick", bushy_file, "--codecs", "athcodec", "bench_codecs:Rounded",
+                          "--bounds", "1e-2", "1e-3", "--out", str(folder))
+    steps = [row["step"] for row in result["tables"][0]["rows"]]
+    assert steps == ["rd", "decode", "paper", "scale", "report", "all"]
+    text = (folder / "report.md").read_text()
+    assert all(f"`python -m bench {verb} " in text for verb in ("rd", "decode", "paper", "scale"))
+    pictures = {f"bushy_{name}.png" for name in ("max", "rms", "progressive")}
+    if find_spec("matplotlib") is None:  # the extra `bench` has it
+        assert plots.MISSING in text and not list(folder.glob("*.png"))
+    else:
+        assert {file.name for file in folder.glob("*.png")} == pictures
+        assert all(f"]({name})" in text for name in pictures)
+    scale = json.loads((folder / "scale.json").read_text())
+    sizes, ratios = tables_of(scale)
+    copies = [row["encode ns"] for row in sizes if row["series"] == "copies"]
+    assert ratios[0]["ratio"] == pytest.approx(max(copies) / min(copies)) and len(copies) > 1
+
+
+def test_without_matplotlib_the_report_says_what_to_install(tmp_path, bushy_file):
+    run_bench(tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", "1e-3")
+    program = ("import sys; sys.modules['matplotlib'] = None; from bench.__main__ import main; "
+               f"sys.exit(main(['report', '--results', {str(tmp_path)!r}]))")
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, text=True, capture_output=True,
+                          timeout=60)
+    assert done.returncode == 0 and plots.MISSING in done.stdout
+    assert plots.MISSING in (tmp_path / "report.md").read_text()
+    assert 'pip install "athcodec[bench]"' in plots.MISSING

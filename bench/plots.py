@@ -1,0 +1,123 @@
+"""Pictures of rate and distortion, one set per clip, as PNG, by matplotlib (of the extra `bench` alone).
+
+Rate against the largest error, rate against the RMS error, and the growing prefix of one file. Both axes are
+logarithmic. Colours are those of Okabe and Ito ("Color universal design", 2008), which colour-blind people
+can tell apart, without the yellow, which is faint on white; every curve has a marker of its own too, so that
+a picture works in grey.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+from bench.compare import Point, is_pca, measured
+from bench.opponents import OURS
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7A7A7A")
+MARKERS = "svDP<>pXh8*d^"
+STYLES = {"baseline": "-", "program": "--"}
+MISSING = 'matplotlib is not installed, so there are no pictures: pip install "athcodec[bench]"'
+INCHES, DPI = (12, 6), 110
+ERRORS = {"max": "largest error / bounding-box diagonal", "rms": "RMS error / bounding-box diagonal"}
+
+
+class NoPlots(Exception):
+    """matplotlib is missing; the message says what to do."""
+
+
+def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path,
+         prefix: str = "") -> list[Path]:
+    """Writes the pictures of a clip and returns their files. Raises NoPlots."""
+    figure_of = _pyplot()
+    points = measured(point for point in contents["points"] if point["clip"] == clip)
+    pictures = {error: _rate_picture(figure_of, points, error, clip) for error in ERRORS if points}
+    for result in contents["curves"]:
+        if result["clip"] == clip:
+            pictures["progressive"] = _progressive_picture(figure_of, result, clip)
+    return [_save(figure, folder / file_name(prefix + clip, what)) for what, figure in pictures.items()]
+
+
+def _pyplot():
+    """A function that makes a figure and its axes, without a screen."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise NoPlots(MISSING) from None
+
+    def figure_of():
+        figure = Figure(figsize=INCHES, dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        return figure, figure.add_subplot()
+
+    return figure_of
+
+
+def file_name(clip: str, what: str) -> str:
+    return f"{re.sub(r'[^A-Za-z0-9._-]+', '_', clip)}_{what}.png"
+
+
+def _rate_picture(figure_of, points: list[Point], error: str, clip: str):
+    figure, axes = figure_of()
+    looks = zip(cycle(COLOURS[1:]), cycle(MARKERS))
+    for codec in dict.fromkeys(point["codec"] for point in points):
+        own = sorted((point for point in points if point["codec"] == codec), key=lambda point: point["bits"])
+        own = [point for point in own if point[error] > 0]
+        if not own:  # without any loss there is no place on a logarithmic axis
+            continue
+        look = _look(own[0], looks)
+        axes.plot([point["bits"] for point in own], [point[error] for point in own], label=codec, **look)
+    name = "rate against largest error" if error == "max" else "rate against RMS error"
+    _label(axes, f"{clip}: {name}", "bits per vertex and frame", ERRORS[error])
+    figure.legend(fontsize=8, loc="outside right upper")
+    return figure
+
+
+def _look(point: Point, looks) -> dict[str, Any]:
+    if point["kind"] == OURS:
+        return {"color": COLOURS[0], "marker": "o", "linewidth": 2.6, "zorder": 5}
+    colour, marker = next(looks)
+    style = ":" if is_pca(point) else STYLES[point["kind"]]
+    return {"color": colour, "marker": marker, "linestyle": style, "linewidth": 1.3, "markersize": 5}
+
+
+def _progressive_picture(figure_of, result: dict[str, Any], clip: str):
+    figure, axes = figure_of()
+    steps, single = result["steps"], result["single"]
+    for number, (error, name) in enumerate((("max", "largest error"), ("rms", "RMS error"))):
+        axes.plot([row["bytes"] for row in steps], [row[error] for row in steps], drawstyle="steps-post",
+                  color=COLOURS[number], marker="os"[number], linewidth=2,
+                  label=f"prefix of one file: {name}")
+        axes.plot([row["bytes"] for row in single], [row[error] for row in single], color=COLOURS[number],
+                  linestyle="--", marker="^v"[number], linewidth=1.2, label=f"files of their own: {name}")
+    for row in steps:
+        if row["segments"] == max(other["segments"] for other in steps):
+            axes.annotate(f"level {row['level']}", (row["bytes"], row["max"]), xytext=(5, 6),
+                          textcoords="offset points", fontsize=9)
+    _label(axes, f"{clip}: a growing prefix of one file, bound {result['bound']:g}", "bytes",
+           "error / bounding-box diagonal")
+    axes.margins(x=0.1)
+    axes.legend(fontsize=9, loc="best")
+    return figure
+
+
+def _label(axes, title: str, across: str, up: str) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter("{x:,g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_title(title)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    axes.grid(True, which="major", color="#dddddd", linewidth=0.8)
+
+
+def _save(figure, file: Path) -> Path:
+    figure.savefig(file, metadata={"Software": None})
+    return file

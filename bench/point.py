@@ -1,0 +1,112 @@
+"""Two processes of their own for rd.py: one encodes a clip with a codec, another decodes and measures.
+
+    python -m bench.point encode CODEC CLIP.h5 BOUND FILE
+    python -m bench.point decode CODEC CLIP.h5 BOUND FILE
+
+The second one has nothing of the first but the file, so that what it gives is in those bytes; it reads the
+clip only when it has decoded. Peak memory is that of the whole process. A codec that crashes takes only its
+own process with it. BOUND is a fraction of the bounding box's diagonal. Prints one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from bench.codecs import Source
+from bench.codecs.peer import CannotKeep
+from bench.opponents import chosen
+from bench.peak import peak_bytes
+
+ENCODES, QUICK_ENCODE = 3, 1.0  # an encoder that takes longer than these seconds runs once
+DECODES, DECODE_SECONDS = 7, 5.0  # fewer decodes, at least three, where they take longer than this together
+
+
+def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
+    [codec] = chosen([codec_name]).values()
+    with athcodec.read_hdf5(clip_path) as clip:
+        bound = rel_bound * Source(clip).diagonal
+        loaded = peak_bytes()
+        runs: list[float] = []
+        while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
+            source = _loaded(clip)  # a new one: codecs may keep with it what they have worked out
+            seconds, data = _timed(lambda: codec.encode(source, bound))
+            runs.append(seconds)
+    peak = peak_bytes()
+    file.write_bytes(data)
+    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "loaded_bytes": loaded,
+            "encode_peak_bytes": peak, "settings": _plain(codec.settings)}
+
+
+def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
+    [codec] = chosen([codec_name]).values()
+    data = file.read_bytes()
+    decoded = codec.decode(data)  # a warm-up that counts for memory alone
+    peak = peak_bytes()
+    runs: list[float] = []
+    while len(runs) < DECODES and (len(runs) < 3 or sum(runs) < DECODE_SECONDS):
+        seconds, decoded = _timed(lambda: codec.decode(data))
+        runs.append(seconds)
+    with athcodec.read_hdf5(clip_path) as clip:
+        result = _errors(Source(clip), decoded, rel_bound)
+        rate = bits_per_vertex_frame(len(data), clip.frame_count, clip.vertex_count)
+    return result | {"decode_s": median(runs), "decode_runs": len(runs), "decode_peak_bytes": peak,
+                     "bits": rate}
+
+
+def _loaded(clip: athcodec.MotionClip) -> Source:
+    source = Source(clip)
+    _ = source.positions, source.rest
+    return source
+
+
+def _timed(step: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = step()
+    return time.perf_counter() - start, result
+
+
+def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
+    """Errors over the diagonal, and in words what is wrong with them, if anything."""
+    shape = source.positions.shape
+    if getattr(decoded, "shape", None) != shape or decoded.dtype != np.float32:
+        is_array = isinstance(decoded, np.ndarray)
+        got = f"{decoded.dtype} {decoded.shape}" if is_array else type(decoded).__name__
+        return {"broken": f"got {got}; expected float32 {shape}"}
+    meter = ErrorMeter(source.clip.rest)
+    meter.add(source.positions, decoded)
+    errors = {"max": meter.max_error / source.diagonal, "rms": meter.rms_error / source.diagonal,
+              "kg": meter.kg_error, "motion": meter.motion_normalised_error}
+    bound = rel_bound * source.diagonal
+    if not meter.max_error <= bound:
+        errors["broken"] = f"got an error of {meter.max_error:.6g}; expected at most {bound:.6g}"
+    return errors
+
+
+def _plain(settings: Any) -> Any:
+    """Settings as JSON holds them."""
+    if isinstance(settings, dict):
+        return {str(name): _plain(value) for name, value in settings.items()}
+    if isinstance(settings, (list, tuple, np.ndarray)):
+        return [_plain(value) for value in settings]
+    if isinstance(settings, np.generic):
+        return settings.item()
+    return settings if isinstance(settings, (str, int, float, bool, type(None))) else str(settings)
+
+
+if __name__ == "__main__":
+    verb, name, clip, bound, target = sys.argv[1:]
+    try:
+        result = {"encode": encode, "decode": decode}[verb](name, clip, float(bound), Path(target))
+    except CannotKeep as error:
+        result = {"cannot": str(error)}
+    print(json.dumps(result))

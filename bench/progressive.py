@@ -1,0 +1,198 @@
+"""What a growing prefix of one .ath file shows, and what it costs that a file can be cut at all.
+
+The curve: after every level and segment of one file, the bytes so far and the error of what they show, where
+segments that have the next level already show it. Errors are measured on what athcodec decodes from just that
+many bytes; those that follow from the file's own table stand beside them. The yardstick are files of their
+own, each coded for a looser bound.
+
+The cost: the same clip coded without intermediate depths, with the encoder's own stages: the same settings,
+every stem's modes together in one stream per segment, no maps of nodes, a table of one level.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from dataclasses import replace
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from athcodec import container as ct
+from athcodec.ath import Thresholds, survey
+from athcodec.coding import Settings, Shape, Source, code_stems
+from athcodec.hierarchy import hierarchy_of
+from athcodec.metrics import ErrorMeter
+from athcodec.search import Search
+from athcodec.transform import DEFAULT_SEGMENT
+from bench.clips import Encoded, encoded
+
+TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
+ROUNDING = 1e-6  # the error table holds float32
+
+CURVE_NOTE = """
+Bytes of the file from its start; segments: how many of them show this level, the others the one before. Max
+and RMS over the diagonal, decoded from a file that ends there; 'table' is what the file itself says of it.
+Single file: bytes of a file of its own, coded for a bound that leaves the same largest error, on the straight
+line (log-log) between files coded for looser bounds; prefix/single is what one file for all distances costs.
+"""
+
+COST_NOTE = """
+Bytes of whole files. AFFINES: maps of nodes, which only a file that is cut needs. Early split: a leaf of the
+ATH that is one short stem has its first modes in the stream of its node's level and the rest one level
+deeper; the clip was coded again with each stem's modes together, levels otherwise kept, and this is what
+that saves. One stream: what is saved by coding all levels, unsplit, in one stream per segment. All three at
+the file's steps, with the best of its rotation factors and time bases for all levels (split and unsplit: or
+those of the file), corrections counted; below 0: nothing is saved. Table: entries for chunks and errors of
+the levels before the last. Without: the file less AFFINES, table and the better of the other two; cost: what
+the file has above that.
+"""
+
+
+# ---- the curve ----
+
+
+def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[str, Any]:
+    """{"steps": rows by growing prefix, "single": files of their own at looser bounds, "broken": lines}."""
+    with encoded(clip_path, rel_error) as result:
+        diagonal = _diagonal(result)
+        steps = _steps(result, diagonal)
+    single = []
+    for bound in (*(bound for bound in looser if bound > rel_error), rel_error):
+        with encoded(clip_path, bound) as result:
+            meter = _measured(result.clip, result.decoder, 0, result.clip.frame_count, None)
+            single.append({"bound": bound, "bytes": result.summary.bytes, "max": meter.max_error / diagonal,
+                           "rms": meter.rms_error / diagonal})
+    broken = [f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
+              f"the file's table says {row['table max']:.7g}"
+              for row in steps if row["max"] > row["table max"] * (1 + ROUNDING)]
+    return {"steps": steps, "single": single, "broken": broken}
+
+
+def _diagonal(result: Encoded) -> float:
+    return result.summary.max_error_bound / result.summary.relative_bound
+
+
+def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
+    decoder, clip = result.decoder, result.clip
+    whole = result.summary.path.read_bytes()
+    decoded: dict[int, ErrorMeter] = {}  # what each segment shows at best so far
+    level_of: dict[int, int] = {}
+    rows = []
+    for level, segment, end in _boundaries(decoder):
+        with athcodec.open(io.BytesIO(whole[:end])) as cut:
+            decoded[segment] = _measured(clip, cut, *decoder.segments[segment], level)
+        level_of[segment] = level
+        if len(level_of) == len(decoder.segments):
+            done = sum(shown == level for shown in level_of.values())
+            rows.append({"bytes": end, "level": level, "segments": done}
+                        | _together(decoded, decoder, diagonal)
+                        | _from_table(level_of, decoder, diagonal))
+    return rows
+
+
+def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
+    """(level, segment, bytes of the file until both are complete), in file order."""
+    ends: dict[tuple[int, int], int] = {}
+    for chunk in decoder.container.chunks:
+        if chunk.is_motion:
+            ends[chunk.level, chunk.segment] = chunk.offset + chunk.length
+    before, found = decoder.container.prelude_length, []
+    for level in range(decoder.level_count):
+        for segment in range(len(decoder.segments)):
+            before = ends.get((level, segment), before)
+            found.append((level, segment, before))
+    return found
+
+
+def _measured(clip: athcodec.MotionClip, decoder: athcodec.Decoder, start: int, stop: int,
+              depth: int | None) -> ErrorMeter:
+    meter = ErrorMeter()
+    for first, frames in decoder.blocks(depth, frames=slice(start, stop)):
+        meter.add(clip.block(first, first + len(frames)), frames)
+    return meter
+
+
+def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
+    parts = [(decoded[segment].max_error, decoded[segment].rms_error, stop - start)
+             for segment, (start, stop) in enumerate(decoder.segments)]
+    return dict(zip(("max", "rms"), _pooled(parts, diagonal), strict=True))
+
+
+def _from_table(level_of: dict[int, int], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
+    errors = decoder.container.errors
+    parts = [(*map(float, errors[level_of[segment], segment]), stop - start)
+             for segment, (start, stop) in enumerate(decoder.segments)]
+    return dict(zip(("table max", "table rms"), _pooled(parts, diagonal), strict=True))
+
+
+def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple[float, float]:
+    """Largest and RMS error over the diagonal from those of segments with so many frames."""
+    parts = list(parts)
+    squares = sum(rms**2 * frames for _, rms, frames in parts)
+    return (max(largest for largest, _, _ in parts) / diagonal,
+            sqrt(squares / sum(frames for _, _, frames in parts)) / diagonal)
+
+
+# ---- the cost ----
+
+
+def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
+    """One row: bytes of a file, what each thing that serves its levels takes, and bytes without them."""
+    with encoded(clip_path, rel_error) as result:
+        chunks, sizes = result.decoder.container.chunks, result.summary.chunk_bytes
+        levels, segments = result.decoder.level_count, len(result.decoder.segments)
+    again = _Again(clip_path, rel_error)
+    stored = again.streams(again.settings)
+    in_file = sizes.get("STEMS", 0) + sizes.get("CORRECTIONS", 0)
+    if stored != in_file:
+        raise RuntimeError(f"{clip_path.name}: got {stored} bytes of stems and corrections when coding "
+                           f"again; expected the {in_file} of the file")
+    uniform = again.of_one_level()
+    split = min(stored, *(again.streams(settings) for settings in uniform))
+    unsplit = min(again.streams(settings, split=False) for settings in (again.settings, *uniform))
+    merged = min(again.streams(settings, split=False, one_level=True) for settings in uniform)
+    table = (TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
+             + ERROR_ENTRY * (levels - 1) * segments)
+    affines, bytes_ = sizes.get("AFFINES", 0), result.summary.bytes
+    without = bytes_ - affines - table - (split - min(split, unsplit, merged))
+    return {"bytes": bytes_, "levels": levels, "AFFINES": affines, "table": table,
+            "early split": split - unsplit, "one stream": split - merged, "without": without,
+            "cost %": 100 * (bytes_ / without - 1)}
+
+
+def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
+    """Chunks that a file of one level would not have; its STEMS and CORRECTIONS stand at the last one."""
+    return chunk.kind == ct.AFFINES or (chunk.kind == ct.STEMS and chunk.level < last)
+
+
+class _Again:
+    """The clip in the encoder's own stages, at the settings that the encoder finds."""
+
+    def __init__(self, clip_path: Path, rel_error: float) -> None:
+        with athcodec.read_hdf5(clip_path) as clip:
+            hierarchy = hierarchy_of(clip)
+            seen = survey(clip, hierarchy)
+            bound = rel_error * seen.diagonal
+            self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
+            self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
+            self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
+            self.settings = Search(self._source, self._ath, bound, "default", lambda stage, done: None).best()
+
+    def of_one_level(self) -> list[Settings]:
+        """Settings that a single stream could have: what the levels have now, the same for all of them."""
+        levels = len(self.settings.omega)
+        pairs = sorted(set(zip(self.settings.omega, self.settings.learned, strict=True)))
+        return [replace(self.settings, omega=(omega,) * levels, learned=(learned,) * levels)
+                for omega, learned in pairs]
+
+    def streams(self, settings: Settings, split: bool = True, one_level: bool = False) -> int:
+        """Bytes of all stems and corrections."""
+        shape = Shape(self._source, self._ath, settings)
+        pieces = shape.plan.pieces  # the memory that the core reads
+        if not split:
+            pieces["low_level"], pieces["low_modes"] = -1, 0
+        if one_level:
+            pieces["level"] = shape.plan.level_count - 1
+        return sum(code_stems(shape, settings, positions).bytes for positions in self._positions)

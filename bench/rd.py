@@ -1,0 +1,340 @@
+"""Rate and distortion of athcodec beside baselines and programs: every codec, at every bound, on every clip.
+
+Each codec makes the smallest file it can within the bound; one process encodes, another decodes the bytes and
+measures (point.py). A codec that is missing, breaks the bound, crashes or takes too long is a row that says
+so. With --json the results are kept as they come: a run that was stopped goes on where it was, and what is
+there from the same clip, code and versions is not measured again. Then what follows from the points: mean
+savings and ratios (compare.py), the growing prefix of one file and what it costs (progressive.py).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from bench import compare, data, progressive
+from bench.clips import REL_ERROR
+from bench.codecs import Codec
+from bench.codecs.programs import lossless
+from bench.curves import Curve
+from bench.opponents import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
+from bench.store import Store
+from bench.suite import SUITES, Case, cases, digest
+from bench.tables import cpu_model, environment, table
+
+ROOT = Path(__file__).resolve().parent.parent
+BOUNDS = {"quick": (1e-3, 1e-4, 1e-5), "full": (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)}
+LOOSER = {"quick": (0.3, 0.03, 3e-3), "full": (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)}
+COST_BOUNDS = {"quick": (1e-4,), "full": (1e-3, 1e-4, 1e-5)}
+TIMEOUT = 3600
+KEYS = {"clips": ("clip",), "points": ("clip", "codec", "bound"), "curves": ("clip", "bound"),
+        "costs": ("clip", "bound")}
+OK, MISSING, BROKEN, FAILED, SLOW = "ok", "missing", "bound broken", "failed", "too slow"
+CANNOT = "cannot keep the bound"
+ABOUT = ("frames", "fps", "vertices", "branches")
+
+POINTS_NOTE = """
+Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames; each
+codec tuned itself for the fewest bytes within it, everything that decoding needs counted. Bits: per vertex
+and frame. Max and RMS over the diagonal, KG in per cent, motion: RMS error over the RMS distance from the
+rest pose, all measured on what another process decoded from the bytes. Encode: seconds with all tuning,
+median of 3 runs, or a single run ('runs' 1) of a codec that takes more than a second. Decode: median of 3
+to 7 runs after one that does not count. MB (1,000,000 bytes): peak memory of the whole process, Python and
+imports included; when encoding with the clip in memory.
+"""
+
+SAVINGS_NOTE = """
+Mean saving of athcodec in bytes at the same error (Bjontegaard), over the errors that both codecs cover;
+positive: athcodec is smaller.
+"""
+
+RATIOS_NOTE = """
+Bytes of the best of them over athcodec's. At a bound: both at their smallest within that bound. At a
+Karni-Gotsman error, that is at equal RMS: sizes interpolated (log-log) between the points above, which all
+codecs tuned for the bound. PCA: every codec that stores a basis learned from the clip.
+"""
+
+OVER_CLIPS_NOTE = "Ratios as above, over the clips that have them."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[],
+                        help="files CLIP.h5, or names of clips of this benchmark; by default the suite's")
+    parser.add_argument("--suite", choices=SUITES, default="quick",
+                        help="which clips and bounds, where none are named (default %(default)s)")
+    parser.add_argument("--bounds", type=float, nargs="+", metavar="FRACTION",
+                        help="error bounds over the bounding box's diagonal")
+    parser.add_argument("--codecs", nargs="+", metavar="NAME", default=[],
+                        help="codecs to measure (default: all), or MODULE:NAME for one of your own")
+    parser.add_argument("--lossless", action="store_true",
+                        help="measure the programs that can give every bit back too, once per clip")
+    parser.add_argument("--timeout", type=float, default=TIMEOUT, metavar="SECONDS",
+                        help="for one encoding or decoding (default %(default)s)")
+    parser.add_argument("--again", action="store_true", help="run again what failed or was too slow")
+    parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    if args.list:
+        return _listing(args)
+    store = Store(args.json, environment(args.argv), KEYS)
+    codecs, bounds = _codecs(args), tuple(args.bounds or BOUNDS[args.suite])
+    clips = cases(args.clips, args.suite)
+    for case in clips:
+        about = _about(store, case)
+        if case.path is None:
+            continue
+        for name, codec in codecs.items():
+            for bound in (0.0,) if is_lossless(codec) else bounds:
+                _point(_Job(case, name, codec, bound, about["digest"], args.timeout), store, args.again)
+        if any(codec.kind == OURS for codec in codecs.values()):
+            _levels(case, about["digest"], bounds, args.suite, store)
+    return summary(store.contents(), [case.name for case in clips], bounds)
+
+
+def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
+    codecs = chosen(args.codecs)
+    return codecs | ({codec.name: codec for codec in lossless()} if args.lossless else {})
+
+
+def _listing(args: argparse.Namespace) -> dict[str, Any]:
+    args.json = None  # a list is no result: what is in the file stays
+    codecs = [{"codec": codec.name, "kind": codec.kind, "can run": codec.missing() or "yes"}
+              for codec in all_codecs()]
+    clips = [{"clip": name, "what": data.describe(name)} for name in data.SUITES[args.suite]]
+    return {"tables": [table("Codecs", codecs), table(f"Clips, suite {args.suite}", clips)], "broken": []}
+
+
+def _about(store: Store, case: Case) -> dict[str, Any]:
+    """What a clip is, with a digest of its content."""
+    if case.path is None:
+        return store.add("clips", {"clip": case.name, "what": case.description})
+    with athcodec.read_hdf5(case.path) as clip:
+        row = {"clip": case.name, "what": case.description, "frames": clip.frame_count, "fps": clip.fps,
+               "vertices": clip.vertex_count, "branches": clip.branch_count,
+               "bytes": 12 * clip.frame_count * clip.vertex_count, "digest": digest(case.path)}
+    return store.add("clips", row)
+
+
+# ---- points ----
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One codec at one bound on one clip; `name` is what finds the codec in another process."""
+
+    case: Case
+    name: str
+    codec: Codec
+    bound: float
+    digest: str
+    timeout: float
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        return {"clip": self.case.name, "codec": self.codec.name, "kind": self.codec.kind,
+                "bound": self.bound}
+
+    @property
+    def depends(self) -> dict[str, str]:
+        return {"clip": self.digest} | fingerprint(self.codec)
+
+
+def _point(job: _Job, store: Store, again: bool) -> None:
+    known = store.find("points", job.identity, job.depends)
+    if known is not None and known["status"] != MISSING and (known["status"] == OK or not again):
+        return
+    why = job.codec.missing()
+    if why and _was_measured(job, store):
+        return
+    result = {"status": MISSING, "why": why} if why else _measure(job)
+    _say(job, result)
+    store.add("points", job.identity | result | {"cpu": cpu_model(), "depends": job.depends})
+
+
+def _was_measured(job: _Job, store: Store) -> bool:
+    """Whether there is a result of this clip from when, or where, the codec could run."""
+    known = store.find("points", job.identity)
+    return known is not None and known["status"] == OK and known["depends"]["clip"] == job.digest
+
+
+def _measure(job: _Job) -> dict[str, Any]:
+    figures: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for step in ("encode", "decode"):
+            words = (step, job.name, job.case.path.resolve(), repr(job.bound), Path(folder) / "data")
+            try:
+                figures |= _process(map(str, words), job.timeout)
+            except subprocess.TimeoutExpired:
+                return figures | {"status": SLOW, "why": f"{step}: longer than {job.timeout:g} s"}
+            except _Failed as error:
+                return figures | {"status": FAILED, "why": f"{step}: {error}"}
+            if "cannot" in figures:
+                return {"status": CANNOT, "why": figures["cannot"]}
+    why = figures.pop("broken", None)
+    return figures | ({"status": BROKEN, "why": why} if why else {"status": OK})
+
+
+class _Failed(Exception):
+    """A process of point.py ended without a result."""
+
+
+def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
+    command = [sys.executable, "-m", "bench.point", *words]
+    with subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          start_new_session=True) as process:
+        try:
+            out, errors = process.communicate(timeout=timeout)
+        except BaseException:  # a program that the codec has started must not go on either
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    if process.returncode < 0:
+        raise _Failed(f"ended by signal {-process.returncode}")
+    if process.returncode:
+        raise _Failed((errors.strip().splitlines() or [f"exit code {process.returncode}"])[-1])
+    if not out.strip():
+        raise _Failed("got no result; expected a line of JSON")
+    return json.loads(out.splitlines()[-1])
+
+
+def _say(job: _Job, result: dict[str, Any]) -> None:
+    """A line of progress."""
+    end = f"{result['bytes']:,} bytes" if result["status"] == OK else f"{result['status']}: {result['why']}"
+    print(f"{job.case.name}, {job.codec.name}, {job.bound:g}: {end}", file=sys.stderr, flush=True)
+
+
+# ---- levels ----
+
+
+def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str, store: Store) -> None:
+    """The progressive curve at the default bound, or the one nearest to it, and the cost of the levels."""
+    depends = {"clip": clip_digest, "looser": str(LOOSER[suite])} | fingerprint_of_athcodec()
+    shown = min(bounds, key=lambda bound: (abs(bound / REL_ERROR - 1), bound))
+    costs = [bound for bound in COST_BOUNDS[suite] if bound in bounds] or [shown]
+    wanted = [("curves", shown, lambda path, bound: progressive.curve(path, bound, LOOSER[suite]))]
+    wanted += [("costs", bound, progressive.cost) for bound in costs]
+    for name, bound, measure in wanted:
+        identity = {"clip": case.name, "bound": bound}
+        if store.find(name, identity, depends) is None:
+            store.add(name, identity | measure(case.path, bound) | {"depends": depends})
+
+
+# ---- tables ----
+
+
+def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None,
+            ) -> dict[str, Any]:
+    """All results, and tables of those of these clips and bounds (None: all bounds)."""
+    tables = [_clips_table([row for row in contents["clips"] if row["clip"] in clips])]
+    points = [point for point in contents["points"]
+              if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))]
+    all_ratios: list[dict[str, Any]] = []
+    for clip in clips:
+        own = [point for point in points if point["clip"] == clip]
+        if not own:
+            continue
+        tables.append(table(title(clip), [_row(point) for point in own], POINTS_NOTE, _processors(own)))
+        for ours in compare.our_names(own):
+            rows = compare.ratios(own, ours)
+            all_ratios += [{"clip": clip, "codec": ours} | row for row in rows]
+            tables.append(table(f"Mean saving: {clip}, {ours}", compare.savings(own, ours), SAVINGS_NOTE))
+            tables.append(table(f"Ratios: {clip}, {ours}", rows, RATIOS_NOTE, *_absent(own)))
+        tables += _level_tables(contents, clip)
+    if len(clips) > 1:
+        tables.append(table("Ratios over all clips", compare.over_clips(all_ratios), OVER_CLIPS_NOTE))
+    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))} | contents
+
+
+def title(clip: str) -> str:
+    """Of the table of a clip's points."""
+    return f"Rate and distortion: {clip}"
+
+
+def _clips_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    return table("Clips", [{"clip": row["clip"]} | {name: row.get(name) for name in ABOUT}
+                           | {"float32 MB": row["bytes"] / 1e6 if "bytes" in row else None}
+                           | {"what": row["what"]} for row in rows])
+
+
+def _row(point: dict[str, Any]) -> dict[str, Any]:
+    row = {"codec": point["codec"], "bound": f"{point['bound']:g}"}
+    if "bytes" in point:
+        row |= {"bytes": point["bytes"], "encode s": point["encode_s"], "runs": point["encode_runs"],
+                "encode MB": point["encode_peak_bytes"] / 1e6}
+    if "decode_s" in point:
+        row |= {"decode s": point["decode_s"], "decode MB": point["decode_peak_bytes"] / 1e6,
+                "bits": point["bits"]}
+    if "max" in point:
+        row |= {"max": point["max"], "RMS": point["rms"], "KG %": point["kg"], "motion": point["motion"]}
+    if point["status"] == OK:
+        return _ordered(row | {"settings": _words(point["settings"])})
+    return _ordered(row | {"settings": f"{point['status'].upper()}: {point['why']}".replace("|", "/")})
+
+
+COLUMNS = ("codec", "bound", "bytes", "bits", "max", "RMS", "KG %", "motion", "encode s", "runs", "decode s",
+           "encode MB", "decode MB", "settings")
+
+
+def _ordered(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: row.get(name) for name in COLUMNS}
+
+
+def _words(settings: Any) -> str:
+    """Settings on one line."""
+    if isinstance(settings, dict):
+        return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
+    if isinstance(settings, list):
+        return " ".join(map(_words, settings))
+    return f"{settings:.4g}" if isinstance(settings, float) else str(settings).replace("|", "/")
+
+
+def _processors(points: list[dict[str, Any]]) -> str:
+    names = dict.fromkeys(point["cpu"] for point in points)
+    return f"Processor: {'; '.join(names)}."
+
+
+def _absent(points: list[dict[str, Any]]) -> list[str]:
+    """Who could have been the best, and did not take part: not one point of theirs was measured."""
+    present = {point["codec"] for point in compare.measured(points)}
+    absent = {point["codec"]: point["status"] for point in points if point["codec"] not in present}
+    names = ", ".join(f"{name} ({why})" for name, why in absent.items())
+    return [f"Not among them: {names}."] if absent else []
+
+
+def _level_tables(contents: dict[str, list[dict[str, Any]]], clip: str) -> Iterator[dict[str, Any]]:
+    for result in contents["curves"]:
+        if result["clip"] == clip:
+            single = Curve.of([row["max"] for row in result["single"]],
+                                      [row["bytes"] for row in result["single"]])
+            rows = [_step_row(row, single.size_at(row["max"])) for row in result["steps"]]
+            yield table(f"A growing prefix of one file: {clip}, bound {result['bound']:g}", rows,
+                        progressive.CURVE_NOTE)
+    costs = [{"bound": f"{row['bound']:g}"} | {name: value for name, value in row.items()
+                                               if name not in ("clip", "bound", "depends", "command")}
+             for row in contents["costs"] if row["clip"] == clip]
+    if costs:
+        yield table(f"What levels cost: {clip}", costs, progressive.COST_NOTE)
+
+
+def _step_row(row: dict[str, Any], single: float | None) -> dict[str, Any]:
+    return row | {"single file": single and round(single), "prefix/single": single and row["bytes"] / single}
+
+
+def _broken(points: list[dict[str, Any]], curves: list[dict[str, Any]]) -> Iterator[str]:
+    """Lines for what must not happen to code of this project; of a program the row alone says it."""
+    for point in points:
+        if point["status"] in (BROKEN, FAILED) and point["kind"] != "program":
+            yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: "
+                   f"{point['why']}")
+    for result in curves:
+        yield from result["broken"]

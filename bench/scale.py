@@ -1,0 +1,199 @@
+"""Seconds per vertex and frame to encode and decode, over clips of more and more vertices or frames.
+
+They should not depend on the size: the target is a ratio of at most 1.5 between the dearest and the cheapest
+clip of a series. Two series are made from one clip: copies of the plant as one clip, each some frames ahead
+of the one before, so that no two move alike, all in one place, so that the bound stays the same; and a few of
+them played forwards and backwards for longer. That keeps alike what a vertex and a frame hold, which plants
+of different sizes do not; the suite `full` has series of such plants too, where they can be made. File to
+file and file to array, in one process, files in the page cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec.exporters import Hdf5Writer
+from bench.clips import add_rel_error
+from bench.decode import compile_program
+from bench.suite import cases
+from bench.tables import table
+
+TARGET = 1.5
+ENCODES, DECODES = 3, 5
+FRAMES_AHEAD = 7
+REAL = {"vertices, 200 frames": ("mj_1k_200f", "mj_4k_200f", "mj_8k_200f", "refined_50k_200f"),
+        "frames, 1k vertices": ("mj_1k_200f", "mj_1k_1200f"),
+        "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f"),
+        "frames, 8k vertices": ("mj_8k_200f", "mj_8k_1200f")}
+SIZES = {"quick": ((1, 3), 120, (120, 240), 1),  # copies, their frames; frames, their copies
+         "full": ((1, 2, 5, 10, 20, 50), 200, (200, 400, 800, 1200), 8)}
+
+NOTE = """
+Encode: from an HDF5 file to a file, default effort, no attributes, median of {encodes} runs. Decode: opening
+and all positions as one float32 array, in Python, median of {decodes} after one that does not count. ns:
+nanoseconds per vertex and frame. C: the decoder alone, its file opened and its bases built, median of as many
+processes (decode.py); what opening takes is part of 'decode' and the more of it the smaller a clip is.
+Plants: copies in the clip.
+"""
+
+RATIO_NOTE = "The largest figure of a series over its smallest."
+
+
+@dataclass(frozen=True)
+class _Clip:
+    """A clip of a series."""
+
+    series: str
+    name: str
+    path: Path
+    plants: int = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[],
+                        help="a series of your own: files CLIP.h5, or names of clips of this benchmark")
+    parser.add_argument("--suite", choices=tuple(SIZES), default="quick",
+                        help="how far the series go that are made here (default %(default)s)")
+    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
+                        help="what they are made of (default: the sample)")
+    for name, count in (("encodes", ENCODES), ("decodes", DECODES)):
+        parser.add_argument(f"--{name}", type=int, default=count, metavar="N",
+                            help="runs that medians are of (default %(default)s)")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        program = compile_program(Path(folder))
+        for clip in _series(args, Path(folder)):
+            rows.append(_row(clip, Path(folder) / "clip.ath", args, program))
+            if clip.path.parent == Path(folder):
+                clip.path.unlink()
+    note = NOTE.format(encodes=args.encodes, decodes=args.decodes)
+    return {"tables": [table(f"Time by size, bound {args.rel_error:g}", rows, note),
+                       table("Largest over smallest", list(_ratios(rows)), RATIO_NOTE)], "broken": []}
+
+
+def _row(clip: _Clip, file: Path, args: argparse.Namespace, program: Path) -> dict[str, Any]:
+    encode = _encode_seconds(clip.path, file, args.rel_error, args.encodes)
+    decode, in_c = _decode_seconds(file, args.decodes), _c_seconds(file, program, args.decodes)
+    with athcodec.open(file) as decoder:
+        frames, vertices, branches = decoder.frame_count, decoder.vertex_count, decoder.branch_count
+        segments = len(decoder.segments)
+    row = {"series": clip.series, "clip": clip.name, "plants": clip.plants, "vertices": vertices,
+           "branches": branches, "frames": frames, "segments": segments, "bytes": file.stat().st_size}
+    seconds = {"encode": encode, "decode": decode, "decode, C": in_c}
+    return (row | {f"{what} s": value for what, value in seconds.items()}
+            | {f"{what} ns": 1e9 * value / (frames * vertices) for what, value in seconds.items()})
+
+
+def _encode_seconds(path: Path, file: Path, rel_error: float, count: int) -> float:
+    runs = []
+    for _ in range(count):
+        start = time.perf_counter()
+        with athcodec.read_hdf5(path) as clip:
+            athcodec.encode(clip, file, rel_error=rel_error, attributes="none")
+        runs.append(time.perf_counter() - start)
+    return median(runs)
+
+
+def _decode_seconds(file: Path, count: int) -> float:
+    runs = []
+    for _ in range(count + 1):
+        start = time.perf_counter()
+        with athcodec.open(file) as decoder:
+            decoder.positions()
+        runs.append(time.perf_counter() - start)
+    return median(runs[1:])
+
+
+def _c_seconds(file: Path, program: Path, count: int) -> float:
+    command = [str(program), str(file), "once"]
+    runs = [json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)["decode_ms"]
+            for _ in range(count)]
+    return median(runs) / 1e3
+
+
+def _ratios(rows: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    for series in dict.fromkeys(row["series"] for row in rows):
+        own = [row for row in rows if row["series"] == series]
+        for what in ("encode", "decode", "decode, C"):
+            figures = [row[f"{what} ns"] for row in own]
+            ratio = max(figures) / min(figures)
+            yield {"series": series, "what": what, "clips": len(own), "least ns": min(figures),
+                   "most ns": max(figures), "ratio": ratio, "target": TARGET, "met": ratio <= TARGET}
+
+
+# ---- the clips ----
+
+
+def _series(args: argparse.Namespace, folder: Path) -> Iterator[_Clip]:
+    """Given clips, or those made from one; a made clip is written when its turn comes."""
+    if args.clips:
+        yield from _clips("given", args.clips)
+        return
+    stands, stand_frames, lengths, plants = SIZES[args.suite]
+    with _stand(args.of) as stand:
+        for count in stands:
+            yield stand.clip("copies", folder, count, stand_frames)
+        for frames in lengths:
+            yield stand.clip("repeated frames", folder, plants, frames)
+    if args.suite == "full":
+        for series, names in REAL.items():
+            yield from _clips(series, names)
+
+
+def _clips(series: str, words: Iterable[str]) -> Iterator[_Clip]:
+    for case in cases(words, "full"):
+        if case.path:
+            yield _Clip(series, case.name, case.path)
+        else:
+            print(f"{case.name}: {case.description}", file=sys.stderr)
+
+
+@contextmanager
+def _stand(path: Path) -> Iterator[_Stand]:
+    with athcodec.read_hdf5(path) as clip:
+        yield _Stand(clip, path.stem)
+
+
+class _Stand:
+    """Copies of one plant, all in one place, and its motion for as many frames as wanted."""
+
+    def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
+        self._clip, self._name = clip, name
+        self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
+
+    def clip(self, series: str, folder: Path, plants: int, frames: int) -> _Clip:
+        path, source = folder / f"{plants}x{frames}.h5", self._clip
+        parent, moved = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
+        index = None if source.stem_index is None else np.tile(source.stem_index, plants)
+        with Hdf5Writer(path, time=np.arange(frames) / source.fps,
+                        vertex_branch=(source.vertex_branch + moved).ravel(),
+                        branch_parent=np.where(parent < 0, -1, parent + moved).ravel(),
+                        rest=np.tile(source.rest.astype(np.float32), (plants, 1)), stem_index=index,
+                        metadata=source.metadata) as writer:
+            for frame in range(frames):
+                writer.add(self._moved(frame, plants).reshape(1, -1, 3))
+        return _Clip(series, f"{self._name} x {plants}", path, plants)
+
+    def _moved(self, frame: int, plants: int) -> np.ndarray:
+        """(plants, N, 3): forwards to the last frame and backwards again, each plant further on."""
+        last = self._clip.frame_count - 1
+        at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
+        return self._positions[np.where(at > last, 2 * last - at, at)]

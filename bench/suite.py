@@ -1,0 +1,51 @@
+"""The clips of a run: files given on the command line, clips of data.py by name, or a whole suite of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import athcodec
+from bench import data
+from bench.trees.simulate import MissingEngine
+
+SUITES = tuple(data.SUITES)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A clip that takes part: its name in results, its file (None: it cannot be made), and what it is."""
+
+    name: str
+    path: Path | None
+    description: str = ""
+
+
+def cases(words: Iterable[str], suite: str) -> list[Case]:
+    """The clips named, or those of the suite. Raises SystemExit for a name that there is not."""
+    return [_case(word) for word in list(words) or data.SUITES[suite]]
+
+
+def _case(word: str) -> Case:
+    if Path(word).is_file():
+        return Case(Path(word).stem, Path(word), "given on the command line")
+    if word not in (data.SAMPLE, *data.RECIPES):
+        names = ", ".join([data.SAMPLE, *data.RECIPES])
+        raise SystemExit(f"clip: got {word!r}; expected an HDF5 file or one of {names}")
+    try:
+        return Case(word, Path(data.path_of(word)), data.describe(word))
+    except MissingEngine as error:
+        return Case(word, None, f"{data.describe(word)}: MISSING: {error}")
+
+
+def digest(path: Path) -> str:
+    """Of positions, rest pose and branches: what a codec sees of a clip."""
+    total = hashlib.sha256()
+    with athcodec.read_hdf5(path) as clip:
+        for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
+            total.update(array.tobytes())
+        for _, frames in clip.blocks():
+            total.update(frames.tobytes())
+    return total.hexdigest()[:12]

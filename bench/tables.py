@@ -1,0 +1,99 @@
+"""Results as aligned Markdown tables, and what is said about the machine that they come from.
+
+A verb's result is a dictionary that JSON can hold: "tables", each {"title", "rows", "notes"} with rows as
+dictionaries of unrounded figures by column, and "broken", one line for every promise that was not kept.
+Nothing is measured here.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shlex
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+DISTRIBUTIONS = ("athcodec", "numpy", "h5py", "zstandard")
+MISSING = "-"
+
+
+def table(title: str, rows: list[dict[str, Any]], *notes: str) -> dict[str, Any]:
+    """A table of a result; `notes` are printed below it, one paragraph each."""
+    return {"title": title, "rows": rows, "notes": [" ".join(note.split()) for note in notes]}
+
+
+def environment(argv: Sequence[str]) -> dict[str, Any]:
+    """The command (paths by their last part only), versions and machine."""
+    words = [Path(word).name if os.sep in word else word for word in argv]
+    versions = {"python": platform.python_version()} | {name: version(name) for name in DISTRIBUTIONS}
+    system = f"{platform.system()} {platform.machine()}"
+    machine = {"cpu": cpu_model(), "cores": os.cpu_count(), "system": system}
+    if hasattr(os, "getloadavg"):
+        machine["load_before"] = round(os.getloadavg()[0], 2)
+    command = shlex.join(["python", "-m", "bench", *words])
+    return {"command": command, "versions": versions, "machine": machine}
+
+
+def cpu_model() -> str:
+    """Of the first processor, as the system names it."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or "unknown"
+
+
+def write_json(result: dict[str, Any], file: Path) -> None:
+    file.write_text(json.dumps(result, indent=1) + "\n")
+
+
+def as_text(result: dict[str, Any], above: Mapping[str, str] | None = None) -> str:
+    """What a verb prints: tables (with text `above` those of some titles), broken promises, machine.
+
+    Notes that several tables have in common stand below the first one.
+    """
+    parts, said = [], set()
+    for part in result["tables"]:
+        notes = [note for note in part["notes"] if note not in said]
+        said.update(notes)
+        parts.append((above or {}).get(part["title"], "") + _table_text(part | {"notes": notes}))
+    parts += [f"BROKEN: {line}" for line in result["broken"]]
+    parts.append("; ".join([_pairs(result["machine"]), _pairs(result["versions"])]))
+    return "\n\n".join([f"`{result['command']}`", *parts])
+
+
+def _pairs(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in values.items())
+
+
+def _table_text(part: dict[str, Any]) -> str:
+    rows = part["rows"]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = [_column(name, [row.get(name) for row in rows]) for name in names]
+    lines = ["| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True)]
+    return "\n".join([f"### {part['title']}", "", *lines, *(f"\n{note}" for note in part["notes"])])
+
+
+def _column(name: str, values: list[Any]) -> list[str]:
+    """Header, rule and cells of one column, all of one width; numbers to the right."""
+    cells = [_cell(value) for value in values]
+    width = max(3, *map(len, [name, *cells]))
+    if all(isinstance(value, str) for value in values):
+        return [name.ljust(width), "-" * width, *(cell.ljust(width) for cell in cells)]
+    return [name.rjust(width), "-" * (width - 1) + ":", *(cell.rjust(width) for cell in cells)]
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return MISSING
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
+    if isinstance(value, (list, tuple)):
+        return " ".join(str(int(item)) if isinstance(item, bool) else _cell(item) for item in value)
+    return str(value)
