@@ -53,7 +53,6 @@ class Lengyel(Baseline):
             "dead_zone": DEAD_ZONES,
             "pose": Ladder.geometric(0.05, 2, 0.25),
             "first": Choice(("tracks", "shapes")),
-            "basis_of": Choice(("coded", "exact")),
         }
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
@@ -79,14 +78,16 @@ class Lengyel(Baseline):
         )
         residual = positions - place(_write_tracks(writer, exact, track_step, settings))
         step = writer.single(settings["step"] * bound)
-        if settings["basis_of"] == "coded":
-            spectrum = principal(trajectories.rows(residual))
-        else:  # faster: known from earlier trials
-            spectrum = memo(
-                source,
-                ("left", rigid, depth, settings["pose_of"], settings["joint"]),
-                lambda: principal(trajectories.rows(positions - place(exact))),
-            )
+        # what another trial left at about this step is near enough, and saves most of the time
+        near = (
+            rigid,
+            depth,
+            settings["joint"],
+            settings["pose_of"],
+            settings["learned"],
+            round(2 * np.log2(track_step)),
+        )
+        spectrum = memo(source, ("left", *near), lambda: principal(trajectories.rows(residual)))
         write_group(writer, residual, order, spectrum, step, settings, trajectories)
         return order
 

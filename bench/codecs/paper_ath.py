@@ -4,8 +4,8 @@ Song, Yang and Peng, "Hierarchical approximation of plant motion", Journal of Im
 sections 2 to 4: an independent least-squares affine map per node and frame (eq. 2), residuals in the space of
 the base pose (eq. 3) on the deepest nodes, and a pruned hierarchy (TAM). Every node has its maps, and so has
 the stem of every inner node, which the paper leaves open; entries are integers over the range of their kind,
-of 16 bits, or of 12 or 20 where that is smaller. The paper says nothing of coding: here maps and residuals may be
-differences in time, residuals also along the stems, and how far TAM prunes is searched.
+of 16 bits, or of 12 or 20 where that is smaller. The paper says nothing of coding: here maps and residuals
+may be differences in time, residuals also along the stems, and how far TAM prunes is searched.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class PaperAth(Baseline):
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return {
             "bits": BITS,
-            "tolerance": Ladder.geometric(0.5, 512, 4, 1),
+            "tolerance": Choice((1, 2, 4, 8, 16, 32, 64, 128, 512, 4096, 1e6), 4),
             "maps_in_time": Choice((0, 1, 2), 1),
             "in_time": Choice((0, 1, 2), 1),
             "along": Choice((0, 1, 2)),
