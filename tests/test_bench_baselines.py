@@ -14,7 +14,7 @@ import pytest
 from athcodec.clip import MotionClip
 from bench.codecs import Source, check
 from bench.codecs.baselines import BASELINES
-from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, compiler, read_varint, varint
+from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, read_varint, varint
 from bench.codecs.lengyel import Parts, _rotation_vectors, _rotations
 from bench.codecs.ours import Athcodec
 from bench.codecs.tree import VertexOrder, differences, sums, vertex_order
@@ -23,8 +23,6 @@ from bench.codecs.tuned import Choice, Ladder, Search
 ROOT = Path(__file__).resolve().parent.parent
 BOUND = 3e-4  # over the diagonal
 CODERS = [RangeCoder(), Zstd()]
-
-pytestmark = pytest.mark.skipif(compiler() is None, reason="needs a C compiler")
 
 
 @pytest.fixture(autouse=True)
