@@ -16,6 +16,7 @@ from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.coder import Reader, Writer
 
+KEPT = 6  # what trials go back to, without filling the memory
 ORDERS = ("source", "hierarchy")
 
 
@@ -83,11 +84,12 @@ def read_order(reader: Reader) -> VertexOrder:
 
 
 def memo(source: Source, key: tuple, make):
-    """What `make` gives, computed once per source."""
-    known = source.__dict__.setdefault("_known", {})
-    if key not in known:
-        known[key] = make()
-    return known[key]
+    """What `make` gives, kept with the source; of each kind, key[0], only the KEPT that were used last."""
+    kind = source.__dict__.setdefault("_known", {}).setdefault(key[0], {})
+    kind[key] = kind.pop(key) if key in kind else make()
+    if len(kind) > KEPT:
+        del kind[next(iter(kind))]
+    return kind[key]
 
 
 def ordered(source: Source, order: VertexOrder) -> np.ndarray:
