@@ -102,15 +102,18 @@ class Shape:
             head.exact, head.stream = True, entropy.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
         else:
-            head.stream, decoded = entropy.encode_rest(branches, settings.rest_step, source.rest)
+            head.stream, decoded = entropy.encode_rest(branches, head.step, source.rest)
+            while np.linalg.norm(decoded - source.rest, axis=1).max() > settings.bound:
+                head.step = qz.single(0.8 * head.step)
+                head.stream, decoded = entropy.encode_rest(branches, head.step, source.rest)
             self.plan.set_rest(decoded)
         return head
 
 
 def lags(source: Source, step: float) -> np.ndarray:
-    """Predictors of the rest pose, (B,): linear along beams, by trial elsewhere."""
+    """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
-    lags = np.ones(hierarchy.branch_count, np.int32)
+    lags = np.zeros(hierarchy.branch_count, np.int32)
     for b in np.flatnonzero(source.wide):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]

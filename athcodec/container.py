@@ -36,7 +36,7 @@ from athcodec.errors import (
 )
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 2
+MAJOR, MINOR = 0, 3
 NO_LEVEL = 255
 OPTIONAL = 0x8000
 

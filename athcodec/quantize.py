@@ -13,9 +13,10 @@ from athcodec.errors import BoundError
 DEAD_ZONE = 0.55
 NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of maps: step over the error that is theirs
 NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
+NODE_HARM = 1.08  # times a level's error that cheaper maps may cost
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
-REST_CAP = 1.1  # rest pose step over bound: its own error stays within the bound
+REST_CAP = 1.6  # rest pose step over bound: there its own error reaches the bound
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 TEMPORAL_BITS = 14
@@ -81,14 +82,14 @@ LONGEST_LAG = 40
 
 
 def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
-    """The predictor of a stem's rest pose that leaves the least to code: see FORMAT.md, Lag. stem: (n, 3)."""
+    """The lag, 1 or more, that leaves the least of a stem's rest pose to code: see FORMAT.md, Lag. stem: (n, 3)."""
     chain = stem if attach is None else np.vstack([attach, stem])
     steps = np.diff(chain[:1000], axis=0)  # a sample does for long stems
+    none = len(stem)  # no step is that many vertices ago
 
     def cost(lag: int) -> float:
         residual = steps.copy()
-        if lag:
-            residual[lag:] -= steps[:-lag]
+        residual[lag:] -= steps[: max(0, len(steps) - lag)]
         return float(np.log2(1 + np.abs(residual) / step).sum())
 
-    return min(range(min(len(steps), LONGEST_LAG)), key=cost, default=0)
+    return min([none, *range(1, min(len(steps), LONGEST_LAG))], key=cost)

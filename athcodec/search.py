@@ -18,9 +18,10 @@ from athcodec import quantize as qz
 from athcodec.ath import Ath
 from athcodec.coding import Settings, Shape, Source, code_stems, lags, loose_branches, threads
 from athcodec.errors import BoundError
-from athcodec.transform import Plan
+from athcodec.transform import Plan, SegmentMotion, position_error
 
 EFFORTS = ("fast", "default", "best")
+WALKS = 3  # of both steps
 
 Progress = Callable[[str, float], None]
 
@@ -115,15 +116,18 @@ class Search:
             sheets = sheets[1:]
         omegas = {settings.omega, (2,) * self.levels} if not any(settings.omega) else {settings.omega}
         candidates = [replace(settings, sheet=sheet, omega=omega) for sheet in sheets for omega in sorted(omegas)]
-        costs = [cost for cost, _ in self._costs(candidates)]
-        return replace(candidates[int(np.argmin(costs))], omega=settings.omega)
+        return replace(self._cheapest(candidates), omega=settings.omega)
 
     def _with_rotations(self, settings: Settings) -> Settings:
         factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
         candidates = [replace(settings, omega=(k,) * self.levels) for k in factors]
         per_level = np.array([levels for _, levels in self._costs(candidates)])
-        chosen = per_level.argmin(axis=0)
-        return replace(settings, omega=tuple(int(factors[i]) for i in chosen))
+        mixed = replace(settings, omega=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
+        return self._cheapest([settings, mixed, *candidates])
+
+    def _cheapest(self, candidates: list[Settings]) -> Settings:
+        costs = [cost for cost, _ in self._costs(candidates)]
+        return candidates[int(np.argmin(costs))]
 
     def _with_learned(self, settings: Settings) -> Settings:
         """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
@@ -139,11 +143,15 @@ class Search:
         return self._walk_steps(settings, 1.04, 1.12)
 
     def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
-        """Walks step, then rest step, to the cheapest on geometric grids."""
-        settings = self._walk(settings, "step", factor, math.inf)
-        if self.source.exact_rest:
-            return settings
-        return self._walk(settings, "rest_step", rest_factor, qz.REST_CAP * settings.bound)
+        """Walks step and rest step in turn to the cheapest on geometric grids."""
+        for _ in range(WALKS):
+            before, settings = settings, self._walk(settings, "step", factor, math.inf)
+            if self.source.exact_rest:
+                break
+            settings = self._walk(settings, "rest_step", rest_factor, qz.REST_CAP * settings.bound)
+            if settings == before:
+                break
+        return settings
 
     def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
         def moved(exponent: int) -> Settings:
@@ -161,19 +169,34 @@ class Search:
             costs |= costs_at(wanted)
 
     def _with_node_steps(self, settings: Settings) -> Settings:
-        """The finest maps of inner nodes that keep to their share of the file."""
+        """Maps of inner nodes that keep to their share of the file, and are no finer than the levels' errors ask for."""
         shape, errors = Shape(self.source, self.ath, settings), self._level_errors(settings.bound)
         coded = code_stems(shape, settings, self.sample)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         rest = coded.bytes * scale + shape.prelude_bytes
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        chosen = limits = None
         for quality in qz.NODE_QUALITIES:
             steps = quality * errors
             steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
             coded.segment.clear_nodes()
             coded.segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
-            size = sum(len(entropy.encode_affines(coded.segment, level)) for level in range(self.levels)
-                       if shape.plan.has_affines(level))
-            if size * scale <= allowed:
+            if limits is None:
+                size = sum(len(entropy.encode_affines(coded.segment, level)) for level in self._map_levels(shape.plan))
+                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                    continue
+                chosen, limits = steps, self._errors_of_maps(shape, coded.segment)
+                limits[1:] = np.minimum(qz.NODE_HARM * limits[1:], limits[:-1])  # a deeper level stays the better one
+            elif (self._errors_of_maps(shape, coded.segment) <= limits).all():
+                chosen = steps
+            else:
                 break
-        return replace(settings, node_steps=steps)
+        return replace(settings, node_steps=chosen)
+
+    def _map_levels(self, plan: Plan) -> list[int]:
+        return [level for level in range(self.levels) if plan.has_affines(level)]
+
+    def _errors_of_maps(self, shape: Shape, segment: SegmentMotion) -> np.ndarray:
+        """RMS errors of the sample at the levels that have maps."""
+        poses = (segment.pose(level, shape.origin, shape.dtype) for level in self._map_levels(shape.plan))
+        return np.sqrt([position_error(pose, self.sample, shape.origin)[1] for pose in poses])

@@ -92,7 +92,7 @@ def roots(*counts: int) -> np.ndarray:
     """(B,) of BRANCH: stems of so many vertices, each its own root."""
     branches = np.zeros(len(counts), BRANCH)
     branches["parent"] = branches["attach"] = -1
-    branches["count"], branches["lag"] = counts, 1
+    branches["count"] = counts
     return branches
 
 

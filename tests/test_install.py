@@ -216,7 +216,7 @@ def without_times(text: str) -> str:
 
 @pytest.fixture(scope="module")
 def played(engine, sample_ath) -> str:
-    return run(engine / "play", sample_ath, "--slices", 40, "--seconds", 12, "--fps", 30)
+    return run(engine / "play", sample_ath, "--slices", 40, "--seconds", 24, "--fps", 30)
 
 
 def test_the_example_shows_coarse_levels_far_away_and_the_deepest_one_close_by(played, sample_ath):
@@ -240,8 +240,8 @@ def test_the_example_shows_what_has_arrived_until_all_has(played, sample_ath):
 
 
 def test_the_example_plays_the_same_again(played, engine, sample_ath):
-    again = run(engine / "play", sample_ath, "--slices", 40, "--seconds", 12, "--fps", 30)
-    assert without_times(again) == without_times(played) and len(rows(played)) == 12
+    again = run(engine / "play", sample_ath, "--slices", 40, "--seconds", 24, "--fps", 30)
+    assert without_times(again) == without_times(played) and len(rows(played)) == 24
 
 
 @pytest.mark.parametrize("spoil, says", [

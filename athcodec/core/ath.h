@@ -135,7 +135,7 @@ typedef struct ath_branch {
     int32_t count;        /* vertices of its stem, at least 1 */
     int32_t attach;       /* vertex of the parent's stem that it hangs on, -1 for a root */
     int32_t flags;        /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one */
-    int32_t lag;          /* of the rest pose's predictor */
+    int32_t lag;          /* of the rest pose's predictor; 0: a beam */
     int32_t first;        /* its first vertex */
     int32_t subtree;      /* branches in its subtree, itself included */
     int32_t depth;

@@ -100,8 +100,8 @@ static void diagonalise(int32_t n, double *d, double *e, double *q)
 }
 
 /* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
- * `gaps` (small positive integers) add up to: an integrated Wiener process, some free rotation, some roughness. */
-static void cantilever(int32_t n, const uint8_t *gaps, double *basis, double *work)
+ * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. */
+static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double *basis, double *work)
 {
     double s[ATH_PIECE_VERTICES], d[ATH_PIECE_VERTICES], e[ATH_PIECE_VERTICES];
     double *a = work, *q = work + n * n;
@@ -115,7 +115,7 @@ static void cantilever(int32_t n, const uint8_t *gaps, double *basis, double *wo
         for (int32_t j = 0; j <= i; j++) {
             double low = s[j], high = s[i];
             double bend = low * low * (3.0 * high - low) / 6.0;
-            a[i * n + j] = a[j * n + i] = bend + 0.1 * (low * high) + 0.001 * low;
+            a[i * n + j] = a[j * n + i] = bend + turn * (low * high) + rough * low;
         }
     tridiagonalise(n, a, q, d, e);
     diagonalise(n, d, e, q);
@@ -127,6 +127,13 @@ static void cantilever(int32_t n, const uint8_t *gaps, double *basis, double *wo
         for (int32_t i = 0; i < n; i++) basis[m * n + i] = sign * q[best * n + i];
         d[best] = -1e300;
     }
+}
+
+void ath_rest_basis(int32_t n, double *basis, double *work)
+{
+    uint8_t even[ATH_PIECE_VERTICES];
+    memset(even, 1, sizeof even);
+    cantilever(n, even, 100.0, 0.0, basis, work);
 }
 
 /* Adds `candidate` to the `count` orthonormal rows of `basis` after removing what they hold of it, twice for
@@ -263,7 +270,7 @@ void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, 
     for (int32_t p = 0; p < piece_count; p++) {
         ath_piece *piece = pieces + p;
         if (piece->modes >= filled) {
-            cantilever(piece->count, gaps + piece->first, bases + piece->modes, work);
+            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, bases + piece->modes, work);
             filled = piece->modes + (int64_t)piece->count * piece->count;
         }
         if (piece->flags & ATH_SHEET) {

@@ -8,7 +8,7 @@ enum {
     CHECKSUM_AT = 12,
     OPTIONAL = 0x8000,
     MAJOR = 0,
-    MINOR = 2
+    MINOR = 3
 };
 
 static uint32_t u16_at(const uint8_t *at) { return (uint32_t)at[0] | (uint32_t)at[1] << 8; }

@@ -4,7 +4,8 @@
 
 size_t ath_prelude_model_size(void)
 {
-    return sizeof(hierarchy_model) > sizeof(exact_model) ? sizeof(hierarchy_model) : sizeof(exact_model);
+    size_t larger = sizeof(hierarchy_model) > sizeof(exact_model) ? sizeof(hierarchy_model) : sizeof(exact_model);
+    return larger > sizeof(rest_model) ? larger : sizeof(rest_model);
 }
 
 static int finished(const ath_coder *coder, int valid) { return valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK; }
@@ -53,8 +54,7 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    code_rest(&coder, (rest_model *)model, branches, branch_count, step, 0, rest);
-    return finished(&coder, 1);
+    return finished(&coder, code_rest(&coder, (rest_model *)model, branches, branch_count, step, 0, rest));
 }
 
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,

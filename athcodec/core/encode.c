@@ -24,8 +24,7 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    code_rest(&coder, (rest_model *)model, branches, branch_count, step, source, rest);
-    return coder_finish(&coder);
+    return written(&coder, code_rest(&coder, (rest_model *)model, branches, branch_count, step, source, rest));
 }
 
 int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
@@ -105,5 +104,6 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
 size_t ath_model_size(void)
 {
     size_t size = sizeof(affine_model) + history_size(ATH_SEGMENT_FRAMES);
-    return size > sizeof(correction_model) ? size : sizeof(correction_model); /* the others are smaller */
+    if (size < sizeof(correction_model)) size = sizeof(correction_model);
+    return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the others are smaller */
 }

@@ -65,6 +65,8 @@ ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count,
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
 ATH_ENCODER_API void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
                             double *work, double *bases);
+/* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
+void ath_rest_basis(int32_t n, double *basis, double *work);
 /* Completes the nodes, once the rest pose is known. */
 ATH_ENCODER_API void ath_plan_nodes(const ath_shape *shape, ath_node *nodes);
 

@@ -4,7 +4,7 @@
 #ifndef ATH_STREAMS_H
 #define ATH_STREAMS_H
 
-#include "number_model.h"
+#include "coefficient_model.h"
 
 /* ---- hierarchy ---- */
 
@@ -52,7 +52,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {0, 0, 0, 0, 1, 0, 0, 0};
+    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
@@ -162,20 +162,37 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
 
 /* ---- rest pose ---- */
 
+enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
+
 typedef struct {
     number_model inner, start;
+    uint32_t mean[2][3];
+    coefficient_model modes;
+    uint32_t history[ATH_SLOTS * REST_RUN];
+    double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
+    double work[2 * REST_RUN * REST_RUN];
+    uint8_t made[REST_RUN + 1];
 } rest_model;
+
+static void rest_model_init(rest_model *model)
+{
+    number_model_init(&model->inner);
+    number_model_init(&model->start);
+    for (int32_t i = 0; i < 6; i++) model->mean[i / 3][i % 3] = 64;
+    coefficient_model_init(&model->modes, REST_RUN, model->history);
+    memset(model->made, 0, sizeof model->made);
+}
 
 /* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
 static void predict_rest(const ath_branch *branch, const double *rest, int32_t i, double predicted[3])
 {
     const double *stem = rest + 3 * (size_t)branch->first;
-    const double *before = i > 0 ? stem + 3 * (i - 1) : branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
-    const double *from = 0, *to = 0;
-    if (branch->lag > 0 && i >= branch->lag) {
-        to = stem + 3 * (i - branch->lag);
-        from = i > branch->lag ? stem + 3 * (i - branch->lag - 1)
-                               : branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
+    const double *attach = branch->attach >= 0 ? rest + 3 * (size_t)branch->attach : 0;
+    const double *before = i > 0 ? stem + 3 * (i - 1) : attach, *from = 0, *to = 0;
+    int32_t lag = ath_max(branch->lag, 1);
+    if (i >= lag) {
+        to = stem + 3 * (i - lag);
+        from = i > lag ? stem + 3 * (i - lag - 1) : attach;
     }
     for (int32_t k = 0; k < 3; k++) {
         predicted[k] = before ? before[k] : 0.0;
@@ -183,34 +200,94 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
-static int32_t nearest_step(double value, double step)
+/* Steps in a value: `half` (0.5: the nearest) and more of one count as a whole. */
+static int32_t steps_in(double value, double step, double half)
 {
     double units = value / step;
     if (!(units > -1073741823.0)) return -1073741823;
     if (!(units < 1073741823.0)) return 1073741823;
-    return units < 0.0 ? -(int32_t)(0.5 - units) : (int32_t)(units + 0.5);
+    return units < 0.0 ? -(int32_t)(1.0 - half - units) : (int32_t)(1.0 - half + units);
 }
 
-static void code_rest(ath_coder *coder, rest_model *model, const ath_branch *branches, int32_t branch_count, double step,
-                      const double *source, double *rest)
+/* Vertex i of a stem as steps from where it is expected. */
+static void code_rest_vertex(ath_coder *coder, rest_model *model, const ath_branch *branch, int32_t i, double step,
+                             const double *source, double *rest)
 {
-    uint32_t mean[2][3] = {{64, 64, 64}, {64, 64, 64}};
-    number_model_init(&model->inner);
-    number_model_init(&model->start);
-    for (int32_t b = 0; b < branch_count; b++)
-        for (int32_t i = 0; i < branches[b].count; i++) {
-            double predicted[3], *out = rest + 3 * (size_t)(branches[b].first + i);
-            int32_t starting = i < 2;
-            predict_rest(branches + b, rest, i, predicted);
-            for (int32_t k = 0; k < 3; k++) {
-                uint32_t *history = &mean[starting][k];
-                uint32_t all = mean[starting][0] + mean[starting][1] + mean[starting][2];
-                int32_t given = ENCODING ? nearest_step(source[out - rest + k] - predicted[k], step) : 0;
-                int32_t steps = code_signed(coder, starting ? &model->start : &model->inner, (*history + all) / 4, given);
-                out[k] = predicted[k] + (double)steps * step;
-                *history = *history - (*history + 7) / 8 + clipped(steps) * 2;
-            }
+    double predicted[3], *out = rest + 3 * (size_t)(branch->first + i);
+    int32_t starting = i < 2;
+    uint32_t *mean = model->mean[starting];
+    predict_rest(branch, rest, i, predicted);
+    for (int32_t k = 0; k < 3; k++) {
+        int32_t given = ENCODING ? steps_in(source[out - rest + k] - predicted[k], step, 0.5) : 0;
+        int32_t steps = code_signed(coder, starting ? &model->start : &model->inner,
+                                    (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
+        out[k] = predicted[k] + (double)steps * step;
+        mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
+    }
+}
+
+static const double *rest_basis(rest_model *model, int32_t n)
+{
+    double *basis = model->bases + (n - 1) * n * (2 * n - 1) / 6;
+    if (!model->made[n]) ath_rest_basis(n, basis, model->work);
+    model->made[n] = 1;
+    return basis;
+}
+
+static void steps_of_run(int32_t n, const double *basis, double step, const double base[3], const double *run,
+                         int32_t *row)
+{
+    for (int32_t k = 0; k < 3; k++)
+        for (int32_t m = 0; m < n; m++) {
+            double sum = 0.0;
+            for (int32_t i = 0; i < n; i++) sum = sum + basis[m * n + i] * (run[3 * i + k] - base[k]);
+            row[k * REST_RUN + m] = steps_in(sum, step, 0.55);
         }
+}
+
+/* `n` vertices of a beam from `first` on, by the modes of a beam that hangs on `base`. */
+static void code_rest_run(ath_coder *coder, rest_model *model, int32_t first, int32_t n, const double base[3],
+                          double step, const double *source, double *rest)
+{
+    int32_t row[3 * REST_RUN] = {0};
+    const double *basis = rest_basis(model, n);
+    double *run = rest + 3 * (size_t)first;
+    if (ENCODING) steps_of_run(n, basis, step, base, source + 3 * (size_t)first, row);
+    code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t k = 0; k < 3; k++) {
+            double sum = 0.0;
+            for (int32_t m = 0; m < n; m++) sum = sum + basis[m * n + i] * (double)row[k * REST_RUN + m];
+            run[3 * i + k] = base[k] + sum * step;
+        }
+}
+
+/* A beam is cut into runs of like length, each of which hangs on the vertex before it. */
+static void code_rest_beam(ath_coder *coder, rest_model *model, const ath_branch *branch, double step,
+                           const double *source, double *rest)
+{
+    int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
+    if (from) code_rest_vertex(coder, model, branch, 0, step, source, rest);
+    for (int32_t r = 0; r < runs; r++) {
+        int32_t start = from + (int32_t)((int64_t)left * r / runs), end = from + (int32_t)((int64_t)left * (r + 1) / runs);
+        size_t before = start > 0 ? (size_t)(branch->first + start - 1) : (size_t)branch->attach;
+        double base[3] = {rest[3 * before], rest[3 * before + 1], rest[3 * before + 2]};
+        code_rest_run(coder, model, branch->first + start, end - start, base, step, source, rest);
+    }
+}
+
+static int code_rest(ath_coder *coder, rest_model *model, const ath_branch *branches, int32_t branch_count, double step,
+                     const double *source, double *rest)
+{
+    rest_model_init(model);
+    for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
+        if (branches[b].lag == 0)
+            code_rest_beam(coder, model, branches + b, step, source, rest);
+        else
+            for (int32_t i = 0; i < branches[b].count; i++)
+                code_rest_vertex(coder, model, branches + b, i, step, source, rest);
+    }
+    return !model->modes.invalid;
 }
 
 /* ---- exact numbers ---- */
