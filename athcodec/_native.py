@@ -16,6 +16,7 @@ from athcodec._library import load_library
 
 PIECE_VERTICES = 64
 SEGMENT_FRAMES = 256
+SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
@@ -55,7 +56,8 @@ class Motion(ctypes.Structure):
 class Integers(ctypes.Structure):
     """ath_integers."""
 
-    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps")]
+    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps", "shape_counts",
+                                              "shape_first", "shapes", "duals")]
 
 
 _PLAYING = {  # core/ath.h
@@ -94,6 +96,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_fill": (None, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p, c_void_p]),
+    "ath_principal": (None, [c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_plan_nodes": (None, [POINTER(Shape), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
@@ -111,6 +114,9 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
+    "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
+    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), c_void_p, c_void_p, c_void_p,
+                                    c_int32]),
     "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
                                    c_int32]),
     "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),

@@ -21,6 +21,7 @@ from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
+from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
 
 
@@ -75,6 +76,7 @@ class Settings:
     lags: np.ndarray  # (B,) int32, file order
     omega: tuple[int, ...]  # per level: rotation factors
     learned: tuple[bool, ...]  # per level: whether the time basis is
+    shaped: np.ndarray | None  # (P,) bool: pieces that have learned shapes; None: none has
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
 
 
@@ -173,16 +175,24 @@ def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
     return rows[np.any(rows, axis=1)] @ segment.cosines
 
 
+FINER = 32
+
+
+def analyse_finely(shape: Shape, settings: Settings, positions: np.ndarray) -> SegmentMotion:
+    """A segment at a step FINER times smaller, in cosines and modes: what is to be learned from."""
+    fine = replace(settings, step=qz.single(settings.step / FINER))
+    segment = SegmentMotion(shape.plan, positions.shape[2], _streams(fine, shape.plan.level_count, {}))
+    segment.analyse(positions, qz.DEAD_ZONE)
+    return segment
+
+
 def _learn_bases(shape: Shape, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
     """Temporal bases of the levels that learn theirs, from a finer pass with cosines."""
     levels = [level for level, learned in enumerate(settings.learned) if learned]
     if not levels:
         return {}
-    finer = 32
-    fine = replace(settings, step=qz.single(settings.step / finer))
-    segment = SegmentMotion(shape.plan, positions.shape[2], _streams(fine, shape.plan.level_count, {}))
-    segment.analyse(positions, qz.DEAD_ZONE)
-    bases = {level: qz.learn_temporal_basis(_level_rows(segment, level) / finer, qz.TEMPORAL_TOLERANCE)
+    segment = analyse_finely(shape, settings, positions)
+    bases = {level: qz.learn_temporal_basis(_level_rows(segment, level) / FINER, qz.TEMPORAL_TOLERANCE)
              for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
 
@@ -210,12 +220,12 @@ class Coded:
         return ct.pack_corrections(self.correction_step, stream)
 
 
-def code_stems(shape: Shape, settings: Settings, positions: np.ndarray) -> Coded:
+def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: Shapes | None) -> Coded:
     """Streams of the stems and the corrections that keep the limit."""
     plan = shape.plan
     bases = _learn_bases(shape, settings, positions)
     streams = _streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], streams)
+    segment = SegmentMotion(plan, positions.shape[2], streams, shapes)
     segment.analyse(positions, qz.DEAD_ZONE)
     stems = {}
     for level in range(plan.level_count):
@@ -238,10 +248,11 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray) -> Coded
                              f"{shape.dtype.name} numbers")
 
 
-def code_segment(shape: Shape, settings: Settings, positions: np.ndarray) -> tuple[dict, np.ndarray]:
+def code_segment(shape: Shape, settings: Settings, positions: np.ndarray,
+                 shapes: Shapes | None) -> tuple[dict, np.ndarray]:
     """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level."""
     plan, last = shape.plan, shape.plan.level_count - 1
-    coded = code_stems(shape, settings, positions)
+    coded = code_stems(shape, settings, positions, shapes)
     segment = coded.segment
     segment.analyse_nodes(positions, settings.node_steps, qz.DEAD_ZONE)
     chunks: dict[tuple[int, int], bytes] = {(level, ct.STEMS): data for level, data in coded.stems.items()}

@@ -132,7 +132,7 @@ class Decoder:
             if self.container.find(kind) is None:
                 return f"no {ct.KIND_NAMES[kind]}"
         for (kind, level), count in Counter((c.kind, c.level) for c in self.container.chunks if c.is_motion).items():
-            if kind != ct.CORRECTIONS and count < len(self.segments):
+            if kind not in (ct.CORRECTIONS, ct.SHAPES) and count < len(self.segments):
                 segment = next(i for i in range(len(self.segments)) if self.container.find(kind, level, i) is None)
                 return f"no {ct.KIND_NAMES[kind]} of level {level}, segment {segment}"
         return "other chunks"

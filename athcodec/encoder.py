@@ -28,6 +28,7 @@ from athcodec.errors import BoundError, ClipError
 from athcodec.files import new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.search import EFFORTS, Progress, Search
+from athcodec.shapes import Shapes
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, Plan
 
 DEFAULT_REL_ERROR = 1e-4
@@ -177,10 +178,15 @@ class _Job:
     def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
         qz.check_bound(bound, self.seen.low, self.seen.high, self.clip.dtype, self.source.reach)
         ath = self.seen.ath(self.thresholds(bound))
-        settings = Search(self.source, ath, bound, self.effort, self.report).best()
+        search = Search(self.source, ath, bound, self.effort, self.report)
+        settings = search.best()
         shape = Shape(self.source, ath, settings)
+        shapes = search.shapes(shape.plan, settings)
         self._add_prelude(store, shape, ath)
-        errors = self._add_motion(store, shape, settings)
+        if shapes is not None:
+            for level in shapes.levels(shape.plan).tolist():
+                store.add(ct.SHAPES, entropy.encode_shapes(shape.plan, shapes, level), level)
+        errors = self._add_motion(store, shape, settings, shapes)
         self._add_static(store)
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
                            len(self.source.segments), shape.plan.level_count, shape.plan.level_count, bound,
@@ -215,7 +221,8 @@ class _Job:
             for name, array in self.clip.attributes.items():
                 store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
 
-    def _add_motion(self, store: ct.ChunkStore, shape: Shape, settings: Settings) -> np.ndarray:
+    def _add_motion(self, store: ct.ChunkStore, shape: Shape, settings: Settings,
+                    shapes: Shapes | None) -> np.ndarray:
         """Codes all segments, a few at a time; returns (levels, segments, 2) errors."""
         count = len(self.source.segments)
         errors = np.zeros((shape.plan.level_count, count, 2))
@@ -224,7 +231,7 @@ class _Job:
             for index in range(count):
                 if len(pending) == threads():
                     self._collect(store, errors, index - len(pending), pending.popleft())
-                pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index)))
+                pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index), shapes))
             while pending:
                 self._collect(store, errors, count - len(pending), pending.popleft())
         return errors
@@ -290,7 +297,8 @@ def _summary(path: Path, job: _Job, result: _Result, chunks: list[ct.Chunk], dec
     settings, bound = result.settings, result.settings.bound
     choices = {"step_ratio": settings.step / bound, "rest_step_ratio": settings.rest_step / bound,
                "rotations": list(settings.omega), "learned": list(settings.learned),
-               "sheets": int(settings.sheet.sum())}
+               "sheets": int(settings.sheet.sum()),
+               "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, bound, bound / diagonal if diagonal > 0 else 0.0,
                    decoder.table1(), depths, sizes, choices)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec._native import BRANCH, address, encode_stream, lib
-from athcodec.transform import SegmentMotion
+from athcodec.shapes import Shapes
+from athcodec.transform import Plan, SegmentMotion
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
@@ -45,6 +46,14 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
     rank, frames = steps.shape
     return encode_stream("ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1,
                          address(steps, np.int32, steps.size))
+
+
+def encode_shapes(plan: Plan, shapes: Shapes, level: int) -> bytes:
+    """Learned shapes of one level."""
+    return encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.shape,
+                         address(shapes.counts, np.int32, len(plan.pieces)),
+                         address(shapes.first, np.int64, len(plan.pieces)),
+                         address(shapes.integers, np.int32, shapes.integers.size), level)
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:

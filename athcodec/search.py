@@ -16,12 +16,14 @@ import numpy as np
 from athcodec import entropy
 from athcodec import quantize as qz
 from athcodec.ath import Ath
-from athcodec.coding import Settings, Shape, Source, code_stems, lags, loose_branches, threads
+from athcodec.coding import Settings, Shape, Source, analyse_finely, code_stems, lags, loose_branches, threads
 from athcodec.errors import BoundError
+from athcodec.shapes import Components, Shapes, components, estimated_bits, learn
 from athcodec.transform import Plan, SegmentMotion, position_error
 
 EFFORTS = ("fast", "default", "best")
 WALKS = 3  # of both steps
+LEARNING_SEGMENTS = 4  # of a clip, that shapes are learned from
 
 Progress = Callable[[str, float], None]
 
@@ -35,11 +37,12 @@ class Search:
         step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
         self.levels = ath.height + 2
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
+        self._components: dict[tuple, Components] = {}
         self.sample = source.positions(len(source.segments) // 2)
         self.start = Settings(
             bound=bound, limit=qz.error_limit(bound, source.seen.diagonal), step=qz.single(step),
             rest_step=qz.single(rest_step), sheet=source.wide, loose=loose_branches(source, self.sample),
-            lags=lags(source, rest_step), omega=(0,) * self.levels, learned=(False,) * self.levels,
+            lags=lags(source, rest_step), omega=(0,) * self.levels, learned=(False,) * self.levels, shaped=None,
             node_steps=np.full(self.levels, step))
 
     def _level_errors(self, bound: float) -> np.ndarray:
@@ -65,7 +68,8 @@ class Search:
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
 
     def best(self) -> Settings:
-        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_steps]
+        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_shapes,
+                 self._with_steps]
         if self.effort == "fast":
             steps = [self._with_rotations]
         elif self.effort == "best":
@@ -79,25 +83,59 @@ class Search:
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, bytes per level in the sample) at these settings."""
-        varied = (settings.step, settings.rest_step, settings.omega, settings.learned, settings.sheet.tobytes())
+        varied = (settings.step, settings.rest_step, settings.omega, settings.learned, settings.sheet.tobytes(),
+                  settings.shaped is not None and settings.shaped.tobytes())
         if varied not in self._known:
             self._known[varied] = self._try(settings)
         return self._known[varied]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
         shape = Shape(self.source, self.ath, settings)
+        shapes = self.shapes(shape.plan, settings)
         try:
-            coded = code_stems(shape, settings, self.sample)
+            coded = code_stems(shape, settings, self.sample, shapes)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
         levels = np.zeros(self.levels)
+        shape_bytes = 0
+        if shapes is not None:
+            shape_bytes = sum(len(entropy.encode_shapes(shape.plan, shapes, level))
+                              for level in shapes.levels(shape.plan).tolist())
         for level, data in coded.stems.items():
             levels[level] = len(data)
         corrections = len(coded.correction_chunk)
         if corrections:
             levels += corrections * self._share(shape.plan, coded.corrections)
         scale = self.source.clip.frame_count / self.sample.shape[2]
-        return levels.sum() * scale + shape.prelude_bytes, levels
+        return levels.sum() * scale + shape_bytes + shape.prelude_bytes, levels
+
+    def shapes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> Shapes | None:
+        """Shapes of the pieces that are to have some, or of all, learned from segments spread over the clip."""
+        if settings.shaped is None and not everywhere:
+            return None
+        known = settings.omega, settings.sheet.tobytes()
+        if known not in self._components:
+            shape, count = Shape(self.source, self.ath, settings), len(self.source.segments)
+            some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            self._components[known] = components(shape.plan, (
+                analyse_finely(shape, settings, self.source.positions(segment)) for segment in some))
+        return learn(plan, self._components[known], settings.step, None if everywhere else settings.shaped)
+
+    def _with_shapes(self, settings: Settings) -> Settings:
+        """Learned shapes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
+        shape = Shape(self.source, self.ath, settings)
+        shapes, plain = self.shapes(shape.plan, settings, everywhere=True), replace(settings, shaped=None)
+        scale = self.source.clip.frame_count / self.sample.shape[2]
+        pieces = np.repeat(np.arange(len(shapes.counts)), shape.plan.pieces["count"])
+        try:
+            modes, tracks = (estimated_bits(code_stems(shape, plain, self.sample, some).segment.coefficients, pieces,
+                                            len(shapes.counts)) for some in (None, shapes))
+        except BoundError:
+            return settings
+        owners = np.repeat(np.arange(len(shapes.counts)), shapes.counts)
+        price = estimated_bits(shapes.integers, owners, len(shapes.counts))
+        wanted = [(shapes.counts > 0) & ((tracks * scale + price) * doubt < modes * scale) for doubt in qz.SHAPE_DOUBTS]
+        return self._cheapest([plain, *(replace(settings, shaped=some) for some in wanted if some.any())])
 
     def _share(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
         """Fractions of the corrections that fall on the pieces of each level."""
@@ -169,9 +207,9 @@ class Search:
             costs |= costs_at(wanted)
 
     def _with_node_steps(self, settings: Settings) -> Settings:
-        """Maps of inner nodes that keep to their share of the file, and are no finer than the levels' errors ask for."""
+        """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         shape, errors = Shape(self.source, self.ath, settings), self._level_errors(settings.bound)
-        coded = code_stems(shape, settings, self.sample)
+        coded = code_stems(shape, settings, self.sample, self.shapes(shape.plan, settings))
         scale = self.source.clip.frame_count / self.sample.shape[2]
         rest = coded.bytes * scale + shape.prelude_bytes
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)

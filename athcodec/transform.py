@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from ctypes import addressof
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from athcodec._native import (
     address,
     lib,
 )
+
+if TYPE_CHECKING:
+    from athcodec.shapes import Shapes
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 256 << 20
@@ -146,11 +150,11 @@ class LevelStream:
 class SegmentMotion:
     """The quantised motion of one segment."""
 
-    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream]):
+    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], shapes: Shapes | None = None):
         if not 1 <= frames <= MAX_SEGMENT or len(streams) != plan.level_count:
             raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {MAX_SEGMENT} frames, "
                              f"{plan.level_count} streams")
-        self.plan, self.frames, self.streams = plan, frames, streams
+        self.plan, self.frames, self.streams, self.shapes = plan, frames, streams, shapes
         shape = plan.shape
         self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
         self.tracks = np.zeros((shape.piece_count, 2, 3, frames), np.int32)
@@ -173,6 +177,10 @@ class SegmentMotion:
                              carriers=self._carriers.ctypes.data, work=self._work.ctypes.data, frames=self.frames)
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
+        if self.shapes is not None:
+            for name, array in (("shape_counts", self.shapes.counts), ("shape_first", self.shapes.first),
+                                ("shapes", self.shapes.units), ("duals", self.shapes.duals)):
+                setattr(self.integers, name, array.ctypes.data)
 
     def restream(self, streams: list[LevelStream]) -> None:
         """Clears the integers and sets how the next ones are to be read."""

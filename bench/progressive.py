@@ -22,6 +22,7 @@ import athcodec
 from athcodec import container as ct
 from athcodec.ath import Thresholds, survey
 from athcodec.coding import Settings, Shape, Source, code_stems
+from athcodec.entropy import encode_shapes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
 from athcodec.search import Search
@@ -145,9 +146,9 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
     again = _Again(clip_path, rel_error)
     stored = again.streams(again.settings)
-    in_file = sizes.get("STEMS", 0) + sizes.get("CORRECTIONS", 0)
+    in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
     if stored != in_file:
-        raise RuntimeError(f"{clip_path.name}: got {stored} bytes of stems and corrections when coding "
+        raise RuntimeError(f"{clip_path.name}: got {stored} bytes of motion when coding "
                            f"again; expected the {in_file} of the file")
     uniform = again.of_one_level()
     split = min(stored, *(again.streams(settings) for settings in uniform))
@@ -163,8 +164,8 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
 
 
 def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
-    """Chunks that a file of one level would not have; its STEMS and CORRECTIONS stand at the last one."""
-    return chunk.kind == ct.AFFINES or (chunk.kind == ct.STEMS and chunk.level < last)
+    """Chunks that a file of one level would not have; the others stand at the last one."""
+    return chunk.kind == ct.AFFINES or (chunk.kind in (ct.STEMS, ct.SHAPES) and chunk.level < last)
 
 
 class _Again:
@@ -178,7 +179,8 @@ class _Again:
             self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
             self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
             self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
-            self.settings = Search(self._source, self._ath, bound, "default", lambda stage, done: None).best()
+            self._search = Search(self._source, self._ath, bound, "default", lambda stage, done: None)
+            self.settings = self._search.best()
 
     def of_one_level(self) -> list[Settings]:
         """Settings that a single stream could have: what the levels have now, the same for all of them."""
@@ -188,11 +190,14 @@ class _Again:
                 for omega, learned in pairs]
 
     def streams(self, settings: Settings, split: bool = True, one_level: bool = False) -> int:
-        """Bytes of all stems and corrections."""
+        """Bytes of all shapes, stems and corrections."""
         shape = Shape(self._source, self._ath, settings)
         pieces = shape.plan.pieces  # the memory that the core reads
         if not split:
             pieces["low_level"], pieces["low_modes"] = -1, 0
         if one_level:
             pieces["level"] = shape.plan.level_count - 1
-        return sum(code_stems(shape, settings, positions).bytes for positions in self._positions)
+        shapes = self._search.shapes(shape.plan, settings)
+        of_shapes = 0 if shapes is None else sum(
+            len(encode_shapes(shape.plan, shapes, level)) for level in shapes.levels(shape.plan).tolist())
+        return of_shapes + sum(code_stems(shape, settings, positions, shapes).bytes for positions in self._positions)

@@ -23,7 +23,8 @@ import zstandard
 
 import athcodec
 from athcodec import MotionClip, container, entropy, errors
-from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, crc32c
+from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
+from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion
 from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
 
@@ -294,7 +295,7 @@ def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
 
 
 
-@pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS])
+@pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
 @pytest.mark.parametrize("seed", range(6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
     """On every level: the positions that they give, or that they are invalid."""
@@ -303,7 +304,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
     for i, (chunk, payload) in enumerate(parts.chunks):
         if chunk.kind != kind:
             continue
-        head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4}[kind]
+        head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4, container.SHAPES: 0}[kind]
         stream = random_stream(spec, random, *motion_function(spec, parts, chunk))
         data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1:]])
         for level in range(chunk.level, parts.header.level_count):
@@ -322,6 +323,12 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
                                          parts.header.vertex_count)
     rest = spec.content(chunks, 2)
     plan = spec.make_plan(branches, spec.decode_rest(rest[36:], branches, spec.f64(rest, 28)))
+    if chunk.kind == container.SHAPES:
+        shapes = [[] for _ in plan.pieces]
+        for level in range(chunk.level):
+            if (container.SHAPES, level, 0) in chunks:
+                spec.decode_shapes(spec.content(chunks, container.SHAPES, level), plan, shapes, level)
+        return "decode_shapes", plan, shapes, chunk.level
     motion = spec.decode_motion(chunks, plan, 0, frames, chunk.level)
     name = "decode_stems" if chunk.kind == container.STEMS else "decode_affines"
     return name, plan, motion, chunk.level
@@ -556,7 +563,7 @@ def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kin
 
 
 @pytest.mark.parametrize("kind, level", [(container.AFFINES, -1), (container.CORRECTIONS, 0),
-                                         (container.CORRECTIONS, -2)])
+                                         (container.CORRECTIONS, -2), (container.SHAPES, 0)])
 def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec, kind, level):
     file = HandMade(1, False, None)
     file.store.add(kind, bytes(4), level % file.plan.level_count, 1)
@@ -565,14 +572,14 @@ def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec,
 
 def test_unknown_optional_kinds_are_skipped(spec):
     file = HandMade(1, False, None)
-    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8013, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
+    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8014, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
         file.store.add(kind, b"from the future", level)
     assert_same_bits(spec, file.file())
 
 
 @pytest.mark.parametrize("kind, level, error", [
     (0x8001, 255, "UNKNOWN_CHUNK"), (0x0004, 255, "UNKNOWN_CHUNK"), (0x8010, 0, "UNKNOWN_CHUNK"),
-    (0x0020, 255, "UNKNOWN_CHUNK"), (19, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
+    (0x0020, 255, "UNKNOWN_CHUNK"), (20, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
     (0x8021, 0, "BAD_CHUNK_TABLE"), (0x800F, 0, "BAD_CHUNK_TABLE")])
 def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
     file = HandMade(1, False, None)
@@ -605,6 +612,21 @@ class HandMade:
         self.vertex_count = len(self.rest)
         self.store = container.ChunkStore(io.BytesIO())
         self.plan = Plan(self.branches, self.vertex_count)
+        self.shapes = None
+
+    def _some_shapes(self) -> Shapes:
+        """Of about half of the pieces: up to as many as they may have, some small, some with large numbers."""
+        modes = np.minimum(self.plan.pieces["rank"], SHAPE_MODES)
+        counts = self.random.integers(0, 3 * modes + 1) * (self.random.random(len(modes)) < 0.6)
+        integers = np.zeros((counts.sum(), 3, SHAPE_MODES), np.int32)
+        for row, size in zip(integers, np.repeat(modes, counts)):
+            row[:, :size] = np.rint(self.random.normal(0, np.exp2(self.random.uniform(0, 12)), (3, size)))
+            row[self.random.integers(3), self.random.integers(size)] = self.random.choice([-1, 1, 5])
+        integers = integers.reshape(-1, 3 * SHAPE_MODES)
+        units = np.empty(integers.shape)
+        assert lib.ath_unit_shapes(len(integers), integers.ctypes.data, units.ctypes.data)
+        counts = counts.astype(np.int32)
+        return Shapes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, units)
 
     def _skeleton(self) -> tuple[np.ndarray, np.ndarray]:
         branches, rest = np.zeros(len(self.parts), BRANCH), []
@@ -649,6 +671,9 @@ class HandMade:
             self.plan.set_rest(decoded)
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)
+        self.shapes = self._some_shapes()
+        for level in self.shapes.levels(self.plan).tolist():
+            self._add(container.SHAPES, entropy.encode_shapes(self.plan, self.shapes, level), level, 0)
 
     def _rows(self, *shape: int) -> np.ndarray:
         """Integers of all sizes, mostly small, with zeros at the high frequencies and whole rows of zeros."""
@@ -670,7 +695,7 @@ class HandMade:
                    for level in range(self.plan.level_count)]
         for level, basis in bases.items():
             streams[level].temporal = basis * 2.0 ** (1 - self.bases[level][0])
-        motion = SegmentMotion(self.plan, frames, streams)
+        motion = SegmentMotion(self.plan, frames, streams, self.shapes)
         motion.coefficients[:] = self._rows(*motion.coefficients.shape)
         motion.tracks[:] = self._rows(*motion.tracks.shape)
         motion.node_tracks[:] = self._rows(*motion.node_tracks.shape)

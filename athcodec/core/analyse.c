@@ -148,6 +148,22 @@ ATH_HOT static void project(const ath_shape *shape, int32_t T, const ath_piece *
     }
 }
 
+/* Replaces the tracks of the first modes by those of the shapes; there is nothing in the rows that are left over. */
+static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, const double *duals,
+                      const ath_scratch *scratch)
+{
+    size_t frames = (size_t)T, rows = 3 * (size_t)ath_shape_modes(piece);
+    double *tracks = scratch->placed; /* its vertices are no longer needed */
+    memset(tracks, 0, rows * frames * sizeof *tracks);
+    for (int32_t s = 0; s < shape_count; s++)
+        for (size_t j = 0; j < rows; j++) {
+            double weight = duals[s * ATH_SHAPE_NUMBERS + (int32_t)j], *track = tracks + (size_t)s * frames;
+            const double *row = scratch->rows + j * frames;
+            for (int32_t t = 0; t < T; t++) track[t] += weight * row[t];
+        }
+    memcpy(scratch->rows, tracks, rows * frames * sizeof *tracks);
+}
+
 static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
                      const double *source, double *local)
 {
@@ -202,10 +218,12 @@ static void analyse_piece(const ath_shape *shape, const ath_motion *motion, cons
     analyse_tracks(shape, motion, piece, &rows, scratch, source, dead_zone, scratch->placed);
     subtract_rest(shape, T, piece, scratch->placed);
     project(shape, T, piece, scratch->placed, scratch->rows);
-    for (int32_t m = 0; m < piece->rank; m++)
-        code_track(ath_mode_stream(motion, piece, m), T, ath_mode_step(motion, piece, m), dead_zone,
-                   scratch->rows + (size_t)m * 3 * (size_t)T, ath_row(rows.modes, m, T));
-    ath_pose_rows(shape, motion, p, scratch);
+    if (rows.shape_count > 0)
+        to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
+    for (int32_t r = 0; r < piece->rank; r++)
+        code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
+                   scratch->rows + (size_t)r * 3 * (size_t)T, ath_row(rows.modes, r, T));
+    ath_pose_rows(shape, motion, p, &rows, scratch);
 }
 
 void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, const double *source,

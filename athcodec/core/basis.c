@@ -99,12 +99,28 @@ static void diagonalise(int32_t n, double *d, double *e, double *q)
     }
 }
 
+/* Eigenvalues in descending order, and a row for the vector of each, its last number not negative. Destroys `a`. */
+static void eigenvectors(int32_t n, double *a, double *q, double *values, double *vectors)
+{
+    double d[ATH_PIECE_VERTICES], e[ATH_PIECE_VERTICES];
+    tridiagonalise(n, a, q, d, e);
+    diagonalise(n, d, e, q);
+    for (int32_t m = 0; m < n; m++) {
+        int32_t best = 0;
+        for (int32_t i = 1; i < n; i++)
+            if (d[i] > d[best]) best = i;
+        double sign = q[best * n + n - 1] < 0.0 ? -1.0 : 1.0;
+        for (int32_t i = 0; i < n; i++) vectors[m * n + i] = sign * q[best * n + i];
+        values[m] = d[best];
+        d[best] = -1e300;
+    }
+}
+
 /* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
  * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. */
 static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double *basis, double *work)
 {
-    double s[ATH_PIECE_VERTICES], d[ATH_PIECE_VERTICES], e[ATH_PIECE_VERTICES];
-    double *a = work, *q = work + n * n;
+    double s[ATH_PIECE_VERTICES], *a = work, *q = work + n * n;
     int32_t total = 0, along = 0;
     for (int32_t i = 0; i < n; i++) total += gaps[i];
     for (int32_t i = 0; i < n; i++) {
@@ -117,16 +133,14 @@ static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough
             double bend = low * low * (3.0 * high - low) / 6.0;
             a[i * n + j] = a[j * n + i] = bend + turn * (low * high) + rough * low;
         }
-    tridiagonalise(n, a, q, d, e);
-    diagonalise(n, d, e, q);
-    for (int32_t m = 0; m < n; m++) {
-        int32_t best = 0;
-        for (int32_t i = 1; i < n; i++)
-            if (d[i] > d[best]) best = i;
-        double sign = q[best * n + n - 1] < 0.0 ? -1.0 : 1.0;
-        for (int32_t i = 0; i < n; i++) basis[m * n + i] = sign * q[best * n + i];
-        d[best] = -1e300;
-    }
+    eigenvectors(n, a, q, s, basis);
+}
+
+void ath_principal(int32_t count, int32_t n, double *matrices, double *values, double *vectors)
+{
+    double q[ATH_PIECE_VERTICES * ATH_PIECE_VERTICES];
+    for (int32_t i = 0; i < count; i++, matrices += n * n, values += n, vectors += n * n)
+        eigenvectors(n, matrices, q, values, vectors);
 }
 
 void ath_rest_basis(int32_t n, double *basis, double *work)

@@ -50,6 +50,20 @@ int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_
     return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
 }
 
+int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers, int32_t level)
+{
+    ath_coder coder;
+    shape_model *model = (shape_model *)memory;
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    shape_model_init(model);
+    for (int32_t p = 0; p < shape->piece_count && valid; p++)
+        valid = code_shapes(&coder, model, shape->pieces + p, level, shape_counts[p],
+                            integers + shape_first[p] * ATH_SHAPE_NUMBERS) >= 0;
+    return written(&coder, valid);
+}
+
 int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape, const ath_motion *motion,
                          const ath_integers *integers, int32_t level)
 {
@@ -105,5 +119,6 @@ size_t ath_model_size(void)
 {
     size_t size = sizeof(affine_model) + history_size(ATH_SEGMENT_FRAMES);
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
+    if (size < sizeof(shape_model)) size = sizeof(shape_model);
     return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the others are smaller */
 }

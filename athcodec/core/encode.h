@@ -14,6 +14,10 @@ typedef struct ath_integers {
     int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
     int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
     int32_t *node_steps;   /* node_count: exponents of half-octave steps */
+    const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
+    const int64_t *shape_first;  /* piece_count: where its shapes stand in those below */
+    const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
+    const double *duals;         /* likewise: what takes modes to a shape's track */
 } ath_integers;
 
 ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_shape *shape, const ath_integers *integers, int32_t frames,
@@ -24,6 +28,8 @@ ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_shape *shape, const ath_in
     rows.omega = ath_row(integers->tracks, 2 * p, frames);
     rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
     rows.counts = 0;
+    rows.shape_count = integers->shape_counts ? integers->shape_counts[p] : 0;
+    rows.shapes = rows.shape_count > 0 ? integers->shapes + integers->shape_first[p] * ATH_SHAPE_NUMBERS : 0;
     return rows;
 }
 
@@ -79,6 +85,10 @@ ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t cap
                                  const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                     int32_t limit, const int32_t *basis);
+/* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
+ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+                                  const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
+                                  int32_t level);
 ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
                                  const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,

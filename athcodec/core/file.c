@@ -142,6 +142,7 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
 {
     if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
     if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
+    if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
     return kind == ATH_CORRECTIONS && d == level && d == file->shape.height + 1;
 }
 
@@ -153,6 +154,8 @@ static int check_motion_chunks(const ath_file *file)
         const ath_chunk *chunk = file->chunks + i;
         if (chunk->kind == ATH_STEMS || chunk->kind == ATH_AFFINES) count[chunk->kind - ATH_STEMS][chunk->level]++;
         if (chunk->kind == ATH_CORRECTIONS && chunk->level != file->shape.height + 1) return ATH_BAD_CHUNK_TABLE;
+        if (chunk->kind == ATH_SHAPES && (chunk->segment > 0 || !(file->stems_levels >> chunk->level & 1)))
+            return ATH_BAD_CHUNK_TABLE;
     }
     for (int32_t kind = ATH_STEMS; kind <= ATH_AFFINES; kind++)
         for (int32_t d = 0; d < file->header.level_count; d++) {
@@ -397,7 +400,8 @@ int32_t ath_fault(const ath_file *file) { return file->fault; }
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)
 {
-    return ath_find_chunk(file->chunks, file->header.chunk_count, kind, level, (uint32_t)segment);
+    return ath_find_chunk(file->chunks, file->header.chunk_count, kind, level,
+                          kind == ATH_SHAPES ? 0 : (uint32_t)segment);
 }
 
 /* First chunk that ends behind `offset`. */
@@ -432,8 +436,8 @@ void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
 
 static int is_needed(const ath_file *file, const ath_chunk *chunk, int32_t level, int32_t first, int32_t last)
 {
-    return ath_is_motion(chunk) && (int32_t)chunk->segment >= first && (int32_t)chunk->segment <= last
-           && ath_file_needs(file, chunk->kind, chunk->level, level);
+    int within = chunk->kind == ATH_SHAPES || ((int32_t)chunk->segment >= first && (int32_t)chunk->segment <= last);
+    return within && ath_is_motion(chunk) && ath_file_needs(file, chunk->kind, chunk->level, level);
 }
 
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
@@ -457,7 +461,7 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
-    for (int32_t kind = ATH_STEMS; kind <= ATH_CORRECTIONS; kind++)
+    for (int32_t kind = ATH_STEMS; kind <= ATH_SHAPES; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!ath_file_needs(file, kind, d, level)) continue;
             const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);

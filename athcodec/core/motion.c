@@ -3,7 +3,7 @@
 #include "lanes.h"
 #include "motion.h"
 
-enum { POLAR_ITERATIONS = 4, TURN_LANES = 16 };
+enum { POLAR_ITERATIONS = 4, TURN_LANES = 16, ATH_TERMS = ATH_SHAPE_NUMBERS + ATH_PIECE_VERTICES - ATH_SHAPE_MODES };
 
 /* A map takes four rows. */
 static size_t scratch_rows(int32_t longest, int32_t frames) { return (size_t)ath_max(longest, 4) * 3 * (size_t)frames; }
@@ -222,26 +222,72 @@ static int any_nonzero(const double *row, int32_t count)
     return 0;
 }
 
-/* placed = c + R (x0 - a + sum over modes of basis * row), modes ascending, rows of zeros left out. */
-ATH_HOT static void place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const uint8_t *used,
-                          const ath_scratch *scratch)
+/* What a piece is placed by: tracks over time, and how far each moves a vertex along an axis. */
+typedef struct {
+    const double *track[3][ATH_TERMS];
+    int32_t shape[ATH_TERMS]; /* of the first shape_count terms, which are the same for all axes */
+    int32_t mode[ATH_TERMS];  /* of those behind */
+    int32_t shape_count, count;
+} placing_terms;
+
+static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows, int32_t T, const uint8_t *used,
+                              const double *tracks)
 {
-    int32_t T = motion->frames, count = 0;
-    const double *a = ath_rest_attach(shape, piece);
-    const double *basis[ATH_PIECE_VERTICES], *rows[3][ATH_PIECE_VERTICES];
-    double weight[ATH_PIECE_VERTICES];
-    for (int32_t m = 0; m < piece->rank; m++) {
-        if (!used[m]) continue;
-        basis[count] = shape->bases + piece->basis + (size_t)m * (size_t)piece->count;
-        for (int32_t axis = 0; axis < 3; axis++) rows[axis][count] = scratch->rows + (m * 3 + axis) * T;
-        count++;
+    placing_terms terms;
+    int32_t from = rows->shape_count > 0 ? ath_shape_modes(piece) : 0;
+    terms.shape_count = terms.count = 0;
+    for (int32_t s = 0; s < rows->shape_count; s++) {
+        const double *track = tracks + (size_t)s * (size_t)T;
+        if (!used[s / 3] || !any_nonzero(track, T)) continue;
+        for (int32_t axis = 0; axis < 3; axis++) terms.track[axis][terms.count] = track;
+        terms.shape[terms.count++] = s;
     }
+    terms.shape_count = terms.count;
+    for (int32_t m = from; m < piece->rank; m++) {
+        if (!used[m]) continue;
+        for (int32_t axis = 0; axis < 3; axis++)
+            terms.track[axis][terms.count] = tracks + ((size_t)m * 3 + (size_t)axis) * (size_t)T;
+        terms.mode[terms.count++] = m;
+    }
+    return terms;
+}
+
+/* How far each term moves vertex i along an axis. */
+static void weigh_terms(const ath_piece *piece, const ath_piece_rows *rows, const placing_terms *terms,
+                        const double *basis, int32_t i, double weight[3][ATH_TERMS])
+{
+    size_t n = (size_t)piece->count;
+    for (int32_t j = 0; j < terms->shape_count; j++) {
+        const double *shape = rows->shapes + terms->shape[j] * ATH_SHAPE_NUMBERS;
+        double x = 0.0, y = 0.0, z = 0.0;
+        for (int32_t m = 0; m < ath_shape_modes(piece); m++) {
+            double mode = basis[(size_t)m * n + (size_t)i];
+            x = x + mode * shape[3 * m];
+            y = y + mode * shape[3 * m + 1];
+            z = z + mode * shape[3 * m + 2];
+        }
+        weight[0][j] = x;
+        weight[1][j] = y;
+        weight[2][j] = z;
+    }
+    for (int32_t j = terms->shape_count; j < terms->count; j++)
+        weight[0][j] = weight[1][j] = weight[2][j] = basis[(size_t)terms->mode[j] * n + (size_t)i];
+}
+
+/* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. */
+ATH_HOT static void place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+                          const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
+{
+    int32_t T = motion->frames;
+    const double *a = ath_rest_attach(shape, piece);
+    placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
+    double weight[3][ATH_TERMS];
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(shape, piece->first + i);
         double *out = scratch->placed + i * 3 * T;
-        for (int32_t m = 0; m < count; m++) weight[m] = basis[m][i];
+        weigh_terms(piece, rows, &terms, shape->bases + piece->basis, i, weight);
         for (int32_t axis = 0; axis < 3; axis++)
-            lanes_sum(T, count, weight, rows[axis], x0[axis] - a[axis], out + axis * T);
+            lanes_sum(T, terms.count, weight[axis], terms.track[axis], x0[axis] - a[axis], out + axis * T);
         ath_move(T, &scratch->at, out);
     }
 }
@@ -370,20 +416,20 @@ void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t
     }
 }
 
-static void inverse_mode(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t m,
-                         double *track)
+static void inverse_row(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r,
+                        double *track)
 {
-    const ath_stream *stream = ath_mode_stream(motion, piece, m);
-    inverse_track(stream, motion->frames, count_of(rows, m, stream), ath_mode_step(motion, piece, m),
-                  ath_row(rows->modes, m, motion->frames), track);
+    const ath_stream *stream = ath_mode_stream(motion, piece, r);
+    inverse_track(stream, motion->frames, count_of(rows, r, stream), ath_row_step(motion, piece, rows, r),
+                  ath_row(rows->modes, r, motion->frames), track);
 }
 
 static const double *place_used(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
-                                const uint8_t *used, const ath_scratch *scratch)
+                                const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->carrier >= 0) here.placed = carried_vertices(motion, piece);
-    place(shape, motion, piece, used, &here);
+    place(shape, motion, piece, rows, used, &here);
     carry(shape, motion, piece, &here);
     return here.placed;
 }
@@ -393,13 +439,14 @@ static double *row_of(const ath_motion *motion, const ath_scratch *scratch, int3
     return scratch->rows + (size_t)m * 3 * (size_t)motion->frames;
 }
 
-const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch)
+const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                            const ath_scratch *scratch)
 {
     const ath_piece *piece = shape->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < piece->rank; m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return place_used(shape, motion, piece, used, scratch);
+    return place_used(shape, motion, piece, rows, used, scratch);
 }
 
 const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
@@ -411,10 +458,10 @@ const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, i
     for (int32_t m = 0; m < piece->rank; m++) {
         used[m] = 0;
         if (rows->counts && rows->counts[m] == 0) continue;
-        inverse_mode(motion, piece, rows, m, row_of(motion, scratch, m));
+        inverse_row(motion, piece, rows, m, row_of(motion, scratch, m));
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
     }
-    return place_used(shape, motion, piece, used, scratch);
+    return place_used(shape, motion, piece, rows, used, scratch);
 }
 
 /* ---- nodes ---- */
@@ -486,9 +533,58 @@ static void map_of_modes(const ath_shape *shape, const ath_motion *motion, const
     for (int32_t m = 0; m < ath_min(piece->low_modes, piece->rank); m++) {
         double g[3];
         affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
-        inverse_mode(motion, piece, rows, m, scratch->track);
+        inverse_row(motion, piece, rows, m, scratch->track);
         add_outer(motion->frames, scratch->track, g, E);
     }
+}
+
+/* The affine part of a shape: that of its modes. */
+static void map_of_shape(int32_t modes, double functionals[][3], const double *numbers, double G[9])
+{
+    for (int32_t k = 0; k < 9; k++) G[k] = 0.0;
+    for (int32_t m = 0; m < modes; m++)
+        for (int32_t i = 0; i < 3; i++)
+            for (int32_t k = 0; k < 3; k++) G[3 * i + k] = G[3 * i + k] + numbers[3 * m + i] * functionals[m][k];
+}
+
+static void map_of_shapes(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
+                          const ath_piece_rows *rows, const ath_scratch *scratch, double *E)
+{
+    const ath_piece *piece = shape->pieces + node->piece;
+    int32_t T = motion->frames, count = ath_min(rows->shape_count, ath_base_shapes(piece));
+    double functionals[ATH_SHAPE_MODES][3];
+    for (int32_t m = 0; m < ath_shape_modes(piece); m++)
+        affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, functionals[m]);
+    for (int32_t s = 0; s < count; s++) {
+        double G[9];
+        const double *track = scratch->track + s % 3 * T;
+        if (s % 3 == 0) inverse_row(motion, piece, rows, s / 3, scratch->track);
+        map_of_shape(ath_shape_modes(piece), functionals, rows->shapes + s * ATH_SHAPE_NUMBERS, G);
+        for (int32_t k = 0; k < 9; k++)
+            for (int32_t t = 0; t < T; t++) E[k * T + t] = E[k * T + t] + track[t] * G[k];
+    }
+}
+
+static int unit_shape(const int32_t *integers, double *shape)
+{
+    double length2 = 0.0;
+    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++)
+        for (int32_t axis = 0; axis < 3; axis++) {
+            double number = (double)integers[axis * ATH_SHAPE_MODES + m];
+            shape[3 * m + axis] = number;
+            length2 = length2 + number * number;
+        }
+    if (!(length2 > 0.0)) return 0;
+    double scale = 1.0 / ath_sqrt(length2);
+    for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) shape[i] = shape[i] * scale;
+    return 1;
+}
+
+int ath_unit_shapes(int32_t count, const int32_t *integers, double *shapes)
+{
+    for (int32_t s = 0; s < count; s++)
+        if (!unit_shape(integers + s * ATH_SHAPE_NUMBERS, shapes + s * ATH_SHAPE_NUMBERS)) return 0;
+    return 1;
 }
 
 /* R := R (I + E) */
@@ -516,7 +612,10 @@ void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, c
         coded_map(motion, node, rows, scratch, ath_has_shift(shape->pieces + node->piece), E);
     } else {
         ath_turned_attach(shape, motion, node->piece, piece_rows, scratch);
-        map_of_modes(shape, motion, node, piece_rows, scratch, E);
+        if (piece_rows->shape_count > 0)
+            map_of_shapes(shape, motion, node, piece_rows, scratch, E);
+        else
+            map_of_modes(shape, motion, node, piece_rows, scratch, E);
     }
     compose(motion->frames, E, scratch->at.rotation);
 }

@@ -26,11 +26,16 @@ typedef struct ath_motion {
 /* Rows of integers over temporal frequency, 3 x frames each. */
 enum { SHIFT_SLOT = ATH_PIECE_VERTICES, OMEGA_SLOT, ATH_SLOTS };
 
+/* Learned shapes are made of a piece's first modes, three axes each. */
+enum { ATH_SHAPE_MODES = 16, ATH_SHAPE_NUMBERS = 3 * ATH_SHAPE_MODES };
+
 /* The integers of one piece. */
 typedef struct {
     int32_t *modes;        /* rank rows */
     int32_t *omega, *shift;
     int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
+    int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
+    const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
 } ath_piece_rows;
 
 /* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
@@ -62,7 +67,8 @@ void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t
                        const ath_scratch *scratch);
 /* Places a piece from its coefficients over time (scratch->rows) in its attach frame (scratch->at), and keeps what the
  * pieces that hang on it need. Rows that are all 0 are left out. Returns its vertices, count x 3 x frames. */
-const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_scratch *scratch);
+const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                            const ath_scratch *scratch);
 /* The same from its integers. */
 const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch);
@@ -80,6 +86,8 @@ void ath_turn_towards(const double H[9], double size2, double R[9]);
 double ath_omega_step(const ath_shape *shape, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
+/* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all 0. */
+ATH_ENCODER_API int ath_unit_shapes(int32_t count, const int32_t *integers, double *shapes);
 /* The stream that node maps use: cosines, the node's own step. */
 ath_stream ath_node_stream(const ath_motion *motion, double step);
 
@@ -89,19 +97,35 @@ ATH_INLINE const ath_stream *ath_base_stream(const ath_motion *motion, const ath
     return motion->streams + ath_base_level(piece);
 }
 
-/* The stream that holds a piece's mode. */
+/* The stream that holds row m of a piece: its mode, or shapes. */
 ATH_INLINE const ath_stream *ath_mode_stream(const ath_motion *motion, const ath_piece *piece, int32_t m)
 {
     return m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->level;
 }
 
+/* How many of a piece's modes its shapes are made of. */
+ATH_INLINE int32_t ath_shape_modes(const ath_piece *piece) { return ath_min(piece->rank, ATH_SHAPE_MODES); }
+
+/* Most shapes in the stream of the piece's base level. */
+ATH_INLINE int32_t ath_base_shapes(const ath_piece *piece)
+{
+    return 3 * (piece->low_level >= 0 ? ath_min(piece->low_modes, ath_shape_modes(piece)) : ath_shape_modes(piece));
+}
+
+/* Whether row r holds shapes, where the piece has any: then it has no other row below ath_shape_modes. */
+ATH_INLINE int ath_is_shape_row(const ath_piece *piece, const ath_piece_rows *rows, int32_t r)
+{
+    return rows->shape_count > 0 && r < ath_shape_modes(piece);
+}
+
 /* Modes of a cantilever are quantised finer the more of the motion they carry: what the first ones get wrong, the
  * pieces that hang on this one would have to code again. */
-ATH_INLINE double ath_mode_step(const ath_motion *motion, const ath_piece *piece, int32_t m)
+ATH_INLINE double ath_row_step(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r)
 {
     static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
-    double step = ath_mode_stream(motion, piece, m)->step;
-    return piece->flags & ATH_SHEET ? step : step * (m < 4 ? weight[m] : 1.125);
+    double step = ath_mode_stream(motion, piece, r)->step;
+    if (ath_is_shape_row(piece, rows, r)) return 0.875 * step;
+    return piece->flags & ATH_SHEET ? step : step * (r < 4 ? weight[r] : 1.125);
 }
 
 ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)

@@ -5,6 +5,44 @@
 
 #include "coefficient_model.h"
 
+/* ---- shapes ---- */
+
+typedef struct {
+    coefficient_model rows;
+    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
+    number_model count;
+    int32_t count_before[2]; /* of the piece before, by part */
+} shape_model;
+
+static void shape_model_init(shape_model *model)
+{
+    coefficient_model_init(&model->rows, ATH_SHAPE_MODES, model->history);
+    number_model_init(&model->count);
+    model->count_before[0] = model->count_before[1] = 0;
+}
+
+/* What the stream of one level holds of a piece's shapes: those of its base level first, the others at its own, where
+ * the base level is full. `integers`: ATH_SHAPE_NUMBERS of each, zero on entry where decoding; `count`: all of them
+ * when encoding, else those that are known. Returns the new count, -1 where it cannot be. */
+static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece *piece, int32_t level, int32_t count,
+                           int32_t *integers)
+{
+    int32_t most = ath_base_shapes(piece), from = 0, part = level != ath_base_level(piece), above_count = -1;
+    if (part) {
+        if (piece->level != level || count < most) return count;
+        from = most;
+        most = 3 * ath_shape_modes(piece);
+    }
+    int32_t given = ath_min(count, most) - from;
+    int32_t own = (int32_t)code_unsigned(coder, &model->count, (uint32_t)model->count_before[part] * 16, (uint32_t)given);
+    model->count_before[part] = own;
+    if (own > most - from) return -1;
+    for (int32_t s = from; s < from + own; s++)
+        above_count = code_row(coder, &model->rows, ATH_SHAPE_MODES, ath_shape_modes(piece), s, above_count,
+                               integers + s * ATH_SHAPE_NUMBERS);
+    return model->rows.invalid ? -1 : from + own;
+}
+
 /* ---- stems ---- */
 
 static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)
@@ -30,6 +68,7 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_sha
         to = piece->rank;
     }
     for (int32_t m = from; m < to; m++) {
+        if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         above_count = code_row(coder, model, frames, rank, m, above_count, ath_row(rows->modes, m, frames));
         note_count(rows, m, above_count);
     }

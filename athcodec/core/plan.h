@@ -67,6 +67,9 @@ ATH_ENCODER_API void ath_basis_fill(ath_piece *pieces, int32_t piece_count, cons
                             double *work, double *bases);
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
 void ath_rest_basis(int32_t n, double *basis, double *work);
+/* Eigenvalues, in descending order, and eigenvectors, a row each, of symmetric n x n matrices, which are destroyed;
+ * n: at most ATH_PIECE_VERTICES. */
+ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, double *values, double *vectors);
 /* Completes the nodes, once the rest pose is known. */
 ATH_ENCODER_API void ath_plan_nodes(const ath_shape *shape, ath_node *nodes);
 

@@ -4,9 +4,15 @@
 #include "motion_streams.h"
 #include "segment.h"
 
-enum { CHECKSUM_STEP = 1 << 16, TILE = 8 };
+enum { CHECKSUM_STEP = 1 << 16, TILE = 8, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 
 typedef enum { CHECKSUMS, HEADS, PIECES, DONE, FAILED } prepare_phase;
+
+typedef struct {
+    ath_coder coder;
+    shape_model *model;
+    const ath_chunk *chunk; /* null: no piece of the level has shapes */
+} shapes_reader;
 
 typedef struct {
     ath_coder coder;
@@ -33,6 +39,7 @@ typedef struct {
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
+    shapes_reader shapes[ATH_LEVELS];
     stems_reader stems[ATH_LEVELS];
     affines_reader affines[ATH_LEVELS];
     corrections_reader corrections;
@@ -51,6 +58,8 @@ struct ath_work {
     int32_t fault;
     int32_t node_step;
     int32_t counts[ATH_SLOTS];
+    int32_t *shape_integers; /* of the piece, 0 between pieces */
+    double *unit_shapes;
 };
 
 /* ---- memory ---- */
@@ -70,6 +79,8 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     ath_take(&arena, sizeof *work);
     for (int32_t d = 0; d < file->info.level_count; d++) {
         if (file->stems_levels >> d & 1) {
+            if (ath_file_chunk(file, ATH_SHAPES, d, 0))
+                work->shapes[d].model = (shape_model *)ath_take(&arena, sizeof(shape_model));
             work->stems[d].model = (coefficient_model *)ath_take(&arena, sizeof(coefficient_model));
             work->stems[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
             work->stems[d].temporal = (double *)ath_take(&arena, T * T * sizeof(double));
@@ -81,6 +92,8 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     }
     work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
+    work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
     work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->shape.longest * row);
     work->piece.omega = (int32_t *)ath_take(&arena, row);
     work->piece.shift = (int32_t *)ath_take(&arena, row);
@@ -132,8 +145,8 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 {
     int32_t checks = checksum_steps(wanted_chunk(file, segment, level, ATH_CORRECTIONS, level)), heads = level + 2;
     for (int32_t d = 0; d <= level; d++)
-        for (int32_t kind = ATH_STEMS; kind <= ATH_AFFINES; kind++)
-            checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
+        for (int32_t kind = ATH_STEMS; kind <= ATH_SHAPES; kind++)
+            if (kind != ATH_CORRECTIONS) checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
     return checks + heads + file->shape.piece_count + 1;
 }
 
@@ -144,9 +157,11 @@ static int find_chunks(ath_work *work)
     for (int32_t d = 0; d <= work->level; d++) {
         const ath_chunk *stems = wanted_chunk(work->file, work->index, work->level, ATH_STEMS, d);
         const ath_chunk *affines = wanted_chunk(work->file, work->index, work->level, ATH_AFFINES, d);
+        const ath_chunk *shapes = wanted_chunk(work->file, work->index, work->level, ATH_SHAPES, d);
+        work->shapes[d].chunk = shapes;
         work->stems[d].chunk = stems;
         work->affines[d].chunk = affines;
-        there = there && (!stems || stems->bytes) && (!affines || affines->bytes);
+        there = there && (!stems || stems->bytes) && (!affines || affines->bytes) && (!shapes || shapes->bytes);
     }
     work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS, work->level);
     return there && (!work->corrections.chunk || work->corrections.chunk->bytes);
@@ -159,6 +174,8 @@ static void ready_motion(ath_work *work)
     work->motion.cosines = ath_file_cosines(work->file, work->segment->frames);
     work->scratch = ath_motion_scratch(&work->file->shape, &work->motion);
     work->piece.counts = work->counts;
+    work->piece.shapes = work->unit_shapes;
+    memset(work->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->node.step = &work->node_step;
     memset(work->piece.modes, 0, (size_t)work->file->shape.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
     memset(work->piece.omega, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
@@ -217,6 +234,7 @@ static int blame(ath_work *work, const ath_chunk *chunk, int result)
 static const ath_chunk *chunk_to_check(const ath_work *work)
 {
     if (work->next_kind == ATH_STEMS) return work->stems[work->next].chunk;
+    if (work->next_kind == ATH_SHAPES) return work->shapes[work->next].chunk;
     return work->next_kind == ATH_AFFINES ? work->affines[work->next].chunk : work->corrections.chunk;
 }
 
@@ -226,14 +244,14 @@ static void next_phase(ath_work *work, prepare_phase phase)
     work->next = 0;
 }
 
-/* A level's two chunks, then the next level's; at last the corrections. */
+/* A level's chunks, then the next level's; at last the corrections. */
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;
     if (work->next_kind == ATH_CORRECTIONS) {
         next_phase(work, HEADS);
-    } else if (work->next_kind == ATH_STEMS) {
-        work->next_kind = ATH_AFFINES;
+    } else if (work->next_kind != ATH_SHAPES) {
+        work->next_kind = work->next_kind == ATH_STEMS ? ATH_AFFINES : ATH_SHAPES;
     } else {
         work->next++;
         work->next_kind = work->next > work->level ? ATH_CORRECTIONS : ATH_STEMS;
@@ -307,6 +325,11 @@ static int open_level(ath_work *work)
         affine_model_init(affines->model, work->motion.frames, affines->history);
         coder_start(&affines->coder, affines->chunk->bytes, affines->chunk->length);
     }
+    shapes_reader *shapes = work->shapes + d;
+    if (shapes->chunk) {
+        shape_model_init(shapes->model);
+        coder_start(&shapes->coder, shapes->chunk->bytes, shapes->chunk->length);
+    }
     if (work->stems[d].chunk) result = open_stems(work, work->stems + d, work->streams + d);
     return blame(work, work->stems[d].chunk, result);
 }
@@ -325,14 +348,32 @@ static void clear_piece(ath_work *work, const ath_piece *piece)
 {
     int32_t T = work->motion.frames;
     for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(work->piece.modes, m, T), T, work->counts + m);
+    memset(work->shape_integers, 0, (size_t)work->piece.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    work->piece.shape_count = 0;
     clear_row(work->piece.shift, T, work->counts + SHIFT_SLOT);
     clear_row(work->piece.omega, T, work->counts + OMEGA_SLOT);
+}
+
+/* The shapes that the level adds to those of the piece. */
+static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
+{
+    shapes_reader *reader = work->shapes + level;
+    int32_t known = work->piece.shape_count;
+    int32_t count = code_shapes(&reader->coder, reader->model, piece, level, known, work->shape_integers);
+    if (count < 0) return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    size_t from = (size_t)known * ATH_SHAPE_NUMBERS;
+    if (!ath_unit_shapes(count - known, work->shape_integers + from, work->unit_shapes + from))
+        return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    work->piece.shape_count = count;
+    return ATH_OK;
 }
 
 static int read_piece(ath_work *work, int32_t p, int32_t level)
 {
     stems_reader *reader = work->stems + level;
     ath_coder coder = reader->coder;
+    if (work->shapes[level].chunk && read_shapes(work, work->file->shape.pieces + p, level) != ATH_OK)
+        return ATH_BAD_CHUNK;
     code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level,
                &work->piece);
     reader->coder = coder;
@@ -435,6 +476,8 @@ static int finish_level(ath_work *work, int32_t d)
 {
     const stems_reader *stems = work->stems + d;
     const affines_reader *affines = work->affines + d;
+    const shapes_reader *shapes = work->shapes + d;
+    if (shapes->chunk && !coder_finish(&shapes->coder)) return blame(work, shapes->chunk, ATH_BAD_CHUNK);
     if (stems->chunk && !coder_finish(&stems->coder)) return blame(work, stems->chunk, ATH_BAD_CHUNK);
     if (affines->chunk && !coder_finish(&affines->coder)) return blame(work, affines->chunk, ATH_BAD_CHUNK);
     return ATH_OK;

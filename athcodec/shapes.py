@@ -1,0 +1,128 @@
+"""Shapes learned from the motion of single pieces: what they do together, in few tracks.
+
+A piece bends as its stiffness, its load and its neighbours have it: in a plane, in a few forms. The cantilever's modes
+are the same for all; principal components of a piece's modes over time (Lengyel 1999; Sattler et al. 2005, by clusters)
+say the same in fewer tracks, at the price of the components. They are learned once for a clip, so the more frames there
+are the less they cost. FORMAT.md, "Shapes stream".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec import quantize as qz
+from athcodec._native import SHAPE_MODES, SHEET, address, lib
+from athcodec.transform import Plan, SegmentMotion
+
+NUMBERS = 3 * SHAPE_MODES
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Shapes of all pieces, those of a piece behind each other; a row holds NUMBERS."""
+
+    counts: np.ndarray  # (P,) int32; 0: the piece keeps its modes
+    first: np.ndarray  # (P,) int64
+    integers: np.ndarray  # (K, NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m
+    units: np.ndarray  # (K, NUMBERS) float64 of unit length: axis a of mode m at 3 m + a
+    duals: np.ndarray  # likewise: what takes a piece's modes to the tracks of its shapes
+
+    def levels(self, plan: Plan) -> np.ndarray:
+        """Levels whose streams hold some of them."""
+        pieces, shaped = plan.pieces, self.counts > 0
+        full = shaped & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
+        return np.union1d(plan.base_level[shaped], pieces["level"][full])
+
+
+@dataclass(frozen=True)
+class Components:
+    """Principal components of pieces' first modes over all frames seen, in scene units.
+
+    By groups of pieces that have as many modes: pieces (G,), lengths (G, 3 modes) in descending order, unit vectors
+    (G, 3 modes, 3 modes), a row each.
+    """
+
+    frames: int
+    groups: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
+    """From segments that were analysed finely, without shapes and in cosines."""
+    sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
+    groups = [(pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
+              for size in np.unique(sizes) for pieces in [np.flatnonzero(sizes == size)]]
+    frames = 0
+    for segment in segments:
+        frames += segment.frames
+        for pieces, total in groups:
+            for part in _parts(pieces, segment.frames * total.shape[1]):
+                rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
+                total[part] += rows @ rows.transpose(0, 2, 1)
+    return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
+
+
+def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
+    lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in (moments, values, vectors)))
+    return np.sqrt(np.maximum(values, 0.0)), vectors
+
+
+def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
+    """Few enough pieces at a time for memory not to follow their number."""
+    count = max(1, (16 << 20) // (8 * row_bytes))
+    return (slice(at, at + count) for at in range(0, len(pieces), count))
+
+
+def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
+    """Tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
+    slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
+    steps = np.array([stream.step for stream in segment.streams])
+    weight = np.where(plan.pieces["flags"][pieces, None] & SHEET, 1.0, qz.MODE_STEPS[:size])
+    scale = steps[plan.pieces["level"][pieces]][:, None] * weight
+    rows = segment.coefficients[slots] * scale[:, :, None, None]
+    return rows.reshape(len(pieces), 3 * size, segment.frames)
+
+
+def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> Shapes:
+    """The shapes that a motion step asks for, of the pieces `wanted`, (P,) bool, or of all."""
+    counts = np.zeros(len(plan.pieces), np.int32)
+    rows: dict[int, np.ndarray] = {}
+    least = step * np.sqrt(seen.frames)
+    for pieces, lengths, vectors in seen.groups:
+        scale = np.minimum(lengths / (qz.SHAPE_STEP * least), qz.LARGEST_SHAPE)
+        numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
+        kept = (lengths > qz.LEAST_SHAPE * least) & numbers.any(axis=2)
+        if wanted is not None:
+            kept &= wanted[pieces, None]
+        counts[pieces] = np.cumprod(kept, axis=1).sum(axis=1)
+        rows |= {int(p): numbers[i, : counts[p]] for i, p in enumerate(pieces)}
+    return _shapes(counts, [rows[p] for p in np.flatnonzero(counts)])
+
+
+def _shapes(counts: np.ndarray, rows: list[np.ndarray]) -> Shapes:
+    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
+    units, duals = np.zeros((2, len(integers), NUMBERS))
+    first = np.cumsum(counts, dtype=np.int64) - counts
+    at = 0
+    for numbers in rows:
+        count, size = len(numbers), numbers.shape[1] // 3
+        integers[at: at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
+        at += count
+    integers = integers.reshape(-1, NUMBERS)
+    lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
+    at = 0
+    for numbers in rows:
+        own = units[at: at + len(numbers)]
+        duals[at: at + len(own)] = np.linalg.solve(own @ own.T + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
+        at += len(own)
+    return Shapes(counts, first, integers, units, duals)
+
+
+def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
+    """About what integers (K, ...) take in a stream, summed by piece: pieces (K,); returns (piece_count,)."""
+    magnitudes = np.abs(integers).astype(np.float32)
+    bits = (2.0 * np.log2(1.0 + magnitudes) + (magnitudes > 0)).sum(axis=tuple(range(1, integers.ndim)))
+    return np.bincount(pieces, bits, piece_count)
