@@ -1,4 +1,4 @@
-"""athcodec itself: a whole .ath file without attributes, at the default effort."""
+"""athcodec itself: a whole .ath file without attributes, at the default effort, and as small as it gets."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ class Athcodec:
     """
 
     kind = "athcodec"
+    effort = "default"
+    segment_frames = None
 
-    def __init__(self, single_depth: bool = False, effort: str = "default"):
-        self.single_depth, self.effort = single_depth, effort
+    def __init__(self, single_depth: bool = False):
+        self.single_depth = single_depth
         self.name = "athcodec, single depth" if single_depth else "athcodec"
         self.settings: dict = {}
 
@@ -39,6 +41,7 @@ class Athcodec:
                 max_error=bound,
                 attributes="none",
                 effort=self.effort,
+                segment_frames=self.segment_frames,
                 tam=Thresholds(far, 0, far, 0) if self.single_depth else None,
             )
             self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
@@ -50,3 +53,17 @@ class Athcodec:
             file.write_bytes(data)
             with athcodec.open(file, strict=True) as decoder:
                 return np.ascontiguousarray(decoder.positions(), np.float32)
+
+
+class LongSegments(Athcodec):
+    """With the longest segments that there are and the longest search, at the price of coarser seeking.
+
+    The others code a clip as a whole: for clips of up to 256 frames, so does this.
+    """
+
+    effort = "best"
+    segment_frames = 256
+
+    def __init__(self):
+        super().__init__()
+        self.name = "athcodec, long segments"
