@@ -117,6 +117,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
     "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), c_void_p, c_void_p, c_void_p,
                                     c_int32]),
+    "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
     "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
                                    c_int32]),
     "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),

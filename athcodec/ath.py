@@ -20,7 +20,7 @@ from athcodec.hierarchy import Hierarchy, hierarchy_of
 if TYPE_CHECKING:
     from athcodec.clip import MotionClip
 
-MAX_DEPTH = 30
+MAX_DEPTH = 29
 RANK_TOLERANCE = 1e-3
 """A subtree's principal extent counts as missing below this part of its largest one: its best-fit stretch
 along such a direction would be the noise of the rest pose."""

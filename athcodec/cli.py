@@ -93,7 +93,7 @@ def _encode(args: argparse.Namespace) -> int:
             args.output,
             segment_frames=args.segment_frames,
             tam=_thresholds(args.tam, unit),
-            exact_rest=args.exact_rest,
+            exact_rest=args.exact_rest, lossless=args.lossless,
             attributes=args.attributes,
             effort=args.effort,
             progress=report,
@@ -568,6 +568,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
+    verb.add_argument("--lossless", action="store_true",
+                      help="one more level gives positions and rest pose bit for bit; the bound is for the one before")
     verb.add_argument(
         "--attributes", choices=("all", "none"), default="all",
         help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",

@@ -58,6 +58,11 @@ class Source:
         high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
         return float(np.linalg.norm(high - low))
 
+    def exact(self, segment: int) -> np.ndarray:
+        """(N, 3, T) positions of a segment, the very numbers of the clip."""
+        block = self.clip.block(*self.segments[segment])
+        return np.ascontiguousarray(block[:, self.hierarchy.vertex_source].transpose(1, 2, 0))
+
     def positions(self, segment: int) -> np.ndarray:
         """(N, 3, T) float64 positions of a segment."""
         return gather(self.clip.block(*self.segments[segment]), self.hierarchy.vertex_source, self.origin)
@@ -248,9 +253,12 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
                              f"{shape.dtype.name} numbers")
 
 
-def code_segment(shape: Shape, settings: Settings, positions: np.ndarray,
-                 shapes: Shapes | None) -> tuple[dict, np.ndarray]:
-    """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level."""
+def code_segment(shape: Shape, settings: Settings, positions: np.ndarray, shapes: Shapes | None,
+                 exact: np.ndarray | None = None) -> tuple[dict, np.ndarray]:
+    """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
+
+    exact: the source's own numbers (see Source.exact), which one more level is to give.
+    """
     plan, last = shape.plan, shape.plan.level_count - 1
     coded = code_stems(shape, settings, positions, shapes)
     segment = coded.segment
@@ -261,7 +269,9 @@ def code_segment(shape: Shape, settings: Settings, positions: np.ndarray,
             chunks[level, ct.AFFINES] = entropy.encode_affines(segment, level)
     if len(coded.corrections):
         chunks[last, ct.CORRECTIONS] = coded.correction_chunk
-    errors = np.zeros((plan.level_count, 2))
+    if exact is not None:
+        chunks[last + 1, ct.EXACT] = entropy.encode_exact(coded.decoded, exact)
+    errors = np.zeros((plan.level_count + (exact is not None), 2))
     for level in range(plan.level_count):
         decoded = coded.decoded if level == last else segment.pose(level, shape.origin, shape.dtype)
         largest, squares = position_error(decoded, positions, shape.origin)

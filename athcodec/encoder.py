@@ -32,6 +32,7 @@ from athcodec.shapes import Shapes
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, Plan
 
 DEFAULT_REL_ERROR = 1e-4
+LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
 SPOOL_BYTES = 64 << 20
 STATIC_METADATA = ("unit", "up_axis")
 
@@ -69,14 +70,16 @@ class Summary:
 
 def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error: float | None = None,
            target_size: int | None = None, segment_frames: int | None = None, tam: Thresholds | None = None,
-           exact_rest: bool = False, attributes: str = "all", effort: str = "default",
+           exact_rest: bool = False, lossless: bool = False, attributes: str = "all", effort: str = "default",
            progress: Progress | None = None) -> Summary:
     """Compresses a clip into an .ath file at `path`, which appears only when it is whole.
 
     max_error: bound in scene units on the distance of every vertex in every frame; or rel_error: the same as a fraction
-    of the bounding box's diagonal over all frames (default 1e-4); or target_size: bytes, the smallest bound that fits.
-    segment_frames: longest segment, 16 to 256. tam: acceptance thresholds of the ATH (default: one map per frame stays
-    within the bound). exact_rest: keep the rest pose bit for bit. attributes: "none" drops faces, edges and named
+    of the bounding box's diagonal over all frames (default 1e-4, lossless 4e-7); or target_size: bytes, the smallest
+    bound that fits. segment_frames: longest segment, 16 to 256. tam: acceptance thresholds of the ATH (default: one map
+    per frame stays within the bound). exact_rest: keep the rest pose bit for bit. lossless: one more level gives the
+    positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. attributes: "none"
+    drops faces, edges and named
     arrays. Raises ClipError, BoundError, ValueError, OSError.
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
@@ -85,12 +88,12 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     hierarchy = hierarchy_of(clip)
     _check_limits(clip, hierarchy)
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
-    source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest)
-    job = _Job(source, tam, attributes == "all", effort, report)
+    source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless)
+    job = _Job(source, tam, attributes == "all", effort, report, lossless)
     if target_size is not None:
         bound = _bound_for_size(job, target_size)
     else:
-        bound = max_error if max_error is not None else _relative_bound(rel_error or DEFAULT_REL_ERROR, job)
+        bound = max_error if max_error is not None else _relative_bound(rel_error, job)
     with new_file(path) as out, tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         result = job.encode(bound, ct.ChunkStore(spool))
         chunks = result.store.write(out, result.header, result.errors)
@@ -133,11 +136,13 @@ def time_chunk(time: np.ndarray) -> bytes:
     return steady or ct.pack_time(entropy.encode_times(np.ascontiguousarray(time, np.float64)))
 
 
-def _relative_bound(fraction: float, job: _Job) -> float:
-    """A fraction of the diagonal; where nothing moves nor has any extent, of that with the rest pose."""
-    if job.seen.diagonal > 0:
-        return fraction * job.seen.diagonal
-    return max(fraction * job.source.reach, 2 * qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype))
+def _relative_bound(fraction: float | None, job: _Job) -> float:
+    """A fraction (None: the default) of the diagonal; where nothing has any extent, of that with the rest pose."""
+    least = 2 * qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
+    if fraction is None and job.lossless:
+        return max(LOSSLESS_REL_ERROR * job.source.reach, least, job.source.reach / qz.LARGEST_REACH)
+    fraction = fraction or DEFAULT_REL_ERROR
+    return fraction * job.seen.diagonal if job.seen.diagonal > 0 else max(fraction * job.source.reach, least)
 
 
 def _survey_options(tam: Thresholds | None) -> dict:
@@ -163,6 +168,7 @@ class _Job:
     keep_static: bool
     effort: str
     report: Progress
+    lossless: bool
 
     @property
     def clip(self) -> MotionClip:
@@ -189,7 +195,7 @@ class _Job:
         errors = self._add_motion(store, shape, settings, shapes)
         self._add_static(store)
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
-                           len(self.source.segments), shape.plan.level_count, shape.plan.level_count, bound,
+                           len(self.source.segments), len(errors), len(errors), 0.0 if self.lossless else bound,
                            self.clip.dtype == np.float64)
         return _Result(store, header, errors, ath, shape.plan, settings)
 
@@ -225,13 +231,14 @@ class _Job:
                     shapes: Shapes | None) -> np.ndarray:
         """Codes all segments, a few at a time; returns (levels, segments, 2) errors."""
         count = len(self.source.segments)
-        errors = np.zeros((shape.plan.level_count, count, 2))
+        errors = np.zeros((shape.plan.level_count + self.lossless, count, 2))
         with ThreadPoolExecutor(threads()) as pool:
             pending: deque[Future] = deque()
             for index in range(count):
                 if len(pending) == threads():
                     self._collect(store, errors, index - len(pending), pending.popleft())
-                pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index), shapes))
+                exact = self.source.exact(index) if self.lossless else None
+                pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index), shapes, exact))
             while pending:
                 self._collect(store, errors, count - len(pending), pending.popleft())
         return errors

@@ -74,6 +74,14 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
                          address(corrections, np.int32, 5 * len(corrections)), len(corrections))
 
 
+def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
+    """What takes decoded positions, (N, 3, T) float32 or float64, to those of the source, bit for bit."""
+    vertices, _, frames = positions.shape
+    return encode_stream("ath_encode_exact", 4096 + 3 * positions.size, vertices, frames, positions.dtype == np.float64,
+                         address(positions, positions.dtype, positions.size),
+                         address(source, positions.dtype, positions.size))
+
+
 def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float,
                      step: float) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place.

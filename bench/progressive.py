@@ -144,11 +144,16 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
     with encoded(clip_path, rel_error) as result:
         chunks, sizes = result.decoder.container.chunks, result.summary.chunk_bytes
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
-    again = _Again(clip_path, rel_error)
+    with athcodec.read_hdf5(clip_path) as clip:
+        return _cost(_Again(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
+
+
+def _cost(again: _Again, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
+          bytes_: int) -> dict[str, Any]:
     stored = again.streams(again.settings)
     in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
     if stored != in_file:
-        raise RuntimeError(f"{clip_path.name}: got {stored} bytes of motion when coding "
+        raise RuntimeError(f"{again.name}: got {stored} bytes of motion when coding "
                            f"again; expected the {in_file} of the file")
     uniform = again.of_one_level()
     split = min(stored, *(again.streams(settings) for settings in uniform))
@@ -156,7 +161,7 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
     merged = min(again.streams(settings, split=False, one_level=True) for settings in uniform)
     table = (TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
              + ERROR_ENTRY * (levels - 1) * segments)
-    affines, bytes_ = sizes.get("AFFINES", 0), result.summary.bytes
+    affines = sizes.get("AFFINES", 0)
     without = bytes_ - affines - table - (split - min(split, unsplit, merged))
     return {"bytes": bytes_, "levels": levels, "AFFINES": affines, "table": table,
             "early split": split - unsplit, "one stream": split - merged, "without": without,
@@ -171,16 +176,16 @@ def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
 class _Again:
     """The clip in the encoder's own stages, at the settings that the encoder finds."""
 
-    def __init__(self, clip_path: Path, rel_error: float) -> None:
-        with athcodec.read_hdf5(clip_path) as clip:
-            hierarchy = hierarchy_of(clip)
-            seen = survey(clip, hierarchy)
-            bound = rel_error * seen.diagonal
-            self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
-            self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
-            self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
-            self._search = Search(self._source, self._ath, bound, "default", lambda stage, done: None)
-            self.settings = self._search.best()
+    def __init__(self, clip: athcodec.MotionClip, rel_error: float) -> None:
+        hierarchy = hierarchy_of(clip)
+        seen = survey(clip, hierarchy)
+        bound = rel_error * seen.diagonal
+        self.name = str(clip)
+        self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
+        self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
+        self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
+        self._search = Search(self._source, self._ath, bound, "default", lambda stage, done: None)
+        self.settings = self._search.best()
 
     def of_one_level(self) -> list[Settings]:
         """Settings that a single stream could have: what the levels have now, the same for all of them."""

@@ -76,7 +76,7 @@ def use(data: bytes) -> bool:
 
 def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, data):
     assert parts.file() == data and with_header(data) == data
-    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES), "the file has every kind of chunk"
+    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - {ct.EXACT}, "every kind of a lossy file"
     assert use(data)
 
 
@@ -336,7 +336,7 @@ def spoilt_front(rng: np.random.Generator, data: bytes) -> bytes:
         elif way == 4:
             entries.insert(i, bytearray(entries[j]))
         else:
-            kind = rng.choice([0x8009, 0x8014, 0x801F, 0x8021, 0x0009, 0x8001])
+            kind = rng.choice([0x8009, 0x8015, 0x801F, 0x8021, 0x0009, 0x8001])
             place = (0, 0) if 16 <= kind & 0x7FFF < 32 else (255, 0)
             entries.insert(i, bytearray(ct._CHUNK.pack(kind, 0, *place, 0, 0)))
     lengths = sum(struct.unpack_from("<I", entry, 8)[0] for entry in entries)
@@ -446,7 +446,7 @@ def seconds_to_use(chunks, parts) -> float:
     return time.perf_counter() - start
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", [name for name in KINDS if name != "EXACT"])  # see test_lossless.py
 def test_a_spoilt_chunk_with_a_good_checksum_is_refused_or_plays(name, parts):
     """And neither takes much longer than the sound file."""
     rng = np.random.default_rng(KINDS[name])

@@ -27,6 +27,7 @@ from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, l
 from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion
 from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
+from plants import plant
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 TEXT = FORMAT.read_text(encoding="utf-8")
@@ -163,6 +164,13 @@ def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
     assert_same_bits(spec, data)
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         assert decoder.positions().tolist() == [[[1.0, 2.0, 3.0]]]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lossless_files_decode_by_the_document(spec, dtype, tmp_path):
+    clip = plant(seed=12, branches=4, longest=4, frames=18, dtype=dtype)
+    athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, lossless=True)
+    assert_same_bits(spec, (tmp_path / "a.ath").read_bytes())
 
 
 # ---- the pseudo-code ----
@@ -572,14 +580,14 @@ def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec,
 
 def test_unknown_optional_kinds_are_skipped(spec):
     file = HandMade(1, False, None)
-    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8014, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
+    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8015, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
         file.store.add(kind, b"from the future", level)
     assert_same_bits(spec, file.file())
 
 
 @pytest.mark.parametrize("kind, level, error", [
     (0x8001, 255, "UNKNOWN_CHUNK"), (0x0004, 255, "UNKNOWN_CHUNK"), (0x8010, 0, "UNKNOWN_CHUNK"),
-    (0x0020, 255, "UNKNOWN_CHUNK"), (20, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
+    (0x0020, 255, "UNKNOWN_CHUNK"), (21, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
     (0x8021, 0, "BAD_CHUNK_TABLE"), (0x800F, 0, "BAD_CHUNK_TABLE")])
 def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
     file = HandMade(1, False, None)

@@ -153,9 +153,9 @@ def test_one_accepted_plant_is_one_node_and_two_levels(scratch):
     assert decoder.table1()["nodes"] == 1 and decoder.level_count == 2
 
 
-def test_chains_fold_the_depths_beyond_30_into_one_level(scratch):
+def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
     decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0))
-    assert decoder.table1()["depth"] == 31 and decoder.full_level_count == 32
+    assert decoder.table1()["depth"] == 30 and decoder.full_level_count == 31
 
 
 def test_float64_output_of_a_float32_file_is_within_the_bound_too(bushy_ath, bushy_clip):

@@ -118,7 +118,8 @@ int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_
 static int known(uint32_t kind)
 {
     static const uint16_t kinds[] = {ATH_HIERARCHY, ATH_REST, ATH_TIME, OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6,
-                                     ATH_STEMS, ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES, OPTIONAL | 32};
+                                     ATH_STEMS, ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES, ATH_EXACT,
+                                     OPTIONAL | 32};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         if (kinds[i] == kind) return 1;
         if ((kinds[i] & ~OPTIONAL) == (int)(kind & ~(uint32_t)OPTIONAL)) return -1;

@@ -12,6 +12,7 @@ enum {
     ATH_AFFINES = 17,
     ATH_CORRECTIONS = 18,
     ATH_SHAPES = 19, /* of all segments, in segment 0 */
+    ATH_EXACT = 20,
     ATH_NO_LEVEL = 255
 };
 

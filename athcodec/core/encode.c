@@ -64,6 +64,33 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     return written(&coder, valid);
 }
 
+static double number_at(const void *numbers, int wide, size_t at)
+{
+    return wide ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+}
+
+int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames, int wide,
+                         const void *positions, const void *source)
+{
+    ath_coder coder;
+    exact_model *model = (exact_model *)memory;
+    int32_t length[3] = {0, 0, 0};
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    exact_model_init(model);
+    for (size_t v = 0; v < (size_t)vertex_count; v++)
+        for (size_t t = 0; t < (size_t)frames && valid; t++) {
+            double known[3], number[3];
+            for (size_t k = 0; k < 3; k++) {
+                size_t at = (v * 3 + k) * (size_t)frames + t;
+                known[k] = number_at(positions, wide, at);
+                number[k] = number_at(source, wide, at);
+            }
+            valid = code_exact_point(&coder, model, wide, known, length, number);
+        }
+    return written(&coder, valid);
+}
+
 int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape, const ath_motion *motion,
                          const ath_integers *integers, int32_t level)
 {
@@ -120,5 +147,6 @@ size_t ath_model_size(void)
     size_t size = sizeof(affine_model) + history_size(ATH_SEGMENT_FRAMES);
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
     if (size < sizeof(shape_model)) size = sizeof(shape_model);
+    if (size < sizeof(exact_model)) size = sizeof(exact_model);
     return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the others are smaller */
 }

@@ -89,6 +89,9 @@ ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t 
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
                                   const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
                                   int32_t level);
+/* positions, source: vertex-major, float or (wide) double. */
+ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
+                                 int32_t frames, int wide, const void *positions, const void *source);
 ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
                                  const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,

@@ -143,24 +143,27 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
     if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
     if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
-    return kind == ATH_CORRECTIONS && d == level && d == file->shape.height + 1;
+    if (kind == ATH_CORRECTIONS) return d <= level && d == file->shape.height + 1;
+    return kind == ATH_EXACT && d == level && d == file->shape.height + 2;
 }
 
 /* The table has the motion chunks that the hierarchy asks for, and no others. */
 static int check_motion_chunks(const ath_file *file)
 {
-    uint32_t count[2][ATH_LEVELS] = {{0}};
-    for (uint32_t i = 0; i < file->header.chunk_count; i++) {
-        const ath_chunk *chunk = file->chunks + i;
-        if (chunk->kind == ATH_STEMS || chunk->kind == ATH_AFFINES) count[chunk->kind - ATH_STEMS][chunk->level]++;
+    static const int32_t kinds[] = {ATH_STEMS, ATH_AFFINES, ATH_EXACT};
+    uint32_t count[3][ATH_LEVELS] = {{0}};
+    for (uint32_t c = 0; c < file->header.chunk_count; c++) {
+        const ath_chunk *chunk = file->chunks + c;
+        for (int32_t i = 0; i < 3; i++)
+            if (chunk->kind == kinds[i]) count[i][chunk->level]++;
         if (chunk->kind == ATH_CORRECTIONS && chunk->level != file->shape.height + 1) return ATH_BAD_CHUNK_TABLE;
         if (chunk->kind == ATH_SHAPES && (chunk->segment > 0 || !(file->stems_levels >> chunk->level & 1)))
             return ATH_BAD_CHUNK_TABLE;
     }
-    for (int32_t kind = ATH_STEMS; kind <= ATH_AFFINES; kind++)
+    for (int32_t i = 0; i < 3; i++)
         for (int32_t d = 0; d < file->header.level_count; d++) {
-            uint32_t wanted = ath_file_needs(file, kind, d, d) ? file->header.segment_count : 0;
-            if (count[kind - ATH_STEMS][d] != wanted) return ATH_BAD_CHUNK_TABLE;
+            uint32_t wanted = ath_file_needs(file, kinds[i], d, d) ? file->header.segment_count : 0;
+            if (count[i][d] != wanted) return ATH_BAD_CHUNK_TABLE;
         }
     return ATH_OK;
 }
@@ -243,7 +246,9 @@ static int read_prelude(ath_file *file, const ath_limits *limits)
     file->fault = -1;
     plan(file);
     file->info.node_count = file->shape.node_count;
-    if (file->shape.height + 2 != file->header.full_level_count) return ATH_BAD_HEADER;
+    int32_t lossy_levels = file->shape.height + 2; /* one more gives the very positions of the source */
+    if (file->header.full_level_count != lossy_levels && file->header.full_level_count != lossy_levels + 1)
+        return ATH_BAD_HEADER;
     plan_levels(file);
     if ((result = check_motion_chunks(file)) != ATH_OK) return result;
     if ((result = read_rest(file)) != ATH_OK) return result;
@@ -461,7 +466,7 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
-    for (int32_t kind = ATH_STEMS; kind <= ATH_SHAPES; kind++)
+    for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!ath_file_needs(file, kind, d, level)) continue;
             const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);

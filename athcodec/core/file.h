@@ -32,6 +32,11 @@ struct ath_file {
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
 const double *ath_file_cosines(const ath_file *file, int32_t frames);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
+/* Whether it stores the level behind the last lossy one. */
+ATH_INLINE int ath_file_is_lossless(const ath_file *file)
+{
+    return file->header.level_count > file->shape.height + 2;
+}
 /* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
 

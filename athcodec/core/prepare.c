@@ -1,6 +1,7 @@
 /* From the chunks of a segment to what is played of it: all levels' streams are read side by side, piece by piece, each
  * piece placed as soon as its integers are there, so that only what hangs on it is kept. */
 #include "decode.h"
+#include "exact_model.h"
 #include "motion_streams.h"
 #include "segment.h"
 
@@ -36,6 +37,13 @@ typedef struct {
     const ath_chunk *chunk;
 } corrections_reader;
 
+typedef struct {
+    ath_coder coder;
+    exact_model *model;
+    int32_t length[3];
+    const ath_chunk *chunk;
+} exact_reader;
+
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
@@ -43,6 +51,7 @@ struct ath_work {
     stems_reader stems[ATH_LEVELS];
     affines_reader affines[ATH_LEVELS];
     corrections_reader corrections;
+    exact_reader exact_level;
     ath_stream streams[ATH_LEVELS];
     ath_motion motion;
     ath_scratch scratch;
@@ -91,6 +100,7 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
         }
     }
     work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
+    if (ath_file_is_lossless(file)) work->exact_level.model = (exact_model *)ath_take(&arena, sizeof(exact_model));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
@@ -143,10 +153,10 @@ static int32_t checksum_steps(const ath_chunk *chunk)
 
 int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 {
-    int32_t checks = checksum_steps(wanted_chunk(file, segment, level, ATH_CORRECTIONS, level)), heads = level + 2;
+    int32_t checks = 0, heads = level + 2;
     for (int32_t d = 0; d <= level; d++)
-        for (int32_t kind = ATH_STEMS; kind <= ATH_SHAPES; kind++)
-            if (kind != ATH_CORRECTIONS) checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
+        for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
+            checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
     return checks + heads + file->shape.piece_count + 1;
 }
 
@@ -163,7 +173,10 @@ static int find_chunks(ath_work *work)
         work->affines[d].chunk = affines;
         there = there && (!stems || stems->bytes) && (!affines || affines->bytes) && (!shapes || shapes->bytes);
     }
-    work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS, work->level);
+    work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
+                                           work->file->shape.height + 1);
+    work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
+    there = there && (!work->exact_level.chunk || work->exact_level.chunk->bytes);
     return there && (!work->corrections.chunk || work->corrections.chunk->bytes);
 }
 
@@ -233,9 +246,7 @@ static int blame(ath_work *work, const ath_chunk *chunk, int result)
 
 static const ath_chunk *chunk_to_check(const ath_work *work)
 {
-    if (work->next_kind == ATH_STEMS) return work->stems[work->next].chunk;
-    if (work->next_kind == ATH_SHAPES) return work->shapes[work->next].chunk;
-    return work->next_kind == ATH_AFFINES ? work->affines[work->next].chunk : work->corrections.chunk;
+    return wanted_chunk(work->file, work->index, work->level, work->next_kind, work->next);
 }
 
 static void next_phase(ath_work *work, prepare_phase phase)
@@ -244,18 +255,13 @@ static void next_phase(ath_work *work, prepare_phase phase)
     work->next = 0;
 }
 
-/* A level's chunks, then the next level's; at last the corrections. */
+/* A level's chunks, then the next level's. */
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;
-    if (work->next_kind == ATH_CORRECTIONS) {
-        next_phase(work, HEADS);
-    } else if (work->next_kind != ATH_SHAPES) {
-        work->next_kind = work->next_kind == ATH_STEMS ? ATH_AFFINES : ATH_SHAPES;
-    } else {
-        work->next++;
-        work->next_kind = work->next > work->level ? ATH_CORRECTIONS : ATH_STEMS;
-    }
+    if (work->next_kind++ < ATH_EXACT) return;
+    work->next_kind = ATH_STEMS;
+    if (work->next++ == work->level) next_phase(work, HEADS);
 }
 
 static int check_some(ath_work *work)
@@ -317,6 +323,10 @@ static int open_level(ath_work *work)
     int32_t d = work->next++, result = ATH_OK;
     if (d > work->level) {
         const ath_chunk *chunk = work->corrections.chunk;
+        if (work->exact_level.chunk) {
+            exact_model_init(work->exact_level.model);
+            coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
+        }
         next_phase(work, PIECES);
         return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
@@ -440,13 +450,43 @@ static void correct_piece(ath_work *work, const ath_piece *piece)
     reader->coder = coder;
 }
 
-static void show_piece(ath_work *work, int32_t p)
+static int read_exact_point(ath_work *work, size_t at)
+{
+    exact_reader *reader = &work->exact_level;
+    double known[3], number[3];
+    for (size_t k = 0; k < 3; k++)
+        known[k] = work->segment->wide ? ((const double *)work->segment->positions)[at + k]
+                                       : (double)((const float *)work->segment->positions)[at + k];
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->wide, known, reader->length, number)) return 0;
+    for (size_t k = 0; k < 3; k++) {
+        if (work->segment->wide)
+            ((double *)work->segment->positions)[at + k] = number[k];
+        else
+            ((float *)work->segment->positions)[at + k] = (float)number[k];
+    }
+    return 1;
+}
+
+/* The source's own positions in place of those that the levels before give. */
+static int make_exact(ath_work *work, const ath_piece *piece)
+{
+    size_t vertices = (size_t)work->segment->exact_vertices;
+    for (int32_t i = 0; i < piece->count; i++)
+        for (size_t t = 0; t < (size_t)work->segment->frames; t++)
+            if (!read_exact_point(work, (t * vertices + (size_t)(work->exact + i)) * 3))
+                return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
+    return ATH_OK;
+}
+
+static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->shape.pieces + p;
     const double *placed = ath_pose_piece(&work->file->shape, &work->motion, p, &work->piece, &work->scratch);
     store_piece(work, piece, placed);
     if (work->corrections.chunk) correct_piece(work, piece);
+    int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
     work->exact += piece->count;
+    return result;
 }
 
 static void show_node(ath_work *work, int32_t n)
@@ -489,6 +529,8 @@ static int finish(ath_work *work)
     for (int32_t d = 0; d <= work->level; d++)
         if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
     if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
+    if (work->exact_level.chunk && !coder_finish(&work->exact_level.coder))
+        return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
     ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
     work->segment->level = work->level;
@@ -510,7 +552,7 @@ static int do_piece(ath_work *work)
         result = read_node(work, n);
         if (result == ATH_OK && ath_is_shown(shape->nodes + n, work->level)) show_node(work, n);
     }
-    if (result == ATH_OK && piece->level <= work->level) show_piece(work, p);
+    if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
     clear_piece(work, piece);
     return result;
 }

@@ -1,0 +1,99 @@
+"""A lossless file: its last level gives the source's own numbers, and its others play as ever."""
+
+import numpy as np
+import pytest
+from files import Parts, opened
+from plants import clip_of, plant
+
+import athcodec
+from athcodec import container as ct
+from athcodec.cli import main
+from athcodec.errors import BadChunk, BadChunkTable, BadHeader
+
+
+def encoded(clip, **options) -> bytes:
+    path = options.pop("path")
+    athcodec.encode(clip, path, lossless=True, **options)
+    return path.read_bytes()
+
+
+def bits(array: np.ndarray) -> bytes:
+    return np.ascontiguousarray(array).tobytes()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("bound", [{}, {"rel_error": 1e-3}])
+def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound, tmp_path):
+    clip = plant(seed=3, branches=9, frames=40, dtype=dtype, offset=5.0)
+    decoder = opened(encoded(clip, path=tmp_path / "a.ath", segment_frames=16, **bound), strict=True)
+    assert bits(decoder.positions()) == bits(clip.positions) and decoder.positions().dtype == dtype
+    assert bits(decoder.positions(17)) == bits(clip.positions[17])
+    assert bits(decoder.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
+    assert decoder.max_error_bound == 0 and decoder.depths[-1].max_error == 0
+
+
+def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
+    clip = plant(seed=4, branches=9, frames=40)
+    lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
+    athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True)
+    with athcodec.open(tmp_path / "b.ath") as lossy:
+        assert lossless.level_count == lossy.level_count + 1
+        for depth in range(lossy.level_count):
+            assert bits(lossless.positions(depth=depth)) == bits(lossy.positions(depth=depth))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_numbers_that_arithmetic_would_change_come_back(dtype, tmp_path):
+    """Zeros with a sign, the smallest numbers there are, neighbours of 1."""
+    rng = np.random.default_rng(7)
+    rest = rng.normal(size=(6, 3))
+    positions = (rest + 0.1 * rng.normal(size=(20, 6, 3))).astype(dtype)
+    positions[3:7, 2] = 0.0
+    positions[4, 2] = -0.0
+    positions[5, 3] = np.finfo(dtype).smallest_subnormal
+    positions[6, 1] = -np.finfo(dtype).smallest_subnormal
+    clip = clip_of(positions, rest, np.zeros(6, np.int32), np.array([-1], np.int32), dtype)
+    assert bits(opened(encoded(clip, path=tmp_path / "a.ath")).positions()) == bits(positions)
+
+
+def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
+    clip = plant(seed=5, branches=9, frames=40)
+    data = encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4)
+    deepest = opened(data).level_count - 1
+    athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", deepest - 1)
+    shorter = opened((tmp_path / "b.ath").read_bytes(), strict=True)
+    assert bits(shorter.positions()) == bits(opened(data).positions(depth=deepest - 1))
+    assert 0 < shorter.max_error_bound == shorter.depths[-1].max_error
+    cut = opened(data[: opened(data).container.level_end(deepest - 1)])
+    assert bits(cut.positions()) == bits(shorter.positions())
+
+
+def test_what_is_wrong_with_the_exact_level_is_said(tmp_path):
+    clip = plant(seed=6, branches=5, frames=40)
+    parts = Parts.of(encoded(clip, path=tmp_path / "a.ath", segment_frames=16))
+    last = parts.header.level_count - 1
+    i = parts.index(ct.EXACT, last, 1)
+    with pytest.raises(BadChunkTable, match="EXACT"):
+        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).check()
+    for payload in (parts.payload(ct.EXACT, last) + b"\x01" * 12, b"\xff" * 900):
+        decoder = opened(parts.with_payload(ct.EXACT, payload, last))
+        with pytest.raises(BadChunk, match="EXACT"):
+            decoder.positions(0)
+        assert decoder.positions(0, last - 1).shape == (clip.vertex_count, 3)
+
+
+def test_a_level_count_that_the_hierarchy_does_not_have_is_refused(tmp_path):
+    clip = plant(seed=6, branches=5, frames=20)
+    parts = Parts.of(encoded(clip, path=tmp_path / "a.ath"))
+    parts.header.full_level_count += 1
+    with pytest.raises(BadHeader):
+        opened(parts.file())
+
+
+def test_the_command_line_writes_lossless_files(tmp_path):
+    athcodec.write_hdf5(tmp_path / "a.h5", plant(seed=8, branches=5, frames=20))
+    assert main(["encode", str(tmp_path / "a.h5"), str(tmp_path / "a.ath"), "--lossless"]) == 0
+    assert main(["verify", str(tmp_path / "a.ath"), "--against", str(tmp_path / "a.h5")]) == 0
+    assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.h5")]) == 0
+    with athcodec.read_hdf5(tmp_path / "a.h5") as a, athcodec.read_hdf5(tmp_path / "b.h5") as b:
+        assert bits(a.block(0, 20)) == bits(b.block(0, 20))
