@@ -35,6 +35,7 @@ from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
 from athcodec.errors import AthError, ClipError, LevelUnavailable
+from athcodec.files import check_target
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
@@ -295,11 +296,7 @@ def _decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth
 
 def _check_output(path: str, source: str) -> None:
     """Refuse, before any work, what can only fail after it, and what would destroy the input."""
-    folder = os.path.dirname(path) or "."
-    if not os.path.isdir(folder):
-        raise FileNotFoundError(f"{path}: the directory {folder} does not exist")
-    if os.path.isdir(path):
-        raise IsADirectoryError(f"{path}: got a directory, expected a file name")
+    check_target(path)
     if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
         raise FileExistsError(f"{path}: is the input, expected another file name")
 

@@ -25,7 +25,7 @@ from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.decoder import Decoder
 from athcodec.errors import BoundError, ClipError
-from athcodec.files import new_file
+from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.search import EFFORTS, Progress, Search
 from athcodec.shapes import Shapes
@@ -84,6 +84,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
     report = progress or (lambda stage, fraction: None)
+    check_target(path)  # before any work
     clip.check()
     hierarchy = hierarchy_of(clip)
     _check_limits(clip, hierarchy)

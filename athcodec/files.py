@@ -1,37 +1,94 @@
-"""Files that take their name only when they are whole."""
+"""Files that take their name only when they are whole, and what dead writers have left of theirs.
+
+A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the writer dies, and
+then renamed. Whoever next writes to the same target removes the parts that nobody holds any more. Where a file system
+has no locks, parts of dead writers stay: one of a living writer is never removed.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
+try:
+    import fcntl
+except ImportError:  # Windows, where nobody can remove a file that another has open
+    fcntl = None
+
+NAME_CHARACTERS = 50  # of the target in the part's name: a name of the longest length has room for the rest too
+PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+
+
+def check_target(path: str | os.PathLike[str]) -> str:
+    """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the directory is
+    missing or read-only, `path` is one, no plain file, or a read-only one."""
+    path = os.fspath(path)
+    target = os.path.realpath(path)
+    directory = os.path.dirname(target if os.path.islink(path) else path) or "."
+    if not os.path.isdir(directory):
+        raise FileNotFoundError(f"{path}: the directory {directory} does not exist")
+    if not os.access(directory, os.W_OK | os.X_OK):
+        raise PermissionError(f"{path}: the directory {directory} is read-only")
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        return target
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(f"{path}: got a directory, expected a file name")
+    if not stat.S_ISREG(mode):
+        raise FileExistsError(f"{path}: got a device, pipe or socket, expected a plain file")
+    if not os.access(target, os.W_OK):
+        raise PermissionError(f"{path}: is read-only")
+    return target
+
 
 class Part:
-    """A file on its way to `path`: it is written as `name`, beside it, until it is complete.
+    """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is open.
 
-    Raises FileNotFoundError where the directory is missing, IsADirectoryError where `path` is one.
+    It has the permissions of the file that it replaces, or those of any new file. Raises OSError.
     """
 
     def __init__(self, path: str | os.PathLike[str]):
-        self.path = os.path.realpath(path)
-        directory, name = os.path.split(self.path)
-        if not os.path.isdir(directory):
-            raise FileNotFoundError(f"{self.path}: the directory {directory} does not exist")
-        if os.path.isdir(self.path):
-            raise IsADirectoryError(f"{self.path}: is a directory, expected a file name")
-        self.name = os.path.join(directory, f".{name}.{secrets.token_hex(4)}.part")
+        self.path = check_target(path)
+        remove_leftovers(self.path)
+        self.name, self.descriptor = _locked_new_file(self.path)
+        try:
+            _take_permissions(self.path, self.descriptor)
+        except BaseException:
+            self.discard()
+            raise
 
     def complete(self) -> None:
-        """Gives the file its name, in place of an older one."""
+        """Gives the file its name, in place of an older one, once its bytes are on the disk."""
+        os.fsync(self.descriptor)
+        if fcntl is None:
+            self._close()  # Windows renames no open files
         os.replace(self.name, self.path)
+        self._close()
 
     def discard(self) -> None:
         """Removes what has been written."""
+        if fcntl is None:
+            self._close()
         with suppress(FileNotFoundError):
             os.unlink(self.name)
+        self._close()
+
+    def unlock(self) -> None:
+        """Leaves the lock to another that opens the file."""
+        if fcntl is not None:
+            fcntl.flock(self.descriptor, fcntl.LOCK_UN)
+
+    def _close(self) -> None:
+        descriptor, self.descriptor = self.descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
 
 
 @contextmanager
@@ -39,11 +96,75 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises OSError."""
     part = Part(path)
     try:
-        with open(part.name, "x+b") as out:
+        with open(part.descriptor, "w+b", closefd=False) as out:
             yield out
-            out.flush()
-            os.fsync(out.fileno())
         part.complete()
     except BaseException:
         part.discard()
         raise
+
+
+def remove_leftovers(path: str) -> None:
+    """Removes what writers that have died, and only those, left of files on their way to `path`."""
+    directory, name = os.path.split(path)
+    form = re.compile(re.escape(_prefix(name)) + r"[0-9a-f]{8}\.part", re.DOTALL)
+    with suppress(OSError):  # a directory that can be written to but not listed
+        for found in os.listdir(directory):
+            if form.fullmatch(found):
+                _remove_if_dead(os.path.join(directory, found))
+
+
+def _prefix(name: str) -> str:
+    return f".{name[:NAME_CHARACTERS]}."
+
+
+def _locked_new_file(path: str) -> tuple[str, int]:
+    directory, name = os.path.split(path)
+    while True:
+        part = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+        try:
+            descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | PLAIN_OPEN, 0o666)
+        except FileExistsError:
+            continue
+        if fcntl is None:
+            return part, descriptor
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if os.fstat(descriptor).st_nlink:
+            return part, descriptor
+        os.close(descriptor)  # another took it for a leftover before it was locked
+
+
+def _remove_if_dead(name: str) -> None:
+    with suppress(OSError):  # held by its writer, gone by now, or not ours
+        if fcntl is None:
+            os.unlink(name)
+            return
+        descriptor = os.open(name, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | PLAIN_OPEN)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if stat.S_ISREG(os.fstat(descriptor).st_mode):
+                os.unlink(name)
+        finally:
+            os.close(descriptor)
+
+
+def _take_permissions(path: str, descriptor: int) -> None:
+    """Owner, where that is allowed, group and mode of an older file: what was private stays so."""
+    if fcntl is None:
+        return
+    try:
+        older = os.stat(path)
+    except FileNotFoundError:
+        return
+    mode = older.st_mode & 0o777
+    for owner in (older.st_uid, -1):
+        try:
+            os.fchown(descriptor, owner, older.st_gid)
+            break
+        except OSError as error:
+            if error.errno not in (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
+                raise
+    else:
+        mode &= ~0o070  # for another group than it was meant for
+    os.fchmod(descriptor, mode)

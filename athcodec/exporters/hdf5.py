@@ -8,7 +8,10 @@ branch_order.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from os import PathLike
 from typing import Any
 
@@ -74,11 +77,13 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._part: Part | None = Part(path)
-        self._file = h5py.File(self._part.name, "x")
+        self._file = None
         try:
-            self._positions = self._create_positions(dtype)
-            self._write_arrays(arrays | _further(attributes))
-            self._write_metadata(metadata or {})
+            self._file = _new_hdf5(self._part)
+            with _write_errors(self._part.path):
+                self._positions = self._create_positions(dtype)
+                self._write_arrays(arrays | _further(attributes))
+                self._write_metadata(metadata or {})
         except BaseException:
             self.abort()
             raise
@@ -100,7 +105,8 @@ class Hdf5Writer:
         stop = self._written + len(frames)
         if stop > self._frame_count:
             raise ClipError(f"frames: got {stop}, expected {self._frame_count}, one per time")
-        self._positions[self._written : stop] = frames
+        with _write_errors(self._part.path):
+            self._positions[self._written : stop] = frames
         self._written = stop
 
     def close(self) -> None:
@@ -112,7 +118,8 @@ class Hdf5Writer:
         try:
             if self._written < self._frame_count:
                 raise ClipError(f"frames: got {self._written}, expected {self._frame_count}, one per time")
-            self._file.close()
+            with _write_errors(self._part.path):
+                self._file.close()
             self._part.complete()
             self._part = None
         except BaseException:
@@ -125,7 +132,9 @@ class Hdf5Writer:
         if part is None:
             return
         try:
-            self._file.close()
+            if self._file is not None:
+                with suppress(OSError, RuntimeError):  # what cannot be written is given up anyway
+                    self._file.close()
         finally:
             part.discard()
 
@@ -174,6 +183,27 @@ def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None
     with writer:
         for _, frames in clip.blocks():
             writer.add(frames)
+
+
+def _new_hdf5(part: Part) -> h5py.File:
+    """Without HDF5's own lock, as the part has one; where the environment insists on it, with that alone."""
+    try:
+        return h5py.File(part.name, "w", locking=False)
+    except BlockingIOError:
+        part.unlock()
+        return h5py.File(part.name, "w")
+
+
+@contextmanager
+def _write_errors(path: str) -> Iterator[None]:
+    """HDF5 says in half a page, or as a RuntimeError, that the disk is full."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        code = re.search(r"errno = (\d+)", str(error))
+        if code is None:
+            raise
+        raise OSError(int(code[1]), os.strerror(int(code[1])), path) from error
 
 
 def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:
