@@ -249,7 +249,7 @@ def _write_hdf5(
 
 def _measure_against(decoder: Decoder, path: str) -> list[dict[str, Any]]:
     """One entry per level: what it promises, and how far off the clip in `path` it is."""
-    with athcodec.read_hdf5(path) as clip, _naming(path), _progress() as report:
+    with athcodec.read_hdf5(path) as clip, _naming(path), clip.watched(), _progress() as report:
         got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")

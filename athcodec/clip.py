@@ -7,7 +7,8 @@ larger than memory works. It knows no file format and derives no hierarchy (see 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -44,6 +45,7 @@ class MotionClip:
     metadata       "unit", "up_axis" and whatever else describes the clip: str, int, float, bool or lists of
                    them.
     resource       something with close(), closed with the clip: the open file behind lazily read positions.
+    unchanged      a function that tells whether what the positions are read from is as it was when the clip was made.
 
     Raises ClipError at construction where the structure is wrong, and from block() and blocks() at the first
     position that is NaN or infinite.
@@ -61,6 +63,7 @@ class MotionClip:
     rest_pose: str = "first"
     stem_index: np.ndarray | None = None
     resource: Any = None
+    unchanged: Callable[[], bool] | None = None
     rest_dtype: np.dtype = field(init=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
 
@@ -126,6 +129,16 @@ class MotionClip:
         self.attributes = check_attributes(self.attributes)
         self.metadata = dict(self.metadata or {})
         self._check_rest()
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Raises ClipError at the end of the block, also instead of what it raises, where the positions come from a file
+        that somebody has written to since the clip was made."""
+        try:
+            yield
+        finally:
+            if self.unchanged is not None and not self.unchanged():
+                raise ClipError("positions: the file was changed while it was read, expected it to stay as it is")
 
     def block(self, start: int, stop: int) -> np.ndarray:
         """Frames start to stop - 1 as a read-only (stop - start, N, 3) array in the clip's dtype.

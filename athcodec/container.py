@@ -200,18 +200,24 @@ class Container:
         self._places = {(chunk.kind, chunk.level, chunk.segment): chunk for chunk in reversed(self.chunks)}
         self._check_length(strict)
 
-    def _read(self, offset: int, length: int, what: str) -> bytes:
+    def _read_some(self, offset: int, length: int) -> bytes:
+        """`length` bytes, or what there is of them: a file may give fewer at a time than it was asked for."""
         self.file.seek(offset)
-        data = self.file.read(length)
-        self.bytes_read += len(data)
+        parts, got = [], 0
+        while got < length and (part := self.file.read(length - got)):
+            parts.append(part)
+            got += len(part)
+        self.bytes_read += got
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def _read(self, offset: int, length: int, what: str) -> bytes:
+        data = self._read_some(offset, length)
         if len(data) < length:
             raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
         return data
 
     def _read_header(self) -> tuple[Header, bytes]:
-        self.file.seek(0)
-        front = self.file.read(_HEADER.size)
-        self.bytes_read += len(front)
+        front = self._read_some(0, _HEADER.size)
         if front[:8] != MAGIC[: len(front)] or not front:
             raise NotAnAthFile(f"file: got {front[:8]!r} at byte 0; expected {MAGIC!r}")
         if len(front) >= 12:

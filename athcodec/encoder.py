@@ -95,7 +95,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
         bound = _bound_for_size(job, target_size)
     else:
         bound = max_error if max_error is not None else _relative_bound(rel_error, job)
-    with new_file(path) as out, tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+    with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         result = job.encode(bound, ct.ChunkStore(spool))
         chunks = result.store.write(out, result.header, result.errors)
         with Decoder(out, strict=True) as decoder:  # before the file gets its name

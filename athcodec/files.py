@@ -8,6 +8,7 @@ has no locks, parts of dead writers stay: one of a living writer is never remove
 from __future__ import annotations
 
 import errno
+import io
 import os
 import re
 import secrets
@@ -80,15 +81,24 @@ class Part:
             os.unlink(self.name)
         self._close()
 
-    def unlock(self) -> None:
-        """Leaves the lock to another that opens the file."""
-        if fcntl is not None:
-            fcntl.flock(self.descriptor, fcntl.LOCK_UN)
-
     def _close(self) -> None:
         descriptor, self.descriptor = self.descriptor, -1
         if descriptor >= 0:
             os.close(descriptor)
+
+
+class _Naming(io.FileIO):
+    """The bytes of a part, whose errors name the file that it becomes."""
+
+    def __init__(self, part: Part):
+        super().__init__(part.descriptor, "w+", closefd=False)
+        self._path = part.path
+
+    def write(self, data) -> int | None:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._path) from None
 
 
 @contextmanager
@@ -96,7 +106,7 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises OSError."""
     part = Part(path)
     try:
-        with open(part.descriptor, "w+b", closefd=False) as out:
+        with io.BufferedRandom(_Naming(part)) as out:
             yield out
         part.complete()
     except BaseException:

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from os import PathLike
 from typing import Any
 
@@ -77,13 +76,13 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._part: Part | None = Part(path)
-        self._file = None
+        self._file, self._sink = None, _Sink(self._part)
         try:
-            self._file = _new_hdf5(self._part)
-            with _write_errors(self._part.path):
-                self._positions = self._create_positions(dtype)
-                self._write_arrays(arrays | _further(attributes))
-                self._write_metadata(metadata or {})
+            self._file = h5py.File(self._sink, "w")
+            self._positions = self._create_positions(dtype)
+            self._write_arrays(arrays | _further(attributes))
+            self._write_metadata(metadata or {})
+            self._sink.check()
         except BaseException:
             self.abort()
             raise
@@ -105,8 +104,8 @@ class Hdf5Writer:
         stop = self._written + len(frames)
         if stop > self._frame_count:
             raise ClipError(f"frames: got {stop}, expected {self._frame_count}, one per time")
-        with _write_errors(self._part.path):
-            self._positions[self._written : stop] = frames
+        self._positions[self._written : stop] = frames
+        self._sink.check()
         self._written = stop
 
     def close(self) -> None:
@@ -118,8 +117,8 @@ class Hdf5Writer:
         try:
             if self._written < self._frame_count:
                 raise ClipError(f"frames: got {self._written}, expected {self._frame_count}, one per time")
-            with _write_errors(self._part.path):
-                self._file.close()
+            self._file.close()
+            self._sink.check()
             self._part.complete()
             self._part = None
         except BaseException:
@@ -133,8 +132,7 @@ class Hdf5Writer:
             return
         try:
             if self._file is not None:
-                with suppress(OSError, RuntimeError):  # what cannot be written is given up anyway
-                    self._file.close()
+                self._file.close()
         finally:
             part.discard()
 
@@ -185,25 +183,64 @@ def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None
             writer.add(frames)
 
 
-def _new_hdf5(part: Part) -> h5py.File:
-    """Without HDF5's own lock, as the part has one; where the environment insists on it, with that alone."""
-    try:
-        return h5py.File(part.name, "w", locking=False)
-    except BlockingIOError:
-        part.unlock()
-        return h5py.File(part.name, "w")
+class _Sink:
+    """The bytes of a part, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that there was
+    an interruption: it loses track of its objects and crashes when the program ends. So it is not told; `check` raises
+    what has happened."""
 
+    def __init__(self, part: Part):
+        self._file, self._path = open(part.descriptor, "r+b", buffering=0, closefd=False), part.path
+        self._error: BaseException | None = None
 
-@contextmanager
-def _write_errors(path: str) -> Iterator[None]:
-    """HDF5 says in half a page, or as a RuntimeError, that the disk is full."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        code = re.search(r"errno = (\d+)", str(error))
-        if code is None:
-            raise
-        raise OSError(int(code[1]), os.strerror(int(code[1])), path) from error
+    def check(self) -> None:
+        """Raises the first error met; an OSError with the name of the file."""
+        if isinstance(self._error, OSError):
+            raise OSError(self._error.errno, self._error.strerror, self._path)
+        if self._error is not None:
+            raise self._error
+
+    def write(self, data) -> int:
+        data = memoryview(data).cast("B")
+        done = 0
+        while done < len(data) and self._error is None:
+            with self._noting():
+                done += self._file.write(data[done:])
+        return len(data)
+
+    def readinto(self, buffer) -> int:
+        view, done = memoryview(buffer).cast("B"), 0
+        while done < len(view) and self._error is None:
+            with self._noting():
+                got = self._file.readinto(view[done:])
+                if not got:
+                    break
+                done += got
+        view[done:] = bytes(len(view) - done)
+        return len(view)
+
+    def read(self, size: int = -1) -> bytes:
+        return self._file.read(size)
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        return self._file.seek(place, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def truncate(self, size: int) -> int:
+        with self._noting():
+            self._file.truncate(size)
+        return size
+
+    def flush(self) -> None:
+        pass  # nothing is held back here
+
+    @contextmanager
+    def _noting(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as error:
+            self._error = self._error or error
 
 
 def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:

@@ -18,7 +18,8 @@ and groups are not read, links are not followed.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import os
+from collections.abc import Callable, Collection, Sequence
 from os import PathLike, fspath
 from typing import Any
 
@@ -75,7 +76,20 @@ def _open(path: str | PathLike[str]) -> h5py.File:
         raise ClipError(f"{fspath(path)}: the HDF5 file cannot be opened: {error}") from error
 
 
+def _watch(file: h5py.File) -> Callable[[], bool]:
+    """Whether the file has kept its size and time. HDF5 itself reads zeros where a file has become shorter."""
+    descriptor = file.id.get_vfd_handle()
+
+    def stamp() -> tuple[int, int]:
+        now = os.fstat(descriptor)
+        return now.st_size, now.st_mtime_ns
+
+    before = stamp()
+    return lambda: stamp() == before
+
+
 def _read(file: h5py.File, rest: str, root: int | Sequence[int] | None, skip: Collection[str]) -> MotionClip:
+    unchanged = _watch(file)
     positions = _dataset(file, "positions")
     if positions is None:
         raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
@@ -91,6 +105,7 @@ def _read(file: h5py.File, rest: str, root: int | Sequence[int] | None, skip: Co
         attributes=attributes,
         metadata=metadata,
         resource=file,
+        unchanged=unchanged,
         **_branches(file, positions, metadata, root),
     )
     _drop_derivable_order(clip)
