@@ -1,0 +1,275 @@
+"""Faults while files are written, from outside: writers killed at random moments, disks that are full, sources that change.
+
+Everything runs as the command that users run, in processes of its own: `run` gives the rows of the table. A final name
+must hold nothing, what it held before, or a whole new file; the next writer to the same place must leave no temporary
+file; an error must be one line and exit code 1. The tests use the same functions with fewer rounds.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import athcodec
+from athcodec.sources import sample_path
+from spec.robust import Row
+
+PATIENCE = 120.0  # seconds after which a command counts as hung
+ONE_LINE = re.compile(r"athcodec: error: [^\n]+\n")
+VERBS = ("encode", "decode", "decode --gzip", "truncate")
+
+
+@dataclass
+class Place:
+    """A folder with a source and its .ath file, and an empty one to write to."""
+
+    source: Path
+    encoded: Path
+    folder: Path
+
+    @classmethod
+    def make(cls, folder: Path) -> Place:
+        source, encoded, out = folder / "source.h5", folder / "encoded.ath", folder / "out"
+        shutil.copy(sample_path(), source)
+        with athcodec.read_hdf5(source) as clip:
+            athcodec.encode(clip, encoded, effort="fast", segment_frames=40)
+        out.mkdir()
+        return cls(source, encoded, out)
+
+    def words(self, verb: str, target: Path) -> list[str]:
+        """The command line of a verb that writes `target`."""
+        given = str(self.source if verb == "encode" else self.encoded)
+        more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--depth", "1"]}
+        return [verb.split()[0], given, str(target), *more.get(verb, [])]
+
+    def left_over(self, target: Path) -> list[str]:
+        return [path.name for path in self.folder.iterdir() if path != target]
+
+
+def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subprocess.Popen:
+    """The command, in a process on which `prepare` has been run."""
+    return subprocess.Popen([sys.executable, "-m", "athcodec", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            text=True, preexec_fn=prepare)
+
+
+def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
+    """(exit code, stderr) of a command; minus SIGKILL where it had to be stopped after PATIENCE."""
+    process = spawn(words, prepare)
+    try:
+        _, err = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        _, err = process.communicate()
+    return process.returncode, err
+
+
+def is_whole(path: Path) -> bool:
+    """Whether an .ath or HDF5 file can be read to its last byte."""
+    try:
+        if path.suffix == ".ath":
+            with athcodec.open(path, strict=True) as decoder:
+                decoder.check()
+        else:
+            with athcodec.read_hdf5(path) as clip:
+                clip.block(0, clip.frame_count)
+    except (athcodec.errors.AthError, OSError):
+        return False
+    return True
+
+
+# ---- killed ----
+
+
+def kill_while_writing(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
+    """Kills a verb with SIGKILL, half of the time as soon as its part is there, else at any moment."""
+    rng, row = random.Random(seed), Row("killed while writing", 0)
+    parts = cleaned = 0
+    while row.tried < rounds and time.monotonic() < until:
+        verb = VERBS[row.tried % len(VERBS)]
+        target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
+        older = rng.choice([None, b"older"])
+        target.unlink(missing_ok=True)
+        if older:
+            target.write_bytes(older)
+        row.wrong += not _survives_a_kill(place, verb, target, older, rng)
+        left = place.left_over(target)
+        parts += bool(left)
+        _next_run(place, target)
+        row.wrong += bool(place.left_over(target)) or not is_whole(target)
+        cleaned += bool(left)
+        row.tried += 1
+        target.unlink()
+    row.note = f"{parts} left a part, {cleaned} were removed by the next run"
+    return row
+
+
+def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None, rng: random.Random) -> bool:
+    """Whether the target is, after the kill, absent or as before, or whole."""
+    process = spawn(place.words(verb, target))
+    if rng.random() < 0.5:
+        while process.poll() is None and not place.left_over(target):
+            time.sleep(0.0005)
+        time.sleep(rng.uniform(0, 0.004 if verb != "encode" else 0.3))
+    else:
+        time.sleep(rng.uniform(0, 1.5))
+    process.kill()
+    process.communicate()
+    if not target.exists():
+        return older is None
+    return target.read_bytes() == older or is_whole(target)
+
+
+def _next_run(place: Place, target: Path) -> None:
+    """Whatever writes to the same place next, in this process, for it is quick."""
+    if target.suffix == ".ath":
+        athcodec.truncate(place.encoded, target, 1)
+    else:
+        with athcodec.open(place.encoded) as decoder:
+            athcodec.write_hdf5(target, decoder)
+
+
+# ---- full disks ----
+
+
+def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: float = float("inf")) -> Row:
+    """Verbs that may write files of so many bytes only (RLIMIT_FSIZE): the write that goes beyond fails with EFBIG."""
+    row = Row("no room to write", 0, note="RLIMIT_FSIZE, the error is EFBIG")
+    for size in sizes:
+        for verb in verbs:
+            if time.monotonic() >= until:
+                return row
+            _judge_refusal(place, verb, row, lambda size=size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+    return row
+
+
+def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
+    """One line, exit code 1, the older file as it was and no other."""
+    target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
+    target.write_bytes(b"older")
+    code, err = finished(place.words(verb, target), prepare)
+    row.tried += 1
+    row.hangs += code == -signal.SIGKILL
+    row.crashes += code < 0 and code != -signal.SIGKILL
+    row.wrong += code >= 0 and not (code == 1 and ONE_LINE.fullmatch(err) is not None)
+    row.wrong += target.read_bytes() != b"older" or bool(place.left_over(target))
+    target.unlink()
+
+
+def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
+    """Verbs on a real file system that is full (a tmpfs in a mount namespace of its own): ENOSPC. Where the system lets
+    nobody make one, nothing is tried and the note says so."""
+    row = Row("disk full", 0)
+    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
+        row.note = "not tried: the system allows no mount namespace here"
+        return row
+    for size in kilobytes:
+        for verb in VERBS:
+            target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
+            command = [sys.executable, "-m", "athcodec", *place.words(verb, target)]
+            script = f'mount -t tmpfs -o size={size}k none "$1" && shift && "$@"; code=$?; ls -A "{place.folder}"; exit $code'
+            done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), *command],
+                                  capture_output=True, text=True, timeout=PATIENCE)
+            row.tried += 1
+            row.crashes += done.returncode > 1
+            row.wrong += done.returncode == 0 or not ONE_LINE.fullmatch(done.stderr) or done.stdout != ""
+    row.note = "tmpfs, the error is ENOSPC"
+    return row
+
+
+# ---- not allowed ----
+
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
+
+
+def obey_permissions() -> None:
+    """For the program that is started next: the modes of files bind it even where the superuser runs it."""
+    ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
+
+
+def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
+    """Into a read-only folder, and over a read-only file."""
+    row = Row("read-only target", 0)
+    for verb in verbs:
+        target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
+        for locked in (place.folder, target):
+            target.write_bytes(b"older")
+            mode = locked.stat().st_mode
+            locked.chmod(0o555 if locked.is_dir() else 0o444)
+            code, err = finished(place.words(verb, target), obey_permissions)
+            locked.chmod(mode)
+            row.tried += 1
+            row.wrong += code != 1 or not ONE_LINE.fullmatch(err) or "read-only" not in err
+            row.wrong += target.read_bytes() != b"older" or bool(place.left_over(target))
+            target.unlink()
+    return row
+
+
+# ---- sources that change ----
+
+
+def change_source(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
+    """Cuts or overwrites the source at a random moment of an encode: a file within its bound of what the source was, or one
+    line; nothing else."""
+    rng, row, accepted = random.Random(seed), Row("source changes while it is read", 0), 0
+    original = place.source.read_bytes()
+    target = place.folder / "target.ath"
+    while row.tried < rounds and time.monotonic() < until:
+        process = spawn(place.words("encode", target))
+        time.sleep(rng.uniform(0.2, 1.2))
+        _damage(place.source, rng)
+        try:
+            _, err = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            row.hangs += 1
+        place.source.write_bytes(original)
+        row.tried += 1
+        row.crashes += process.returncode < 0
+        if process.returncode == 0:  # it had read all it needed
+            accepted += 1
+            code, _ = finished(["verify", str(target), "--against", str(place.source)])
+            row.wrong += code != 0
+            target.unlink()
+        else:
+            row.wrong += not ONE_LINE.fullmatch(err) or target.exists()
+        row.wrong += bool(place.left_over(target))
+    row.note = f"{row.tried - accepted} refused, {accepted} done before the change"
+    return row
+
+
+def _damage(path: Path, rng: random.Random) -> None:
+    size = path.stat().st_size
+    if rng.random() < 0.5:
+        os.truncate(path, rng.randrange(size))
+        return
+    with open(path, "r+b") as file:
+        file.seek(rng.randrange(size // 2))
+        file.write(rng.randbytes(size // 4))
+
+
+def run(budget: float) -> list[Row]:
+    """All of it: 200 kills and what else there is, within about `budget` seconds."""
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        place = Place.make(Path(folder))
+        sizes = [0, 1, 100, 1000, 2048, 4096, 8000]
+        return [
+            fill_disk(place, VERBS, sizes, start + 0.15 * budget),
+            fill_small_disk(place, [4, 8]),
+            write_where_not_allowed(place, VERBS),
+            change_source(place, 60, 1, start + 0.4 * budget),
+            kill_while_writing(place, 200, 2, start + budget),
+        ]
