@@ -34,7 +34,7 @@ from athcodec.ath import Thresholds
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
-from athcodec.errors import AthError, ClipError, LevelUnavailable
+from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.files import check_target
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
@@ -48,6 +48,7 @@ ROUNDING = 1e-6
 
 TRACEBACK = "show the traceback of an error"
 WRITTEN = "file to write; replaced when the new one is complete"
+READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
 LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 
@@ -107,7 +108,7 @@ def _encode(args: argparse.Namespace) -> int:
 
 def _decode(args: argparse.Namespace) -> int:
     _check_output(args.output, args.input)
-    with _open(args.input, allow_partial=args.allow_partial) as decoder:
+    with _open(args.input, args.stats, allow_partial=args.allow_partial) as decoder:
         depth = decoder.deepest if args.depth is None else args.depth
         frames = _frames(args.frames, decoder.frame_count)
         with _progress() as report:
@@ -119,7 +120,7 @@ def _decode(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
-    with _open(args.file) as decoder:
+    with _open(args.file, args.stats) as decoder:
         _print_file(args.file, decoder, args.json)
     return 0
 
@@ -127,7 +128,7 @@ def _info(args: argparse.Namespace) -> int:
 def _verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "against": args.against, "ok": False}
     try:
-        with _open(args.file, strict=True) as decoder:
+        with _open(args.file, args.stats, strict=True) as decoder:
             decoder.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             if args.against:
@@ -174,9 +175,13 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _open(path: str | Path, **options: bool) -> Iterator[Decoder]:
+def _open(path: str | Path, stats: bool = False, **options: bool) -> Iterator[Decoder]:
     with _naming(path), athcodec.open(path, **options) as decoder:
-        yield decoder
+        try:
+            yield decoder
+        finally:
+            if stats:
+                _say("stats", _stats(decoder))
 
 
 @contextmanager
@@ -185,7 +190,7 @@ def _naming(path: str | Path) -> Iterator[None]:
     try:
         yield
     except AthError as error:
-        if str(error).startswith(f"{path}: "):
+        if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise
         raise type(error)(f"{path}: {error}") from error
 
@@ -299,6 +304,14 @@ def _check_output(path: str, source: str) -> None:
     check_target(path)
     if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
         raise FileExistsError(f"{path}: is the input, expected another file name")
+
+
+def _stats(decoder: Decoder) -> str:
+    """What was read of a file, and what that asked of a server."""
+    requests = getattr(decoder.source, "requests", None)
+    if requests is None:
+        return f"{decoder.bytes_read:,} bytes read of {decoder.file_length:,}"
+    return f"{_count(requests, 'request')}, {decoder.source.bytes:,} bytes fetched of {decoder.file_length:,}"
 
 
 def _what_is_missing(decoder: Decoder) -> str:
@@ -584,8 +597,9 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN.ath")
+    verb.add_argument("input", metavar="IN.ath", help=READ)
     verb.add_argument("output", metavar="OUT.h5", help=WRITTEN)
+    _stats_argument(verb)
     verb.add_argument(
         "--depth", metavar="LEVEL", type=_argument(_whole),
         help="level of detail, from 0, the whole plant as one piece (default: the deepest complete one)",
@@ -601,13 +615,19 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     )
 
 
+def _stats_argument(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--stats", action="store_true", help="say on stderr how many requests and bytes it took")
+
+
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("file", metavar="FILE.ath")
+    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    _stats_argument(verb)
     verb.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("file", metavar="FILE.ath")
+    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    _stats_argument(verb)
     verb.add_argument("--against", metavar="SOURCE.h5", help="the source: measure the error of every depth")
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 

@@ -338,8 +338,14 @@ class Container:
         """A chunk's bytes. Raises Truncated, BadChecksum."""
         data = self._read(chunk.offset, chunk.length, str(chunk))
         if crc32c(data) != chunk.checksum:
-            raise BadChecksum(f"{chunk}: got checksum {crc32c(data):#010x}; expected {chunk.checksum:#010x}")
+            doubt = getattr(self.file, "doubt", "")
+            raise BadChecksum(f"{chunk}: got checksum {crc32c(data):#010x}; expected {chunk.checksum:#010x}{doubt}")
         return data
+
+    def prefetch(self, ranges: list[tuple[int, int]]) -> None:
+        """Tells a file that is far away which (offset, size) are read next."""
+        if hasattr(self.file, "prefetch"):
+            self.file.prefetch(ranges)
 
     def read(self, offset: int, length: int) -> bytes:
         """Bytes of the file as they are. Raises Truncated."""

@@ -35,6 +35,7 @@ from athcodec.errors import (
     Truncated,
     error_class,
 )
+from athcodec.files import is_url
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.transform import balanced_segments
 
@@ -67,12 +68,20 @@ class Affines:
 
 
 def open(path, *, strict: bool = False, allow_partial: bool = False, limits: Limits | None = None) -> Decoder:
-    """Opens an .ath file: a path or a seekable binary file object.
+    """Opens an .ath file: a path, a URL (remote.py), or a seekable binary file object.
 
     strict: refuse a file shorter or longer than it says. allow_partial: a damaged level hides itself and those after
-    it instead of raising. Raises a FormatError, or OSError.
+    it instead of raising. Raises a FormatError, or OSError, a RemoteError where it is about a URL.
     """
     return Decoder(path, strict=strict, allow_partial=allow_partial, limits=limits)
+
+
+def _opened(path):
+    if is_url(path):
+        from athcodec.remote import Remote  # what it needs takes long to import
+
+        return Remote(path)
+    return builtins.open(os.fspath(path), "rb")
 
 
 class Decoder:
@@ -80,7 +89,7 @@ class Decoder:
 
     def __init__(self, path, *, strict: bool = False, allow_partial: bool = False, limits: Limits | None = None):
         self._owned = not hasattr(path, "read")
-        self._file = builtins.open(os.fspath(path), "rb") if self._owned else path
+        self._file = _opened(path) if self._owned else path
         try:
             self._open(strict, allow_partial, limits or Limits())
         except BaseException:
@@ -138,6 +147,7 @@ class Decoder:
         return "other chunks"
 
     def _first_damaged_level(self) -> int:
+        self.container.prefetch([(0, self.file_length)])
         for chunk in self.container.chunks:
             if chunk.is_motion and self.container.is_available(chunk):
                 try:
@@ -200,6 +210,11 @@ class Decoder:
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
         return balanced_segments(self.frame_count, self.container.header.segment_count)
+
+    @property
+    def source(self):
+        """The file that the bytes come from. Of a URL: `source.requests` and `source.bytes` count what it has cost."""
+        return self._file
 
     @property
     def bytes_read(self) -> int:
@@ -452,6 +467,7 @@ class Decoder:
         if any(offset + size > self.container.available_length for offset, size in missing):
             raise LevelUnavailable(f"level {depth}, segment {segment}: not in the file; it is cut off at "
                                    f"{self.container.available_length} of {self.file_length} bytes")
+        self.container.prefetch(missing)
         bytes_there = [as_bytes(self.container.read(offset, size)) for offset, size in missing]
         try:
             for (offset, _), data in zip(missing, bytes_there):
@@ -464,6 +480,13 @@ class Decoder:
                 self._player.drop(offset, size)
         return ready
 
+    def _prefetch(self, depth: int, first: int, last: int) -> None:
+        """What the frames first to last - 1 need and is not there yet, where that is more than one segment."""
+        needed = [i for i, (start, stop) in enumerate(self.segments) if start < last and first < stop]
+        if len(needed) > 1:
+            with self._lock:
+                self.container.prefetch(self._player.missing(depth, needed[0], needed[-1]))
+
     def _show(self, segment: int, depth: int, start: int, out: np.ndarray) -> None:
         """Fills `out`, (k, N, 3) float32 or float64, with the frames from `start` on, in the source's order."""
         with self._prepared(segment, depth) as ready:
@@ -473,6 +496,7 @@ class Decoder:
     def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
+        self._prefetch(depth, first, last)
         for start, stop in self.segments:
             low, high = max(start, first), min(stop, last)
             if low < high:
@@ -486,6 +510,7 @@ class Decoder:
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
         shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
+        self._prefetch(depth, first, last)
         for index, (start, stop) in enumerate(self.segments):
             low, high = max(start, first), min(stop, last)
             if low < high:
@@ -543,6 +568,8 @@ class Decoder:
         if not self.complete:
             raise Truncated(f"file: got {self.container.available_length} bytes; expected {self.file_length}; "
                             f"{self.missing}")
+        with self._lock:
+            self.container.prefetch([(0, self.file_length)])
         for chunk in self.container.chunks:
             self._payload(chunk)
         try:

@@ -70,6 +70,10 @@ class LevelUnavailable(AthError, LookupError):
     """A level or frame was asked for that the file, or what is there of it, does not hold."""
 
 
+class RemoteError(AthError, OSError):
+    """Bytes behind a URL cannot be had, or are no longer those of the file that was opened."""
+
+
 def error_class(code: int) -> type[FormatError]:
     """The class of a code of FORMAT.md's table. KeyError: none of a file's."""
     return {each.code: each for each in (FormatError, *FormatError.__subclasses__())}[code]

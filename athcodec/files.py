@@ -25,6 +25,8 @@ except ImportError:  # Windows, where nobody can remove a file that another has 
 NAME_CHARACTERS = 50  # of the target in the part's name: a name of the longest length has room for the rest too
 PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
+_URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
+
 
 def check_target(path: str | os.PathLike[str]) -> str:
     """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the directory is
@@ -47,6 +49,11 @@ def check_target(path: str | os.PathLike[str]) -> str:
     if not os.access(target, os.W_OK):
         raise PermissionError(f"{path}: is read-only")
     return target
+
+
+def is_url(path: object) -> bool:
+    """Whether a path is one for remote.py."""
+    return isinstance(path, str) and _URL.match(path) is not None
 
 
 class Part:

@@ -170,11 +170,12 @@ class File:
 
     # ---- bytes ----
 
-    def missing(self, level: int, segment: int) -> list[tuple[int, int]]:
-        """(offset, size) of the bytes that are still to be fed."""
-        count = lib.ath_ranges(self._file, level, segment, segment, 0, None, 0)
+    def missing(self, level: int, segment: int, last: int | None = None) -> list[tuple[int, int]]:
+        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last."""
+        last = segment if last is None else last
+        count = lib.ath_ranges(self._file, level, segment, last, 0, None, 0)
         ranges = (Range * count)()
-        lib.ath_ranges(self._file, level, segment, segment, 0, ranges, count)
+        lib.ath_ranges(self._file, level, segment, last, 0, ranges, count)
         return [(each.offset, each.size) for each in ranges]
 
     def feed(self, data: np.ndarray, offset: int) -> None:
