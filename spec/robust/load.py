@@ -1,0 +1,395 @@
+"""The decoder under load: many threads, thousands of seeks, a thousand open files, and memory that runs out.
+
+What needs a process of its own (memory is measured, allocations fail, ThreadSanitizer watches the C core) runs in one:
+`python -m spec.robust.load JOB ...` prints one JSON object. `run` gives the rows of the table; the tests use the same
+functions with fewer rounds. Figures of memory are those of the whole process, after a warm-up.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import json
+import os
+import random
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+import athcodec
+from athcodec.errors import AthError, LimitExceeded
+from athcodec.sources import sample_path
+from spec.robust import Row
+
+HERE = Path(__file__).resolve().parent
+CORE = HERE.parent.parent / "athcodec" / "core"
+PATIENCE = 600.0  # seconds after which a process counts as hung
+RACE_FOUND = 66  # ThreadSanitizer's exit code
+GET_HANDLER = 305  # PyDataMem_GetHandler's place in NumPy's table of functions
+
+
+# ---- processes ----
+
+
+def job(name: str, *words: object) -> tuple[int, dict]:
+    """(exit code, result) of one job of this file in a process of its own."""
+    root = str(HERE.parent.parent)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    try:
+        done = subprocess.run([sys.executable, "-m", "spec.robust.load", name, *map(str, words)], env=environment,
+                              capture_output=True, text=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        return -1, {"error": "hung"}
+    result = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    return done.returncode, result | ({"error": done.stderr[-2000:]} if done.returncode else {})
+
+
+def compilers() -> list[str]:
+    """What may know ThreadSanitizer; clang first, whose programs start and run faster with it."""
+    found = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
+    if not found:
+        raise RuntimeError("C compiler: found none of clang, gcc and cc; expected one, or its name in CC")
+    return found
+
+
+def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
+    """A program or library from C, by the first compiler that can."""
+    target = folder / sources[0].stem
+    problems = ""
+    for compiler in compilers():
+        command = [*compiler.split(), "-std=c11", "-O1", "-g", *options, "-o", target, *sources, "-lm", "-lpthread"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode == 0:
+            return target
+        problems += f"{compiler}: {done.stderr.strip()[-500:]}\n"
+    raise RuntimeError(f"{sources[0].name}: got no program, expected one of these compilers to make it\n{problems}")
+
+
+# ---- threads ----
+
+
+def thread_program(folder: Path) -> Path:
+    """threads.c with the decoder's sources, under ThreadSanitizer."""
+    cmake = (CORE / "CMakeLists.txt").read_text()
+    names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
+    flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
+    return compiled(folder, [HERE / "threads.c", *(CORE / name for name in names)], "-fsanitize=thread", *flags,
+                    "-DATH_STATIC", f"-I{CORE}")
+
+
+def race(program: Path, *words: object) -> tuple[int, str, dict]:
+    """(exit code, stderr, result) of one run of threads.c."""
+    environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=0"}
+    done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
+
+
+def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) -> Row:
+    code, err, result = race(program, threads, rounds, *files)
+    row = Row("threads, C core, ThreadSanitizer", result.get("preparations", 0), crashes=int(code < 0))
+    row.wrong = result.get("wrong", 0) + err.count("WARNING: ThreadSanitizer")
+    row.note = f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times meanwhile"
+    return row
+
+
+def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
+    """Threads on one decoder for each file and on decoders of their own, against what one thread alone sees."""
+    row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
+    shared = [athcodec.open(path) for path in files]
+    expected = [[decoder.positions(depth=depth) for depth in range(decoder.level_count)] for decoder in shared]
+
+    def watch(seed: int) -> int:
+        rng, wrong = random.Random(seed), 0
+        own = [athcodec.open(path) for path in files]
+        for _ in range(looks):
+            which = rng.randrange(len(files))
+            decoder = rng.choice((shared, own))[which]
+            wrong += not _same(decoder, expected[which], rng)
+        for decoder in own:
+            decoder.close()
+        return wrong
+
+    with ThreadPoolExecutor(threads) as pool:
+        row.wrong = sum(pool.map(watch, range(threads)))
+    row.tried = threads * looks
+    for decoder in shared:
+        decoder.close()
+    return row
+
+
+def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
+    """Whether a frame or a few, of any level, are what they should be."""
+    depth, frame = rng.randrange(decoder.level_count), rng.randrange(decoder.frame_count)
+    if rng.random() < 0.2:
+        frames = slice(frame, frame + 10)
+        return np.array_equal(decoder.positions(frames, depth), expected[depth][frames])
+    return np.array_equal(decoder.positions(frame, depth), expected[depth][frame])
+
+
+# ---- seeks ----
+
+
+def resident_bytes() -> int:
+    """Of this process; where the system does not say, the most it ever had."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def seek_at_random(path: str, seeks: int) -> dict:
+    """Growth of memory and of the number of Python's objects over so many seeks and changes of level."""
+    rng = random.Random(4)
+    with athcodec.open(path) as decoder:
+        expected = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+
+        def some(count: int) -> int:
+            return sum(not _same(decoder, expected, rng) for _ in range(count))
+
+        wrong = some(300)
+        gc.collect()
+        before, blocks = resident_bytes(), sys.getallocatedblocks()
+        wrong += some(seeks)
+        gc.collect()
+        return {"seeks": seeks, "wrong": wrong, "growth": resident_bytes() - before,
+                "objects": sys.getallocatedblocks() - blocks}
+
+
+def seeks(path: Path, count: int) -> Row:
+    code, result = job("seeks", path, count)
+    row = Row("random seeks and levels", result.get("seeks", 0), crashes=int(code != 0), wrong=result.get("wrong", 0))
+    row.over_limit = int(result.get("growth", 0) > ALLOWED_GROWTH)
+    row.note = f"memory grew by {result.get('growth', 0) / 1000:.0f} kB, {result.get('objects', 0)} objects more"
+    return row
+
+
+ALLOWED_GROWTH = 1 << 20  # bytes: what an allocator may keep; one segment lost at each seek would be a hundred times that
+
+
+# ---- many at once ----
+
+
+def open_many(path: str, count: int) -> dict:
+    """So many decoders at once, each shown once before and after others are closed, in any order."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = count + 100
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+    rng, before, files = random.Random(9), resident_bytes(), _open_files()
+    with athcodec.open(path) as decoder:
+        expected = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+    decoders = [athcodec.open(path) for _ in range(count)]
+    wrong = sum(not _same(decoder, expected, rng) for decoder in decoders)
+    each = (resident_bytes() - before) / count
+    rng.shuffle(decoders)
+    while decoders:
+        decoders.pop().close()
+        for decoder in decoders[: 1 if len(decoders) % 10 else 5]:
+            wrong += not _same(decoder, expected, rng)
+    gc.collect()
+    return {"decoders": count, "wrong": wrong, "bytes_each": each, "files_left": _open_files() - files}
+
+
+def _open_files() -> int:
+    return len(os.listdir("/dev/fd"))
+
+
+def many(path: Path, count: int) -> Row:
+    code, result = job("many", path, count)
+    row = Row("decoders open at once", result.get("decoders", 0), crashes=int(code != 0), wrong=result.get("wrong", 0))
+    row.wrong += result.get("files_left", 0)
+    row.note = f"{result.get('bytes_each', 0) / 1000:.0f} kB each, closed in any order"
+    return row
+
+
+# ---- memory that runs out ----
+
+
+class Scarce:
+    """scarce.c between NumPy and the memory of all arrays of this process, for good."""
+
+    def __init__(self, folder: Path):
+        self._library = ctypes.CDLL(str(compiled(folder, [HERE / "scarce.c"], "-fPIC", "-shared")))
+        self._library.scarce_arm.argtypes = [ctypes.c_long]
+        self._library.scarce_install.argtypes = [ctypes.c_void_p]
+        pointer = ctypes.pythonapi.PyCapsule_GetPointer
+        pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+        table = ctypes.cast(pointer(np._core._multiarray_umath._ARRAY_API, None), ctypes.POINTER(ctypes.c_void_p))
+        handler = ctypes.PYFUNCTYPE(ctypes.py_object)(table[GET_HANDLER])()
+        if not self._library.scarce_install(pointer(handler, b"mem_handler")):
+            raise RuntimeError("NumPy: got another kind of memory handler, expected version 1")
+
+    def fail(self, n: int) -> None:
+        """The n-th array from now on gets no memory."""
+        self._library.scarce_arm(n)
+
+    def end(self) -> bool:
+        """Whether it came to that; from now on all get what they ask for."""
+        return bool(self._library.scarce_arm(0))
+
+
+Call = Callable[[], object]
+
+
+def _calls(path: str, out: str) -> dict[str, Call]:
+    """What is tested, as calls that begin with nothing of their own in memory."""
+
+    def opened(use: Callable[[athcodec.Decoder], object]) -> Call:
+        def call() -> object:
+            with athcodec.open(path) as decoder:
+                return use(decoder)
+
+        return call
+
+    angle = np.linspace(0, 3, 40)
+    rest = np.stack([np.zeros(12), np.linspace(0, 1, 12), np.zeros(12)], 1)
+    clip = athcodec.MotionClip(
+        positions=np.float32(rest + 0.1 * np.sin(angle)[:, None, None] * rest[:, 1:2] ** 2), time=np.arange(40) / 30,
+        vertex_branch=np.repeat([0, 1, 2], 4), branch_parent=[-1, 0, 0], rest=rest)
+    return {
+        "info": opened(lambda decoder: decoder.info()),
+        "positions": opened(lambda decoder: decoder.positions()),
+        "frames": opened(lambda decoder: [decoder.positions(i, depth) for i in (0, -1) for depth in (0, 1)]),
+        "affines": opened(lambda decoder: decoder.affines(3, 1)),
+        "static": opened(lambda decoder: (decoder.attributes, decoder.metadata, decoder.edges, decoder.rest)),
+        "check": opened(lambda decoder: decoder.check()),
+        "truncate": lambda: athcodec.truncate(path, out, 0),
+        "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),
+    }
+
+
+def run_out_of_memory(path: str, seconds: float) -> dict:
+    """Each call with its n-th array failing, for n from 1 until the call needs no more. What it may do is succeed, or raise
+    MemoryError or an error of athcodec's, and leave no file; a decoder that was open must go on as before."""
+    wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
+    with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
+        folder = Path(name)
+        memory, out = Scarce(folder), folder / "out" / "out.ath"
+        out.parent.mkdir()
+        expected = lasting.positions()
+        calls = _calls(path, str(out)) | {
+            "an open decoder": lambda: [lasting.positions(i, depth) for i in (0, -1) for depth in (1, 0)]}
+        for which, call in calls.items():
+            call()  # what is made once is there from now on
+            files, n, fired = _open_files(), 1, True
+            while fired and time.monotonic() < until:
+                out.unlink(missing_ok=True)
+                memory.fail(n)
+                error = _error_of(call)
+                fired = memory.end()
+                tried[which] = n - (not fired)
+                raised += error is not None
+                if not isinstance(error, (MemoryError, AthError, type(None))):
+                    wrong.append(f"{which}, array {n}: {type(error).__name__}: {error}"[:300])
+                if error is not None and any(out.parent.iterdir()):
+                    wrong.append(f"{which}, array {n}: left a file")
+                n += 1
+            del error
+            gc.collect()
+            if _open_files() != files:
+                wrong.append(f"{which}: {_open_files() - files} files stay open")
+            if not np.array_equal(lasting.positions(), expected):
+                wrong.append(f"{which}: the open decoder shows something else")
+    return {"tried": tried, "raised": raised, "wrong": wrong}
+
+
+def _error_of(call: Call) -> BaseException | None:
+    try:
+        call()
+    except BaseException as error:  # which are right is for others to judge
+        return error.with_traceback(None)
+    return None
+
+
+def scarce(path: Path, seconds: float = 300.0) -> Row:
+    """Every array of every call failing once."""
+    code, result = job("scarce", path, seconds)
+    row = Row("the n-th array gets no memory", sum(result.get("tried", {}).values()), crashes=int(code != 0))
+    row.wrong = len(result.get("wrong", []))
+    row.note = "; ".join([f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised",
+                          *result.get("wrong", [])[:3], *result.get("error", "").strip().splitlines()[-1:]])
+    return row
+
+
+def in_little_space(path: str, megabytes: float) -> dict:
+    """One decode with so much address space more than there is now (RLIMIT_AS): the frames, or an error that says so."""
+    with athcodec.open(path) as decoder:
+        expected = decoder.positions(0)
+        room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
+        resource.setrlimit(resource.RLIMIT_AS, (room, resource.RLIM_INFINITY))
+        error = _error_of(lambda: [each.copy() for _, each in decoder.blocks()] + [decoder.positions()])
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        return {"error_name": type(error).__name__ if error else "", "same": np.array_equal(decoder.positions(0), expected)}
+
+
+def little_space(path: Path, sizes: list[float], until: float = float("inf")) -> Row:
+    row, refused = Row("little address space", 0), 0
+    for size in sizes:
+        if time.monotonic() >= until:
+            break
+        code, result = job("space", path, size)
+        row.tried += 1
+        row.crashes += code != 0
+        row.wrong += code == 0 and (not result["same"] or result["error_name"] not in ("", "MemoryError"))
+        refused += result.get("error_name", "") != ""
+    row.note = f"RLIMIT_AS; {refused} raised MemoryError"
+    return row
+
+
+def budgets(path: Path) -> Row:
+    """Limits.memory_bytes from nothing to enough: LimitExceeded before anything large is allocated, or the right frames."""
+    row = Row("memory budgets", 0)
+    with athcodec.open(path) as decoder:
+        expected = decoder.positions()
+    budget, refused = 1, 0
+    while budget < 1 << 31:
+        row.tried += 1
+        try:
+            with athcodec.open(path, limits=athcodec.container.Limits(memory_bytes=budget)) as decoder:
+                row.wrong += not np.array_equal(decoder.positions(), expected)
+        except LimitExceeded:
+            refused += 1
+        budget = int(budget * 1.3) + 1
+    row.note = f"{refused} refused"
+    return row
+
+
+JOBS: dict[str, Callable[..., dict]] = {
+    "seeks": lambda path, count: seek_at_random(path, int(count)),
+    "many": lambda path, count: open_many(path, int(count)),
+    "scarce": lambda path, seconds: run_out_of_memory(path, float(seconds)),
+    "space": lambda path, megabytes: in_little_space(path, float(megabytes)),
+}
+
+
+def run(budget: float) -> list[Row]:
+    """All of it, within about `budget` seconds."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        files = [folder / "short.ath", folder / "long.ath"]
+        for path, frames in zip(files, (16, 40), strict=True):
+            with athcodec.read_hdf5(sample_path()) as clip:
+                athcodec.encode(clip, path, effort="fast", segment_frames=frames)
+        rounds = max(1, int(budget / 60))
+        return [
+            threads_in_c(thread_program(folder), files, 16, rounds),
+            threads_in_python(files, 16, 100 * rounds),
+            seeks(files[0], 10_000),
+            many(files[0], 1_000),
+            budgets(files[0]),
+            scarce(files[1], budget / 3),
+            little_space(files[1], [*range(0, 8), *range(8, 40, 4)], time.monotonic() + budget / 3),
+        ]
+
+
+if __name__ == "__main__":
+    print(json.dumps(JOBS[sys.argv[1]](*sys.argv[2:])))
