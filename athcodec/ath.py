@@ -30,6 +30,7 @@ the best fit flattens a subtree would otherwise have no inverse, or residuals ma
 map's error."""
 
 _LEAST_SCALE = 1e-2         # MIN_STRETCH is relative to this at least: a subtree may shrink to a point
+_SMALLEST_EXTENT = 1e-100    # squares of what is smaller have no inverse
 _POINT_EXTENT = 1e-12       # of the plant's: below it a subtree is one point
 _READ_VALUES = 3 << 21      # numbers read from the clip at once
 _WORK_VERTICES = 1 << 16    # vertex-frames in work at once: a few arrays of them fit a processor's cache
@@ -598,7 +599,7 @@ class _Pieces:
         # Right-handed axes, so that completing a flat piece never mirrors it.
         self.axes[:, :, 2] *= np.sign(np.linalg.det(self.axes))[:, None]
         extent = np.sqrt(np.maximum(variance, 0.0))
-        smallest = _POINT_EXTENT * np.ptp(self.rest, axis=1).max()
+        smallest = max(_POINT_EXTENT * np.ptp(self.rest, axis=1).max(), _SMALLEST_EXTENT)
         present = (extent > RANK_TOLERANCE * extent[:, :1]) & (extent[:, :1] > smallest)
         self.rank = present.sum(axis=1)
         inverse_variance = np.divide(1.0, variance, out=np.zeros_like(variance), where=present)

@@ -20,6 +20,7 @@ LEAST_SHAPE = 0.12  # what a shape that is kept moves in a frame (RMS), in steps
 LARGEST_SHAPE = 2.0**20
 SHAPE_DOUBTS = (1.0, 1.25)  # how much shapes must seem to save, to be tried for a piece
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
+SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
 LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
 REST_CAP = 1.6  # rest pose step over bound: there its own error reaches the bound
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
@@ -33,17 +34,19 @@ def error_limit(bound: float, diagonal: float) -> float:
 
 
 def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
-    """Twice the spacing of the source's own numbers; low, high: (3,) bounding box, dtype: of its positions."""
+    """Twice the spacing of the source's own numbers, or SMALLEST_BOUND; low, high: (3,) bounding box, dtype: of its
+    positions."""
     largest = np.asarray(np.abs([low, high]).max(), dtype)
-    return 2 * float(np.spacing(largest))
+    return max(2 * float(np.spacing(largest)), SMALLEST_BOUND)
 
 
 def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, reach: float) -> None:
     """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `reach`."""
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound > least):
-        raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, twice the spacing of the "
-                         f"source's {np.dtype(dtype).name} coordinates")
+        reason = ("the smallest that a file can hold" if least == SMALLEST_BOUND else
+                  f"twice the spacing of the source's {np.dtype(dtype).name} coordinates")
+        raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
     if reach > LARGEST_REACH * bound:
         raise BoundError(f"max error: got {bound:.3g}; expected at least {reach / LARGEST_REACH:.3g} for positions "
                          f"and a rest pose that are up to {reach:.3g} apart")

@@ -1,0 +1,315 @@
+"""The bound, attacked: clips made to break it, and an honest look at what comes back.
+
+`Attack` says by a few numbers what a clip is like: its hierarchy, rest pose, scale, place, and what its vertices do, which
+no plant does. `broken_promises` encodes and decodes it and returns what was promised and not kept: the bound in every frame
+of every vertex, the error that the file states for each level and segment, the rest pose, refusals that had no reason.
+Distances are measured here, in units of the bound, so that nothing overflows or vanishes. Made by hypothesis, which also
+makes what it finds as small as it can.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+import athcodec
+from athcodec import MotionClip, Thresholds
+from athcodec.clip import LARGEST_COORDINATE
+from athcodec.errors import BoundError
+from spec.robust import Row
+
+HIERARCHIES = ("random", "chain", "bush", "roots", "one")
+RESTS = ("grown", "unrelated", "point", "line", "plane", "lattice", "scales")
+ACTIONS = ("spike", "flicker", "step", "explode", "collapse", "shuffle", "walk", "lattice", "leave", "mirror", "flatten",
+           "noise", "spin", "swap axes")
+
+
+@dataclass(frozen=True)
+class Attack:
+    """A clip in a few numbers."""
+
+    seed: int = 0
+    branches: int = 3
+    longest: int = 4
+    hierarchy: str = "random"
+    rest: str = "grown"
+    actions: tuple[str, ...] = ()
+    frames: int = 20
+    scale: float = 1.0       # of all coordinates
+    squeeze: float = 1.0     # of one axis against the others
+    place: float = 0.0       # distance from the origin, in sizes of the plant
+    wide: bool = False       # float64
+    shuffled: bool = False   # vertices in random order
+    bound: float = 1e-3      # of the diagonal
+    segment_frames: int = 64
+    effort: str = "fast"
+    exact_rest: bool = False
+    tam: tuple[float, int, float, int] | None = None  # lengths as fractions of the diagonal
+
+    def clip(self) -> MotionClip:
+        """Positions are rounded to their type last of all."""
+        rng = np.random.default_rng(self.seed)
+        labels, parents = _hierarchy(rng, self.hierarchy, self.branches, self.longest)
+        rest = _rest(rng, self.rest, labels, parents)
+        positions = np.repeat(rest[None], self.frames, axis=0)
+        if self.rest == "unrelated":
+            rest = rng.normal(size=rest.shape) * 10.0 ** rng.uniform(-3, 3)
+        some = _subtree(parents, int(rng.integers(len(parents))))[labels]
+        with np.errstate(over="ignore", invalid="ignore"):
+            for action in self.actions:
+                positions = _act(rng, action, positions, some)
+            shape = np.array([self.squeeze, 1.0, 1.0])[rng.permutation(3)]
+            corner = self.place * rng.choice([-1.0, 1.0], 3) * max(float(np.ptp(positions)), 1e-3)
+            rest, positions = ((each * shape + corner) * self.scale for each in (rest, positions))
+        limit = 0.99 * LARGEST_COORDINATE
+        rest, positions = (np.clip(np.nan_to_num(each, nan=0.0), -limit, limit) for each in (rest, positions))
+        order = rng.permutation(len(labels)) if self.shuffled else np.arange(len(labels))
+        dtype = np.float64 if self.wide else np.float32
+        return MotionClip(positions=positions[:, order].astype(dtype), rest=rest[order].astype(dtype),
+                          time=np.arange(self.frames) / 30, vertex_branch=labels[order], branch_parent=parents)
+
+    def options(self, clip: MotionClip) -> dict:
+        """Keywords of encode(), with a bound in scene units."""
+        size = extent(clip) or 1.0
+        tam = self.tam and Thresholds(self.tam[0] * size, self.tam[1], self.tam[2] * size, self.tam[3])
+        return {"max_error": self.bound * size, "segment_frames": self.segment_frames, "effort": self.effort,
+                "exact_rest": self.exact_rest, "tam": tam}
+
+
+def extent(clip: MotionClip) -> float:
+    """Diagonal of the box around all frames."""
+    return math.hypot(*np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0))
+
+
+def _hierarchy(rng, kind: str, branches: int, longest: int) -> tuple[np.ndarray, np.ndarray]:
+    if kind == "one":
+        branches = 1
+    index = np.arange(branches)
+    parents = {"random": np.array([-1, *(rng.integers(0, b) for b in range(1, branches))]), "chain": index - 1,
+               "bush": np.where(index, 0, -1), "roots": np.full(branches, -1), "one": index - 1}[kind]
+    return np.repeat(index, rng.integers(1, longest + 1, branches)), parents.astype(np.int64)
+
+
+def _rest(rng, kind: str, labels: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    steps = rng.normal(size=(len(labels), 3)) + [0.0, 0.0, 1.0]
+    if kind == "point":
+        return np.zeros_like(steps)
+    if kind == "line":
+        return np.cumsum(np.abs(steps[:, :1]) * rng.normal(size=3), axis=0)
+    if kind == "plane":
+        return np.cumsum(steps * [1.0, 0.0, 1.0], axis=0)
+    if kind == "lattice":
+        return np.rint(np.cumsum(steps, axis=0))
+    if kind == "scales":  # neighbours twelve orders of magnitude apart
+        return steps * 10.0 ** rng.uniform(-9, 3, (len(labels), 1))
+    rest, first = np.zeros_like(steps), np.searchsorted(labels, np.arange(len(parents)))
+    for branch, parent in enumerate(parents):
+        mine = labels == branch
+        start = rest[first[parent]] if parent >= 0 else 3 * rng.normal(size=3)
+        rest[mine] = start + np.cumsum(0.3 * steps[mine], axis=0)
+    return rest
+
+
+def _subtree(parents: np.ndarray, root: int) -> np.ndarray:
+    inside = np.arange(len(parents)) == root
+    for branch, parent in enumerate(parents):
+        inside[branch] |= parent >= 0 and inside[parent]
+    return inside
+
+
+def _act(rng, action: str, positions: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """What happens to a subtree, `some`, or to all; from a random frame on where it is not everywhere."""
+    frames, count, _ = positions.shape
+    size, late = float(np.ptp(positions)) + 1e-3, slice(int(rng.integers(frames)), None)
+    moved = positions.copy()
+    time_ = np.arange(frames)[:, None, None]
+    if action == "spike":
+        for _ in range(rng.integers(1, 4)):
+            moved[rng.integers(frames), rng.integers(count)] += size * rng.normal(size=3) * 10.0 ** rng.uniform(-3, 6)
+    elif action == "flicker":
+        moved[::2, some] += size * rng.normal(size=3)
+    elif action == "step":
+        moved[late, some] += size * 10.0 ** rng.uniform(-4, 2) * rng.normal(size=3)
+    elif action == "explode":
+        moved[:, some] = moved[:, some] * rng.uniform(1.01, 1.5) ** time_
+    elif action == "collapse":
+        moved[late] = moved[late].mean(axis=1, keepdims=True)
+    elif action == "shuffle":
+        moved[late] = moved[late][:, rng.permutation(count)]
+    elif action == "walk":
+        moved += np.cumsum(rng.normal(size=moved.shape), axis=0) * size * 0.01
+    elif action == "lattice":
+        step = size * 10.0 ** rng.uniform(-5, -1)
+        moved = np.rint((moved + rng.normal(size=moved.shape) * step) / step * 2) * step / 2
+    elif action == "leave":
+        moved += np.linspace(0, 10.0 ** rng.uniform(0, 6), frames)[:, None, None] * size * rng.normal(size=3)
+    elif action in ("mirror", "flatten"):
+        centre = moved[late][:, some].mean(axis=1, keepdims=True)
+        axis = np.where(np.arange(3) == rng.integers(3), -1.0 if action == "mirror" else 0.0, 1.0)
+        moved[late, some] = (moved[late][:, some] - centre) * axis + centre
+    elif action == "noise":
+        moved += rng.normal(size=moved.shape) * size * 10.0 ** rng.uniform(-6, 0)
+    elif action == "spin":
+        angle = time_[..., 0] * rng.uniform(0, 3.2)
+        x, y = moved[..., 0], moved[..., 1]
+        moved[..., 0], moved[..., 1] = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+    elif action == "swap axes":
+        moved[late, some] = moved[late][:, some][..., rng.permutation(3)]
+    return moved
+
+
+# ---- what was promised ----
+
+
+def broken_promises(attack: Attack, folder: Path) -> list[str]:
+    """What encode() and the file promised and did not keep, in words; empty: nothing."""
+    clip = attack.clip()
+    options = attack.options(clip)
+    try:
+        summary = athcodec.encode(clip, folder / "attack.ath", **options)
+    except BoundError as error:
+        return [] if _may_be_refused(clip, options["max_error"]) else [f"refused without reason: {error}"]
+    with athcodec.open(summary.path, strict=True) as decoder:
+        decoder.check()
+        return list(_broken(decoder, clip, options["max_error"], attack))
+
+
+def _may_be_refused(clip: MotionClip, bound: float) -> bool:
+    """Bounds below 1e-35 or twice the spacing of the source's numbers, or 2^28 times smaller than the way from the rest
+    pose."""
+    both = np.concatenate([clip.positions.reshape(-1, 3), clip.rest]).astype(np.float64)
+    spacing = float(np.spacing(np.abs(clip.positions).max()))
+    return bound <= max(2 * spacing, 1e-35) or math.hypot(*np.ptp(both, axis=0)) > 2.0**28 * bound
+
+
+def distances(decoded: np.ndarray, source: np.ndarray, unit: float) -> np.ndarray:
+    """Of vertices, in units."""
+    return np.linalg.norm((decoded.astype(np.float64) - source.astype(np.float64)) / unit, axis=-1)
+
+
+def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: Attack):
+    source = clip.positions
+    if decoder.max_error_bound > bound:
+        yield f"the file promises {decoder.max_error_bound}, not {bound}"
+    for depth, level in enumerate(decoder.depths):
+        off = distances(decoder.positions(depth=depth), source, bound)
+        stated = decoder.container.errors[depth, :, 0] / bound
+        for segment, (start, stop) in enumerate(decoder.segments):
+            worst = off[start:stop].max()
+            if not worst <= stated[segment] * (1 + 1e-6) + 1e-9:
+                yield f"level {depth}, segment {segment}: stated {stated[segment]}, got {worst} bounds"
+        if depth == decoder.level_count - 1 and not off.max() <= 1.0:
+            frame, vertex = np.unravel_index(np.argmax(off), off.shape)
+            yield f"frame {frame}, vertex {vertex}: {off.max()} bounds off"
+    frame = attack.seed % clip.frame_count
+    if not np.array_equal(decoder.positions(frame), decoder.positions()[frame]):
+        yield f"frame {frame} alone is another"
+    if attack.exact_rest:
+        if decoder.rest.tobytes() != clip.rest.astype(clip.rest_dtype).tobytes():
+            yield "the exact rest pose has changed"
+    elif not distances(decoder.rest, clip.rest, bound).max() <= 1.0 + 1e-6 + _rounding(clip, bound):
+        yield f"the rest pose is {distances(decoder.rest, clip.rest, bound).max()} bounds off"
+
+
+def _rounding(clip: MotionClip, bound: float) -> float:
+    """What rounding a rest pose to its own type may add, in bounds: it can lie further out than the motion."""
+    return 2.0 * float(np.spacing(np.abs(clip.rest).max().astype(clip.rest_dtype))) / bound
+
+
+# ---- many of them ----
+
+SCALES = (1.0, 1e-200, 1e-38, 1e-30, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e12, 1e16)
+
+
+@st.composite
+def attacks(draw, **fixed) -> Attack:
+    """Everything drawn but what is fixed. What is simplest comes first in each choice."""
+    drawn = dict(
+        seed=draw(st.integers(0, 10**6)), branches=draw(st.integers(1, 12)), longest=draw(st.sampled_from([1, 2, 3, 8, 70])),
+        hierarchy=draw(st.sampled_from(HIERARCHIES)), rest=draw(st.sampled_from(RESTS)),
+        actions=tuple(draw(st.lists(st.sampled_from(ACTIONS), max_size=3))),
+        frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 31, 33, 64, 100])),
+        scale=draw(st.sampled_from(SCALES)), squeeze=draw(st.sampled_from([1.0, 1e-6, 1e3, 0.0])),
+        place=draw(st.sampled_from([0.0, 1.0, 1e3, 1e5])), wide=draw(st.booleans()), shuffled=draw(st.booleans()),
+        bound=draw(st.sampled_from([1e-3, 1e-1, 1.0, 10.0, 1e-2, 1e-4, 1e-5, 1e-6])),
+        segment_frames=draw(st.integers(16, 256)), effort=draw(st.sampled_from(["fast", "default", "best"])),
+        exact_rest=draw(st.booleans()),
+        tam=draw(st.sampled_from([None, (0.0, 0, 0.0, 0), (10.0, 0, 10.0, 0), (0.01, 2, 0.02, 3), (0.0, 9, 0.0, 99)])))
+    return Attack(**drawn | fixed)
+
+
+LARGE = {
+    "1,000 branches on one stem": Attack(branches=1001, longest=3, hierarchy="bush", frames=12, actions=("walk",)),
+    "a chain of 2,000 branches": Attack(branches=2000, longest=1, hierarchy="chain", frames=6, actions=("walk",)),
+    "a chain of 2,000 that shuffles": Attack(branches=2000, longest=2, hierarchy="chain", frames=4,
+                                             actions=("shuffle", "mirror")),
+    "600 frames in one vertex": Attack(hierarchy="one", longest=1, frames=600, actions=("walk", "spike"),
+                                       segment_frames=256),
+    "a stem of 3,000 vertices": Attack(hierarchy="one", longest=6000, seed=1, frames=6, actions=("noise", "flatten")),
+    "1,000 roots": Attack(branches=1000, hierarchy="roots", frames=8, actions=("leave", "flicker")),
+}
+
+
+def attack_for(seconds: float, first_seed: int = 0) -> Row:
+    """Random attacks, a few hundred from each seed of hypothesis, until the time is over."""
+    row, until, found = Row("the bound, attacked", 0), time.monotonic() + seconds, []
+    with tempfile.TemporaryDirectory() as name:
+
+        @settings(max_examples=300, deadline=None, database=None, phases=[Phase.generate],
+                  suppress_health_check=list(HealthCheck))
+        @given(attacks())
+        def attack_once(attack: Attack) -> None:
+            if time.monotonic() >= until:
+                return
+            row.tried += 1
+            try:
+                broken = broken_promises(attack, Path(name))
+            except Exception as error:  # every one is a find
+                row.crashes += 1
+                broken = [f"{type(error).__name__}: {error}"]
+            if broken:
+                row.wrong += 1
+                found.append(f"{broken[0]} by {describe(attack)}")
+
+        number = first_seed
+        while time.monotonic() < until:
+            seed(number)(attack_once)()
+            number += 1
+    row.note = "; ".join([f"seeds {first_seed} to {number - 1} of hypothesis", *found[:3]])
+    return row
+
+
+def describe(attack: Attack) -> str:
+    """The attack in Python, without what is as usual."""
+    plain = Attack()
+    given_ = [f"{field.name}={getattr(attack, field.name)!r}" for field in dataclasses.fields(Attack)
+              if getattr(attack, field.name) != getattr(plain, field.name)]
+    return f"Attack({', '.join(given_)})"
+
+
+def large() -> Row:
+    row, found = Row("the bound, large hierarchies", 0), []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, attack in LARGE.items():
+            for effort in ("fast", "default"):
+                broken = broken_promises(dataclasses.replace(attack, effort=effort), Path(folder))
+                row.tried += 1
+                row.wrong += bool(broken)
+                found += [f"{name}: {broken[0]}"] if broken else []
+    row.note = "; ".join(found[:3])
+    return row
+
+
+def run(budget: float) -> list[Row]:
+    """All of it, within about `budget` seconds."""
+    start = time.monotonic()
+    row = large()
+    return [row, attack_for(max(10.0, budget - (time.monotonic() - start)))]

@@ -1,0 +1,128 @@
+"""The bound, attacked: whatever a clip does, no vertex is further off than was promised, at any level, in any frame.
+
+The attacks are those of spec/robust/bound.py; `python -m spec.robustness --only bound` runs them for hours.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import athcodec
+from athcodec import quantize as qz
+from athcodec.errors import BoundError, ClipError
+from plants import STEADY, clip_of, plant
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
+
+from spec.robust.bound import ACTIONS, LARGE, Attack, attacks, broken_promises  # noqa: E402
+
+
+@settings(STEADY, max_examples=120)
+@given(attacks())
+def test_no_attack_breaks_a_promise(scratch, attack):
+    assert broken_promises(attack, scratch) == []
+
+
+@pytest.mark.slow
+@settings(STEADY, max_examples=3000)
+@given(attacks())
+def test_no_attack_of_thousands_breaks_a_promise(scratch, attack):
+    assert broken_promises(attack, scratch) == []
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_every_action_alone_keeps_the_bound(action, scratch):
+    assert broken_promises(Attack(seed=3, branches=6, actions=(action,), frames=33, segment_frames=16), scratch) == []
+
+
+@pytest.mark.parametrize("name", ["1,000 branches on one stem", "a chain of 2,000 branches", "1,000 roots"])
+def test_large_hierarchies_keep_the_bound(name, scratch):
+    assert broken_promises(LARGE[name], scratch) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effort", ["fast", "default", "best"])
+@pytest.mark.parametrize("attack", LARGE.values(), ids=LARGE)
+def test_all_large_hierarchies_keep_the_bound_at_every_effort(attack, effort, scratch):
+    assert broken_promises(dataclasses.replace(attack, effort=effort), scratch) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("segment_frames", range(16, 257, 8))
+@pytest.mark.parametrize("effort", ["fast", "default", "best"])
+def test_every_segment_length_keeps_the_bound(segment_frames, effort, scratch):
+    attack = Attack(seed=5, branches=5, frames=257, actions=("walk", "spike"), bound=1e-4, effort=effort)
+    assert broken_promises(dataclasses.replace(attack, segment_frames=segment_frames), scratch) == []
+
+
+def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
+    """One vertex moved by two bounds in one frame, then a table that states less than what is measured."""
+    attack, positions = Attack(actions=("walk",)), athcodec.Decoder.positions
+
+    def moved(decoder, frames=None, depth=None, dtype=None):
+        shown = positions(decoder, frames, depth, dtype).copy()
+        if shown.ndim == 3:
+            shown[7, 1, 2] += 2 * decoder.max_error_bound
+        return shown
+
+    monkeypatch.setattr(athcodec.Decoder, "positions", moved)
+    assert any(re.match(r"frame 7, vertex 1: [12]\.\d+ bounds off", found) for found in broken_promises(attack, scratch))
+    monkeypatch.undo()
+    monkeypatch.setattr(athcodec.container, "_round_up", lambda values: 0.5 * np.asarray(values))
+    assert re.match(r"level 0, segment 0: stated", broken_promises(attack, scratch)[0])
+
+
+# ---- what cannot be kept is refused ----
+
+
+@pytest.mark.parametrize("scale, wide", [(1e-300, True), (1e-160, True), (1e-100, True), (1e-40, True), (1e-40, False),
+                                         (1e-36, False)])
+def test_plants_too_small_for_the_steps_of_a_file_are_refused(scale, wide, scratch):
+    """float64 clips of 1e-200 came back hundreds of bounds off, as squares of their errors are 0; of 1e-40, encoding never
+    ended, as no step of a file is that small."""
+    attack = Attack(scale=scale, wide=wide, actions=("walk",))
+    assert broken_promises(attack, scratch) == []
+    clip = attack.clip()
+    with pytest.raises(BoundError, match="expected more than 1e-35, the smallest that a file can hold"):
+        athcodec.encode(clip, scratch / "tiny.ath", **attack.options(clip))
+    summary = athcodec.encode(clip, scratch / "tiny.ath", max_error=2e-35)
+    with athcodec.open(summary.path) as decoder:
+        assert np.abs(decoder.positions().astype(np.float64) - clip.positions).max() <= 2e-35
+
+
+def test_a_clip_without_any_extent_has_a_bound_that_a_file_can_hold(scratch):
+    still = clip_of(np.zeros((3, 2, 3)), np.zeros((2, 3)), [0, 0], [-1])
+    summary = athcodec.encode(still, scratch / "still.ath")
+    assert summary.max_error_bound >= qz.SMALLEST_BOUND
+    with athcodec.open(summary.path) as decoder:
+        assert not decoder.positions().any()
+
+
+@settings(STEADY, max_examples=40)
+@given(st.integers(0, 19), st.integers(0, 9), st.integers(0, 2), st.sampled_from([np.nan, np.inf, -np.inf, 1e19, -3e38]),
+       st.sampled_from([np.float32, np.float64]))
+def test_one_number_that_is_none_is_refused_wherever_it_is(scratch, frame, vertex, axis, value, dtype):
+    clip = plant(seed=2, branches=5, longest=4, frames=20, dtype=dtype)
+    vertex %= clip.vertex_count
+    clip.positions[frame, vertex, axis] = value
+    with pytest.raises(ClipError, match=f"frame {frame}, vertex {vertex} "):
+        athcodec.encode(clip, scratch / "refused.ath", effort="fast")
+    assert not (scratch / "refused.ath").exists()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_rest_pose_that_is_no_number_is_refused(value):
+    source = plant(seed=2, branches=5, longest=4, frames=3)
+    rest = source.rest.copy()
+    rest[1, 2] = value
+    with pytest.raises(ClipError, match="rest: vertex 1"):
+        clip_of(source.positions, rest, source.vertex_branch, source.branch_parent)
