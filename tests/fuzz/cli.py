@@ -1,0 +1,89 @@
+"""The command `python -m tests.fuzz`: fuzzes each target for a time, or prints what the corpus covers.
+
+Exit code 1 where a target went wrong; the input that did it is kept beside the corpus and named.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from fuzz import coverage, seeds, targets
+from fuzz.targets import BUILD, Outcome
+
+ROUNDTRIP = "roundtrip"
+ALL = (*targets.TARGETS, ROUNDTRIP)
+GRACE = 300
+
+
+def fuzz(target: str, seconds: float, corpus: Path = BUILD / "corpus", sanitizer: str = "address",
+         seed: int = 0) -> Outcome:
+    """One target for some time. Raises BuildError."""
+    if target == ROUNDTRIP:
+        return roundtrip(seconds, seed)
+    used = targets.compiler()
+    program = targets.build(target, used, sanitizer)
+    if used.fuzzer:
+        return targets.fuzz(target, program, seconds, corpus / target, BUILD / "finds", seed=seed)
+    start = BUILD / "seeds" / target
+    seeds.write_inputs(target, start)
+    return targets.replay(target, program, sorted(start.iterdir()))
+
+
+def roundtrip(seconds: float, seed: int) -> Outcome:
+    number = seed or time.time_ns() % 10**9
+    command = [sys.executable, "-m", "fuzz.roundtrip", str(seconds), str(number)]
+    path = {"PYTHONPATH": str(targets.HERE.parent)}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
+    except subprocess.TimeoutExpired as late:
+        return Outcome(ROUNDTRIP, 0, "hang", f"no end {GRACE} s after its time: {late}")
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    last = json.loads(lines[-1]) if lines else {"tried": 0, "failure": ""}
+    if done.returncode == 0:
+        return Outcome(ROUNDTRIP, last["tried"], seconds=seconds)
+    kind = "wrong" if last["failure"] else "crash"
+    return Outcome(ROUNDTRIP, last["tried"], kind, f"{last['failure']}\n{done.stderr}")
+
+
+def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.split("\n\n")[0])
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each target (default: 30)")
+    parser.add_argument("--target", action="append", choices=ALL, help="this one alone; may be repeated")
+    parser.add_argument("--sanitizer", choices=[name for name in targets.SANITIZERS if name != "coverage"],
+                        default="address", help="address (with undefined), memory or none (default: address)")
+    parser.add_argument("--corpus", type=Path, default=BUILD / "corpus", help="folder that grows (default: %(default)s)")
+    parser.add_argument("--coverage", action="store_true", help="print the lines of the decoder that are reached")
+    parser.add_argument("--seed", type=int, default=0, help="0: another one each time")
+    return parser.parse_args(argv)
+
+
+def show(outcome: Outcome) -> None:
+    found = f", {outcome.kind}" if outcome.kind else ""
+    edges = f", {outcome.edges} edges" if outcome.edges else ""
+    print(f"{outcome.target}: {outcome.tried} inputs{edges}{found}", flush=True)
+    if outcome.kind:
+        print(outcome.log[-6000:])
+    if outcome.artifact:
+        print(f"{outcome.target}: kept {outcome.artifact}")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    args = arguments(argv)
+    if args.coverage:
+        files = coverage.measure(args.corpus)
+        print(coverage.as_text(files) if files is not None else coverage.NO_CLANG)
+        return 0
+    if not targets.compiler().fuzzer:
+        print(f"fuzz: {targets.NO_FUZZER}", flush=True)
+    outcomes = []
+    for target in args.target or ALL:
+        outcomes.append(fuzz(target, args.seconds, args.corpus, args.sanitizer, args.seed))
+        show(outcomes[-1])
+    return 1 if any(outcome.kind for outcome in outcomes) else 0

@@ -1,0 +1,212 @@
+/* Fuzz target: a whole decoder in use. The last bytes of an input say which limits it has, how much of the file is there,
+ * and in which order bytes come and go while segments are prepared and played. */
+#include "harness.h"
+
+enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 10 };
+
+typedef struct {
+    const ath_file *file;
+    ath_info info;
+    const ath_segment *held[HELD];
+    const uint8_t *bytes;
+    size_t size;
+    void *work, *memory;    /* of the preparation that is under way, if any */
+} user;
+
+static void prepare(user *u, int32_t argument)
+{
+    int32_t level = argument % u->info.level_count, segment = argument / 3 % u->info.segment_count;
+    ath_segment *made = fuzz_prepare(u->file, segment, level, 1 + argument, MOST_MEMORY, argument);
+    free((void *)(uintptr_t)u->held[argument % HELD]);
+    u->held[argument % HELD] = made;
+}
+
+static void feed_or_drop(user *u, int32_t argument)
+{
+    size_t at = u->size * (size_t)(argument & 15) / 16, size = (u->size - at) * (size_t)(argument >> 4 & 7) / 7;
+    if (argument & 128)
+        ath_drop((ath_file *)(uintptr_t)u->file, at, size);
+    else
+        ath_feed((ath_file *)(uintptr_t)u->file, u->bytes + at, at, size);
+}
+
+static void abandon(user *u)
+{
+    free(u->work);
+    free(u->memory);
+    u->work = u->memory = NULL;
+}
+
+/* Begins a preparation that later calls take on, or never. */
+static void begin(user *u, int32_t argument)
+{
+    int32_t level = argument % u->info.level_count, segment = argument / 5 % u->info.segment_count;
+    size_t work_size = ath_work_size(u->file), size = ath_segment_size(u->file, level);
+    abandon(u);
+    if (work_size > MOST_MEMORY || size > MOST_MEMORY) return;
+    u->work = fuzz_memory(work_size, 0xff);
+    u->memory = fuzz_memory(size, 0xff);
+    if (ath_prepare_start(u->work, work_size, u->file, segment, level, u->memory, size) != ATH_OK) abandon(u);
+}
+
+/* The bytes of a preparation that is under way stay fed: what reads them here is a copy of the file that stays. */
+static void go_on(user *u, int32_t argument)
+{
+    if (u->work && ath_prepare_step((ath_work *)u->work, argument) != ATH_MORE) abandon(u);
+}
+
+static double place(const user *u, int32_t argument)
+{
+    static const double odd[4] = {-1.0, 1e300, 0.0, 1e-300};
+    argument &= 255;
+    if (argument >= 252) return odd[argument - 252];
+    return ath_frame_at(u->file, u->info.duration * argument / 100.0, (ath_wrap)(argument % 3));
+}
+
+static void play(user *u, int32_t argument, int wide)
+{
+    size_t vertices = (size_t)u->info.vertex_count, stride = (size_t)(3 + argument % 2) * (wide ? sizeof(double) : sizeof(float));
+    ath_order order = argument & 4 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER;
+    double at = place(u, argument);
+    void *out = fuzz_memory(vertices * stride, 0);
+    int result = wide ? ath_positions_wide(u->file, u->held, HELD, at, order, out, stride)
+                      : ath_positions(u->file, u->held, HELD, at, order, out, stride);
+    REQUIRE(result == ATH_OK || result == ATH_HELD || result == ATH_NOT_PREPARED, "playing gives its codes");
+    free(out);
+}
+
+static void show_parts(user *u, int32_t argument, int wide)
+{
+    double at = place(u, argument);
+    int32_t level = ath_shown_level(u->file, u->held, HELD, at), parts, nodes, exact;
+    if (level < 0) return;
+    ath_cut_size(u->file, level, &parts, &nodes, &exact);
+    size_t number = wide ? sizeof(double) : sizeof(float);
+    void *matrices = fuzz_memory((size_t)nodes * 12 * number, 0), *stems = fuzz_memory((size_t)exact * 3 * number, 0);
+    ath_part *cut = fuzz_memory((size_t)parts * sizeof *cut, 0);
+    ath_cut(u->file, level, cut);
+    int32_t next = 0;
+    for (int32_t i = 0; i < parts; i++) {
+        REQUIRE(cut[i].first == next && cut[i].count > 0, "parts ascend and leave nothing out");
+        next += cut[i].count;
+    }
+    REQUIRE(next == u->info.vertex_count, "parts hold every vertex");
+    if (wide) {
+        ath_matrices_wide(u->file, u->held, HELD, at, matrices, 12 * number);
+        ath_exact_wide(u->file, u->held, HELD, at, stems, 3 * number);
+    } else {
+        ath_matrices(u->file, u->held, HELD, at, matrices, 12 * number);
+        ath_exact(u->file, u->held, HELD, at, stems, 3 * number);
+    }
+    free(cut);
+    free(stems);
+    free(matrices);
+}
+
+static void ask(user *u, int32_t argument)
+{
+    int32_t level = argument % u->info.level_count, segment = argument % u->info.segment_count;
+    int32_t count = ath_ranges(u->file, level, 0, segment, argument & 1, NULL, 0);
+    ath_range *ranges = fuzz_memory((size_t)count * sizeof *ranges, 0);
+    REQUIRE(ath_ranges(u->file, level, 0, segment, argument & 1, ranges, count) == count, "ranges are counted alike");
+    for (int32_t i = 0; i < count; i++)
+        REQUIRE(ranges[i].size > 0 && ranges[i].offset + ranges[i].size <= u->info.file_length
+                    && (i == 0 || ranges[i].offset > ranges[i - 1].offset + ranges[i - 1].size), "ranges ascend");
+    free(ranges);
+    int32_t ready = ath_ready_level(u->file, segment);
+    REQUIRE(ready >= -1 && ready < u->info.level_count, "a ready level is one of the file's");
+    if (ready >= 0) REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
+    double largest, rms;
+    ath_level_error(u->file, level, argument & 2 ? segment : -1, &largest, &rms);
+    level = ath_depth_for(u->file, argument & 4 ? segment : -1, argument, 0.02 * argument, 1080.0, 1.0);
+    REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
+    for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i);
+    int32_t last = u->info.vertex_count - 1;
+    REQUIRE(ath_vertex_source(u->file)[last] <= last, "vertices are those of the source");
+    REQUIRE(ath_branch_source(u->file)[u->info.branch_count - 1] < u->info.branch_count, "so are branches");
+    REQUIRE(ath_branches(u->file)[0].parent == -1 && ath_times(u->file)[0] <= ath_times(u->file)[u->info.frame_count - 1],
+            "the first branch is a root, and times ascend");
+    REQUIRE(ath_fault(u->file) == -1, "an opened file has no fault");
+}
+
+/* Memory that is too small or not aligned, and levels and segments that there are not. */
+static void misuse(user *u, int32_t argument)
+{
+    size_t work_size = ath_work_size(u->file), size = ath_segment_size(u->file, 0), less = 1 + (size_t)argument;
+    if (work_size > MOST_MEMORY || size > MOST_MEMORY) return;
+    uint8_t *work = fuzz_memory(work_size + 1, 0), *memory = fuzz_memory(size, 0);
+    int32_t segments = u->info.segment_count, levels = u->info.level_count;
+    REQUIRE(ath_prepare_start(work, work_size - less, u->file, 0, 0, memory, size) == ATH_NO_MEMORY, "too little is seen");
+    REQUIRE(ath_prepare_start(work + 1, work_size, u->file, 0, 0, memory, size) == ATH_NO_MEMORY, "alignment is seen");
+    REQUIRE(ath_prepare_start(work, work_size, u->file, 0, 0, memory, size - 1) == ATH_NO_MEMORY, "too little is seen");
+    REQUIRE(ath_prepare_start(work, work_size, u->file, segments, 0, memory, size) == ATH_BAD_ARGUMENT, "no such segment");
+    REQUIRE(ath_prepare_start(work, work_size, u->file, -1, 0, memory, size) == ATH_BAD_ARGUMENT, "no such segment");
+    REQUIRE(ath_prepare_start(work, work_size, u->file, 0, levels, memory, size) == ATH_BAD_ARGUMENT, "no such level");
+    REQUIRE(ath_build((ath_file *)(uintptr_t)u->file, memory, 0) == ATH_NO_MEMORY, "too little is seen");
+    REQUIRE(ath_open(memory, size < 64 ? size : 64, u->bytes, u->size, NULL) == ATH_NO_MEMORY, "too little is seen");
+    free(work);
+    free(memory);
+    for (int32_t result = -1; result < 72; result += 1 + argument % 3) REQUIRE(ath_result_name(result)[0] != 0, "a name");
+}
+
+static void rest(user *u, int32_t argument)
+{
+    size_t vertices = (size_t)u->info.vertex_count;
+    double *wide = fuzz_memory(3 * vertices * sizeof *wide, 0);
+    float *narrow = fuzz_memory(3 * vertices * sizeof *narrow, 0);
+    ath_rest_wide(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, wide, 3 * sizeof *wide);
+    ath_rest(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, narrow, 3 * sizeof *narrow);
+    for (size_t i = 0; i < 3 * vertices; i++)
+        REQUIRE(narrow[i] == (float)wide[i] || wide[i] != wide[i], "both widths hold the same rest pose");
+    free(narrow);
+    free(wide);
+}
+
+static void call(user *u, int32_t which, int32_t argument)
+{
+    if (which == 0) prepare(u, argument);
+    if (which == 1 && !u->work) feed_or_drop(u, argument);
+    if (which == 2) begin(u, argument);
+    if (which == 3) go_on(u, argument);
+    if (which == 4 || which == 5) play(u, argument, which == 5);
+    if (which == 6) show_parts(u, argument, argument & 1);
+    if (which == 7) ask(u, argument);
+    if (which == 8) rest(u, argument);
+    if (which == 9) misuse(u, argument);
+}
+
+static void use(const fuzz_file *opened, const uint8_t *bytes, size_t size, const uint8_t *options)
+{
+    user u;
+    memset(&u, 0, sizeof u);
+    u.file = opened->file;
+    u.bytes = bytes;
+    u.size = size;
+    ath_get_info(u.file, &u.info);
+    for (int32_t i = 3; i + 1 < OPTIONS; i += 2) call(&u, options[i] % CALLS, options[i + 1]);
+    for (int32_t level = 0; level < u.info.level_count; level++) {
+        prepare(&u, level * 7 + options[3]);
+        play(&u, options[4] + level, level & 1);
+        show_parts(&u, options[5], level & 1);
+    }
+    abandon(&u);
+    for (int32_t i = 0; i < HELD; i++) free((void *)(uintptr_t)u.held[i]);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size < OPTIONS) return 0;
+    const uint8_t *options = data + size - OPTIONS;
+    ath_limits limits = fuzz_limits((uint64_t)1 << (14 + options[1] % 8));
+    fuzz_file opened;
+    uint8_t *file = fuzz_copy(data, size - OPTIONS);
+    if (options[0] & 3) fuzz_repair(file, size - OPTIONS);
+    size_t there = size - OPTIONS, least = there, memory;
+    if (options[0] & 4 && ath_front(file, there, &limits, &least, &memory) == ATH_OK) there = least;
+    if (fuzz_open(&opened, file, there, &limits, options[2])) {
+        use(&opened, file, size - OPTIONS, options);
+        fuzz_close(&opened);
+    }
+    free(file);
+    return 0;
+}

@@ -1,0 +1,157 @@
+/* What the fuzz targets share (harness.h). Left out: anything that a target does not need of a file. */
+#include "harness.h"
+
+/* MemorySanitizer notices by itself what was never written. */
+#if defined(__has_feature)
+#if __has_feature(memory_sanitizer)
+#define FILLS 0
+#endif
+#endif
+#ifndef FILLS
+#define FILLS 1
+#endif
+
+enum { FILE_LENGTH_AT = 16, CHECKSUM_AT = 12 };
+
+void *fuzz_memory(size_t size, int fill)
+{
+    void *memory = malloc(size);
+    REQUIRE(memory || size == 0, "memory within the limits can be had");
+    if (memory && FILLS) memset(memory, fill, size);
+    return memory;
+}
+
+uint8_t *fuzz_copy(const uint8_t *bytes, size_t size)
+{
+    uint8_t *copy = fuzz_memory(size, 0);
+    if (size > 0) memcpy(copy, bytes, size);
+    return copy;
+}
+
+ath_limits fuzz_limits(uint64_t memory_bytes)
+{
+    ath_limits limits;
+    ath_default_limits(&limits);
+    limits.table_bytes = 1u << 20;
+    limits.frames = 1u << 16;
+    limits.memory_bytes = memory_bytes;
+    return limits;
+}
+
+/* ---- checksums that fit ---- */
+
+uint32_t fuzz_u32(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+void fuzz_put_u32(uint8_t *at, uint32_t value)
+{
+    for (int i = 0; i < 4; i++) at[i] = (uint8_t)(value >> 8 * i);
+}
+
+size_t fuzz_chunks_at(const uint8_t *file, size_t size)
+{
+    if (size < HEADER) return 0;
+    uint64_t at = HEADER + (uint64_t)ENTRY * fuzz_u32(file + CHUNK_COUNT_AT) + (uint64_t)8 * file[44] * fuzz_u32(file + 40);
+    return at <= size ? (size_t)at : 0;
+}
+
+void fuzz_repair(uint8_t *file, size_t size)
+{
+    static const uint8_t front[12] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', 0, 0, 3, 0};
+    size_t tables_end = fuzz_chunks_at(file, size), at = tables_end;
+    if (tables_end == 0) return;
+    for (uint32_t i = 0; i < fuzz_u32(file + CHUNK_COUNT_AT); i++) {
+        uint8_t *entry = file + HEADER + (size_t)ENTRY * i;
+        size_t length = fuzz_u32(entry + 8);
+        if (length > size - at) length = size - at;
+        fuzz_put_u32(entry + 8, (uint32_t)length);
+        fuzz_put_u32(entry + 12, ath_crc32c(0, file + at, length));
+        at += length;
+    }
+    memcpy(file, front, sizeof front);
+    fuzz_put_u32(file + FILE_LENGTH_AT, (uint32_t)at);
+    fuzz_put_u32(file + FILE_LENGTH_AT + 4, 0);
+    fuzz_put_u32(file + CHECKSUM_AT, 0);
+    fuzz_put_u32(file + CHECKSUM_AT, ath_crc32c(0, file, tables_end));
+}
+
+/* ---- a file and its segments ---- */
+
+static int is_refusal(int result) { return result > ATH_OK && result < ATH_TRAILING_BYTES; }
+
+int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const ath_limits *limits, int fill)
+{
+    size_t front = 0, size = 0;
+    int result = ath_front(bytes, available, limits, &front, &size);
+    if (result == ATH_MISSING) REQUIRE(front > available, "what is missing is more than what is there");
+    if (result != ATH_OK) {
+        REQUIRE(result == ATH_MISSING || is_refusal(result), "ath_front gives a code of ath.h");
+        return 0;
+    }
+    REQUIRE(front <= available, "a prelude that was accepted is there");
+    opened->file = fuzz_memory(size, fill);
+    result = ath_open(opened->file, size, bytes, available, limits);
+    if (result != ATH_OK) {
+        REQUIRE(is_refusal(result), "ath_open refuses with an error of the file");
+        free(opened->file);
+        return 0;
+    }
+    size_t build = ath_build_size(opened->file);
+    opened->memory = size + build;
+    opened->bases = fuzz_memory(build, fill);
+    REQUIRE(ath_build(opened->file, opened->bases, build) == ATH_OK, "ath_build takes the size it asked for");
+    return 1;
+}
+
+void fuzz_close(fuzz_file *opened)
+{
+    free(opened->file);
+    free(opened->bases);
+}
+
+ath_segment *fuzz_prepare(const ath_file *file, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill)
+{
+    size_t work_size = ath_work_size(file), size = ath_segment_size(file, level);
+    if (work_size > most || size > most) return NULL;
+    void *work = fuzz_memory(work_size, fill), *memory = fuzz_memory(size, fill);
+    int64_t left = ath_prepare_steps(file, segment, level);
+    int at_once = steps == INT32_MAX;
+    int result = at_once ? ath_prepare(work, work_size, file, segment, level, memory, size)
+                         : ath_prepare_start(work, work_size, file, segment, level, memory, size);
+    if (result == ATH_OK && !at_once) {
+        do {
+            REQUIRE(left > 0, "preparing takes no more steps than ath_prepare_steps says");
+            result = ath_prepare_step((ath_work *)work, steps);
+            left -= steps;
+        } while (result == ATH_MORE);
+    }
+    if (result == ATH_BAD_CHECKSUM || result == ATH_BAD_CHUNK) {
+        REQUIRE(ath_work_fault(work) >= 0, "a refusal names its chunk");
+        REQUIRE(ath_prepare_step((ath_work *)work, 1) == ATH_BAD_ARGUMENT, "what was refused cannot go on");
+    } else {
+        REQUIRE(result == ATH_OK || result == ATH_MISSING, "preparing gives its codes");
+    }
+    free(work);
+    REQUIRE((ath_segment_level(memory) == level) == (result == ATH_OK), "only what was prepared says so");
+    REQUIRE((ath_segment_index(memory) == segment) == (result == ATH_OK), "only what was prepared says so");
+    if (result == ATH_OK) return memory;
+    free(memory);
+    return NULL;
+}
+
+int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b)
+{
+    size_t vertices = (size_t)file->info.vertex_count, size = 3 * vertices * sizeof(double);
+    double *first = fuzz_memory(size, 0), *second = fuzz_memory(size, 0xff);
+    int same = 1;
+    for (int32_t t = a->start; t < a->start + a->frames && same; t++) {
+        REQUIRE(ath_positions_wide(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK, "it plays");
+        REQUIRE(ath_positions_wide(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK, "it plays");
+        same = memcmp(first, second, size) == 0;
+    }
+    free(first);
+    free(second);
+    return same;
+}

@@ -1,0 +1,34 @@
+/* Fuzz target: the motion streams of every segment at every level of a file whose checksums fit, decoded twice, in one go
+ * and in steps, over memory that held other things: the bits have to be the same. */
+#include "harness.h"
+
+enum { MOST_MEMORY = 8 << 20, MOST_SEGMENTS = 8 };
+
+static void decode_level(const ath_file *file, int32_t segment, int32_t level, const uint8_t *options)
+{
+    ath_segment *whole = fuzz_prepare(file, segment, level, INT32_MAX, MOST_MEMORY, 0xa5);
+    ath_segment *stepped = fuzz_prepare(file, segment, level, 1 + options[1] % 7, MOST_MEMORY, options[2]);
+    REQUIRE((whole != NULL) == (stepped != NULL), "steps decode what one go does");
+    if (whole) REQUIRE(fuzz_same(file, whole, stepped), "a level is a function of the file's bytes");
+    free(whole);
+    free(stepped);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size < OPTIONS) return 0;
+    const uint8_t *options = data + size - OPTIONS;
+    ath_limits limits = fuzz_limits(2 << 20);
+    fuzz_file opened;
+    uint8_t *file = fuzz_copy(data, size - OPTIONS);
+    fuzz_repair(file, size - OPTIONS);
+    if (fuzz_open(&opened, file, size - OPTIONS, &limits, 0xa5)) {
+        ath_info info;
+        ath_get_info(opened.file, &info);
+        for (int32_t s = 0; s < ath_min(info.segment_count, MOST_SEGMENTS); s++)
+            for (int32_t level = 0; level < info.level_count; level++) decode_level(opened.file, s, level, options);
+        fuzz_close(&opened);
+    }
+    free(file);
+    return 0;
+}

@@ -1,0 +1,144 @@
+/* Fuzz target: the streams of the prelude, each from bytes of its own, and the plan that follows from them. The counts
+ * come from the first bytes, so that no header stands between the fuzzer and the streams. */
+#include "harness.h"
+#include "decode.h"
+
+enum { HEAD = 16, MOST_VERTICES = 512, MOST_FRAMES = 1024 };
+
+typedef struct {
+    const uint8_t *at;
+    size_t left;
+} input;
+
+static ath_bytes take(input *from, size_t size)
+{
+    ath_bytes taken = {from->at, size < from->left ? size : from->left};
+    from->at += taken.size;
+    from->left -= taken.size;
+    return taken;
+}
+
+static size_t u16_at(const uint8_t *at) { return (size_t)at[0] | (size_t)at[1] << 8; }
+
+/* A stream in memory of its own, so that reading beyond it is seen. */
+static ath_bytes own(ath_bytes stream)
+{
+    stream.bytes = fuzz_copy(stream.bytes, stream.size);
+    return stream;
+}
+
+static void drop(ath_bytes stream) { free((void *)(uintptr_t)stream.bytes); }
+
+static void check_branches(const ath_branch *branches, int32_t count, int32_t vertices)
+{
+    for (int32_t b = 0; b < count; b++) {
+        const ath_branch *branch = branches + b;
+        REQUIRE(branch->parent < b && branch->count > 0 && branch->first + branch->count <= vertices, "branches are in range");
+        REQUIRE(branch->subtree >= 1 && b + branch->subtree <= count, "subtrees are in range");
+        REQUIRE((branch->parent < 0) == (branch->attach < 0), "what hangs, hangs on a vertex");
+    }
+}
+
+/* Pieces and nodes of a hierarchy over a rest pose that may be anything finite. */
+static void plan(ath_branch *branches, int32_t branch_count, int32_t vertices, const double *rest)
+{
+    ath_shape shape;
+    memset(&shape, 0, sizeof shape);
+    shape.vertex_count = vertices;
+    shape.branch_count = branch_count;
+    shape.branches = branches;
+    shape.rest = rest;
+    shape.piece_count = ath_count_pieces(branches, branch_count, vertices);
+    shape.node_count = ath_count_nodes(branches, branch_count);
+    size_t table_size = ath_basis_table_size(shape.piece_count);
+    ath_piece *pieces = fuzz_memory((size_t)shape.piece_count * sizeof *pieces, 0xa5);
+    ath_node *nodes = fuzz_memory((size_t)shape.node_count * sizeof *nodes, 0xa5);
+    int32_t *memory = fuzz_memory((size_t)vertices * sizeof *memory, 0xa5);
+    int32_t *table = fuzz_memory(table_size * sizeof *table, 0xa5);
+    uint8_t *gaps = fuzz_memory((size_t)vertices, 0xa5);
+    shape.pieces = pieces;
+    shape.nodes = nodes;
+    ath_plan(&shape, pieces, nodes, memory, 0);
+    if (shape.height + 2 <= ATH_LEVELS) {
+        int64_t count = ath_basis_layout(pieces, shape.piece_count, rest, gaps, table);
+        REQUIRE(count <= 2 * (int64_t)ATH_PIECE_VERTICES * vertices, "bases are bounded by the vertices");
+        double *bases = fuzz_memory((size_t)count * sizeof *bases, 0xa5);
+        double *work = fuzz_memory(ATH_BASIS_WORK * sizeof *work, 0xa5);
+        ath_basis_fill(pieces, shape.piece_count, rest, gaps, work, bases);
+        ath_plan_nodes(&shape, nodes);
+        free(work);
+        free(bases);
+    }
+    free(gaps);
+    free(table);
+    free(memory);
+    free(nodes);
+    free(pieces);
+}
+
+static int all_finite(const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!ath_is_finite(values[i])) return 0;
+    return 1;
+}
+
+static double step_from(const uint8_t *at)
+{
+    double step;
+    memcpy(&step, at, sizeof step);
+    return ath_is_finite(step) && step > 0.0 ? step : 0.01;
+}
+
+static void decode_time(void *model, ath_bytes stream, int32_t frames)
+{
+    double *times = fuzz_memory((size_t)frames * sizeof *times, 0xa5);
+    if (ath_decode_times(model, stream.bytes, stream.size, frames, times) == ATH_OK)
+        REQUIRE(all_finite(times, (size_t)frames), "times that were accepted are finite");
+    free(times);
+}
+
+static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t rank, int32_t bits)
+{
+    int32_t limit = 1 << (bits - 1);
+    size_t count = (size_t)rank * (size_t)frames;
+    int32_t *basis = fuzz_memory(count * sizeof *basis, 0x7f);
+    if (ath_decode_temporal(model, stream.bytes, stream.size, rank, frames, limit, basis) == ATH_OK)
+        for (size_t i = 0; i < count; i++) REQUIRE(basis[i] >= -limit && basis[i] <= limit, "a basis keeps to its limit");
+    free(basis);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size < HEAD) return 0;
+    input rest_of_input = {data + HEAD, size - HEAD};
+    int32_t vertices = 1 + (int32_t)(u16_at(data) % MOST_VERTICES);
+    int32_t branch_count = 1 + (int32_t)(u16_at(data + 2) % (size_t)vertices);
+    int32_t frames = 1 + (int32_t)(u16_at(data + 4) % MOST_FRAMES), method = data[6];
+    ath_bytes hierarchy = own(take(&rest_of_input, u16_at(data + 14)));
+    ath_bytes body = own(take(&rest_of_input, rest_of_input.left));
+    void *model = fuzz_memory(ath_prelude_model_size(), 0x7f);
+    if (method & 4) decode_time(model, body, frames);
+    if (method & 8) decode_basis(model, body, ath_min(frames, 256), 1 + data[7] % ath_min(frames, 256), 8 + (method >> 4) % 9);
+    ath_branch *branches = fuzz_memory((size_t)branch_count * sizeof *branches, 0);
+    int32_t *branch_source = fuzz_memory((size_t)branch_count * sizeof *branch_source, 0x7f);
+    int32_t *vertex_source = fuzz_memory((size_t)vertices * sizeof *vertex_source, 0x80);
+    double *rest = fuzz_memory(3 * (size_t)vertices * sizeof *rest, 0xa5);
+    if (ath_decode_hierarchy(model, hierarchy.bytes, hierarchy.size, branch_count, vertices, branches, branch_source,
+                             vertex_source) == ATH_OK) {
+        check_branches(branches, branch_count, vertices);
+        int result = method & 1 ? ath_decode_exact_rest(model, body.bytes, body.size, branches, branch_count, method & 2, rest)
+                                : ath_decode_rest(model, body.bytes, body.size, branches, branch_count, step_from(data + 6),
+                                                  rest);
+        if (!all_finite(rest, 3 * (size_t)vertices)) REQUIRE(result != ATH_OK || !(method & 1), "exact numbers are finite");
+        else plan(branches, branch_count, vertices, rest);
+    }
+    free(rest);
+    free(vertex_source);
+    free(branch_source);
+    free(branches);
+    free(model);
+    drop(hierarchy);
+    drop(body);
+    return 0;
+}
