@@ -4,6 +4,8 @@
 
 #define PI 3.14159265358979323846
 
+enum { MOST_PROBES = 64 };
+
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). */
 static void tridiagonalise(int32_t n, double *a, double *q, double *d, double *e)
@@ -235,14 +237,16 @@ static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
     return 1;
 }
 
-/* Pieces with equal gaps share one basis. `table` is an open-addressing hash of pieces that own theirs. */
+/* Pieces with equal gaps share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
+ * made so that all of them collide: after MOST_PROBES a piece gets a basis to itself, which holds the same numbers. */
 static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, uint8_t *gaps, int32_t *table, uint32_t mask)
 {
     const uint8_t *mine = gaps + pieces[p].first;
     uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
-    while (table[at] >= 0) {
+    for (int32_t probe = 0; table[at] >= 0; probe++) {
         const ath_piece *other = pieces + table[at];
         if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)) return table[at];
+        if (probe == MOST_PROBES) return p;
         at = (at + 1) & mask;
     }
     table[at] = p;
