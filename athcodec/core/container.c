@@ -199,8 +199,7 @@ int ath_read_front(const uint8_t *bytes, size_t available, const ath_limits *lim
     return available < *needed ? ATH_MISSING : ATH_OK;
 }
 
-const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
-                                uint32_t segment)
+uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)
 {
     ath_chunk wanted;
     memset(&wanted, 0, sizeof wanted);
@@ -216,7 +215,15 @@ const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, i
         else
             high = middle;
     }
-    return low < chunk_count && key_of(chunks + low) == key && chunks[low].kind == kind ? chunks + low : 0;
+    return low;
+}
+
+const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
+                                uint32_t segment)
+{
+    const ath_chunk *found = chunks + ath_first_chunk(chunks, chunk_count, kind, level, segment);
+    if (found == chunks + chunk_count || found->kind != kind) return 0;
+    return !ath_is_motion(found) || (found->level == level && found->segment == segment) ? found : 0;
 }
 
 /* ---- heads of chunks ---- */

@@ -30,6 +30,8 @@ typedef struct {
 int ath_read_front(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
                    ath_chunk *chunks, float *errors);
 
+/* Index of the first chunk that does not come before this one in file order. */
+uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);
 /* The chunk of this kind, or null. Level ATH_NO_LEVEL and segment 0 for those of the prelude. */
 const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level,
                                 uint32_t segment);

@@ -439,27 +439,32 @@ void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 
-static int is_needed(const ath_file *file, const ath_chunk *chunk, int32_t level, int32_t first, int32_t last)
+/* `end`: of the chunk written or counted last. */
+static void add_range(const ath_chunk *chunk, uint64_t *end, ath_range *ranges, int32_t capacity, int32_t *count)
 {
-    int within = chunk->kind == ATH_SHAPES || ((int32_t)chunk->segment >= first && (int32_t)chunk->segment <= last);
-    return within && ath_is_motion(chunk) && ath_file_needs(file, chunk->kind, chunk->level, level);
+    int joined = *count > 0 && chunk->offset == *end;
+    *end = chunk->offset + chunk->length;
+    if (!joined) (*count)++;
+    if (*count > capacity) return;
+    if (!joined) ranges[*count - 1].offset = chunk->offset;
+    ranges[*count - 1].size = *end - ranges[*count - 1].offset;
 }
 
+/* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
+ * chunks for each. */
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
                    ath_range *ranges, int32_t capacity)
 {
     int32_t count = 0;
     uint64_t end = 0;
-    for (uint32_t i = 0; i < file->header.chunk_count; i++) {
-        const ath_chunk *chunk = file->chunks + i;
-        if (chunk->length == 0 || (chunk->bytes && !all)) continue;
-        if (!is_needed(file, chunk, level, first_segment, last_segment)) continue;
-        int joined = count > 0 && chunk->offset == end;
-        end = chunk->offset + chunk->length;
-        if (!joined) count++;
-        if (count > capacity) continue;
-        if (!joined) ranges[count - 1].offset = chunk->offset;
-        ranges[count - 1].size = end - ranges[count - 1].offset;
+    for (int32_t d = 0; d <= level; d++) {
+        uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first_segment);
+        for (; i < file->header.chunk_count; i++) {
+            const ath_chunk *chunk = file->chunks + i;
+            if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last_segment) break;
+            if (chunk->length == 0 || (chunk->bytes && !all) || !ath_file_needs(file, chunk->kind, d, level)) continue;
+            add_range(chunk, &end, ranges, capacity, &count);
+        }
     }
     return count;
 }
