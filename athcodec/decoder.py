@@ -10,6 +10,7 @@ from __future__ import annotations
 import builtins
 import os
 import threading
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -210,6 +211,10 @@ class Decoder:
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
         return balanced_segments(self.frame_count, self.container.header.segment_count)
+
+    @cached_property
+    def _segment_starts(self) -> list[int]:
+        return [start for start, _ in self.segments]
 
     @property
     def source(self):
@@ -496,11 +501,10 @@ class Decoder:
     def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
-        self._prefetch(depth, first, last)
-        for start, stop in self.segments:
+        for index in self._segments_within(first, last):
+            start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
-            if low < high:
-                yield low, self.positions(slice(low, high), depth, dtype)
+            yield low, self.positions(slice(low, high), depth, dtype)
 
     def positions(self, frames=None, depth: int | None = None, dtype=None) -> np.ndarray:
         """Positions in the source's vertex order: (N, 3) for one frame, (T, N, 3) for a slice or None (all).
@@ -510,11 +514,10 @@ class Decoder:
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
         shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
-        self._prefetch(depth, first, last)
-        for index, (start, stop) in enumerate(self.segments):
+        for index in self._segments_within(first, last):
+            start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
-            if low < high:
-                self._show(index, depth, low, shown[low - first: high - first])
+            self._show(index, depth, low, shown[low - first: high - first])
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
@@ -542,7 +545,11 @@ class Decoder:
         return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
 
     def _segment_of(self, frame: int) -> int:
-        return next(i for i, (_, stop) in enumerate(self.segments) if frame < stop)
+        return bisect_right(self._segment_starts, frame) - 1
+
+    def _segments_within(self, first: int, last: int) -> range:
+        """The segments that hold the frames from `first` on, `last` not included."""
+        return range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
 
     def residual(self, frame: int, depth: int | None = None) -> np.ndarray:
         """What the matrices of `affines` leave, in the space of the rest pose (paper, eq. 3): (N, 3), source order.
