@@ -24,12 +24,12 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     uint64_t vertices = header->vertex_count, branches = header->branch_count;
     uint64_t entries = (uint64_t)header->level_count * header->segment_count;
     ath_take(&arena, sizeof *file);
-    file->chunks = (ath_chunk *)ath_take(&arena, header->chunk_count * sizeof(ath_chunk));
+    file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
     file->errors = (float *)ath_take(&arena, entries * 2 * sizeof(float));
     file->branches = (ath_branch *)ath_take(&arena, branches * sizeof(ath_branch));
     file->branch_source = (int32_t *)ath_take(&arena, branches * sizeof(int32_t));
     file->vertex_source = (int32_t *)ath_take(&arena, vertices * sizeof(int32_t));
-    file->times = (double *)ath_take(&arena, header->frame_count * sizeof(double));
+    file->times = (double *)ath_take(&arena, (uint64_t)header->frame_count * sizeof(double));
     file->rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
     file->stored_rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
     file->pieces = (ath_piece *)ath_take(&arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
