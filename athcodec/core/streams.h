@@ -89,7 +89,8 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
 static int code_number_of(ath_coder *coder, hierarchy_model *model, int regular, int32_t expected, int32_t count,
                           int32_t *source)
 {
-    int64_t value = regular ? expected : (int64_t)expected + code_signed(coder, &model->source, 16, *source - expected);
+    int32_t given = ENCODING ? *source - expected : 0; /* what stands there is not to be looked at when decoding */
+    int64_t value = regular ? expected : (int64_t)expected + code_signed(coder, &model->source, 16, given);
     if (value < 0 || value >= count) return 0;
     *source = (int32_t)value;
     return 1;
@@ -331,7 +332,7 @@ static int code_temporal(ath_coder *coder, number_model *model, int32_t rank, in
         int32_t before = 0, slope = 0;
         for (int32_t t = 0; t < frames; t++) {
             int32_t *value = basis + (size_t)r * (size_t)frames + t;
-            int32_t rest = code_signed(coder, model, mean, *value - before - slope);
+            int32_t rest = code_signed(coder, model, mean, ENCODING ? *value - before - slope : 0);
             *value = before + slope + rest;
             if (*value < -limit || *value > limit) return 0;
             slope = t > 0 ? *value - before : 0;
