@@ -50,7 +50,7 @@ def check(data: bytes, **options) -> None:
     opened(data, **options).check()
 
 
-def use(data: bytes) -> bool:
+def use(data: bytes, **options) -> bool:
     """Asks for everything that a file may hold. Whether it answered; raises what is neither answer nor refusal."""
     asks = [lambda d: d.check(), lambda d: d.affines(0), lambda d: d.residual(0, 0), lambda d: d.info(),
             lambda d: d.rest, lambda d: d.vertex_branch, lambda d: d.stem_index]
@@ -58,7 +58,7 @@ def use(data: bytes) -> bool:
     asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
     with np.errstate(all="ignore"):
         try:
-            decoder = opened(data)
+            decoder = opened(data, **options)
         except REFUSED as error:
             assert "\n" not in str(error)
             return False

@@ -16,6 +16,7 @@ import numpy as np
 import athcodec
 from athcodec import MotionClip
 from athcodec import container as ct
+from athcodec import entropy
 from athcodec.sources import read_hdf5, sample_path
 from files import Parts, basis_chunk, roots, still_file
 from plants import awkward, bush, clip_of, plant, tube
@@ -61,6 +62,12 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
 }
 
 
+def _wave(frames: int) -> bytes:
+    """A learned basis of one row and 8 bits."""
+    row = np.rint(100 * np.sin(np.arange(frames)))
+    return entropy.encode_temporal(row.astype(np.int32)[None], 8)
+
+
 def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:
     return athcodec.encode(clip, folder / "seed.ath", **{"effort": "fast"} | options).path.read_bytes()
 
@@ -69,7 +76,7 @@ def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:
 def valid_files() -> dict[str, bytes]:
     """Small valid files by name."""
     files = {"least": still_file(), "three_roots": still_file(frames=3, branches=roots(1, 70, 2)),
-             "learned_basis": still_file(frames=9, stems=basis_chunk(b"", 9, 8)),
+             "learned_basis": still_file(frames=9, stems=basis_chunk(_wave(9), 9, 8)),
              "two_segments": still_file(frames=300)}
     with TemporaryDirectory() as name:
         folder = Path(name)

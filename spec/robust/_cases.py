@@ -1,0 +1,106 @@
+"""Runs cases in a process of their own, so that a crash, a hang or a flood of memory is an outcome like any other.
+
+A class of cases is a list of arguments and a function that raises Wrong where one does not come out as it should. What
+a case may be is known to those who make them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import resource
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from spec.robust import Row
+
+HANG_SECONDS = 120.0
+POLL_SECONDS = 0.2
+FREE_MEMORY = 64 << 20
+"""Growth of a process that is no fault of a case: caches of the allocator, modules imported late."""
+_PEAK_UNIT = 1 if sys.platform == "darwin" else 1024
+
+
+class Wrong(Exception):
+    """A case did not come out as it should."""
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Inputs of one class. attempt(data, argument) -> bytes of memory that it may take."""
+
+    name: str
+    files: dict[str, bytes]
+    arguments: Sequence[tuple[str, object]]
+    """(name of a file, what is done to it)"""
+    attempt: Callable[[bytes, object], int]
+    few: bool = False
+    """Whether all are tried, whatever the time."""
+
+
+def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
+    """As many as the time allows, each once, in an order that is mixed but always the same."""
+    order = list(range(len(cases.arguments)))
+    random.Random(0).shuffle(order)
+    counts = dict.fromkeys(("crashes", "hangs", "over_limit", "wrong"), 0)
+    first, done, deadline = "", 0, time.monotonic() + (float("inf") if cases.few else seconds)
+    while done < len(order) and (time.monotonic() < deadline or done == 0):
+        done, outcome, message = _until_a_fault(cases, order, done, deadline, hang)
+        if outcome:
+            counts[outcome] += 1
+            first = first or f"{outcome}: {message}"
+    note = f"of {len(order):,}" if done < len(order) else "all"
+    return Row(cases.name, done, **counts, note=f"{note}; {first}" if first else note)
+
+
+def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, hang: float) -> tuple[int, str, str]:
+    """Goes on from case `start`: where to go on next, and what the last one came to, if it went wrong."""
+    context = multiprocessing.get_context("spawn")
+    at, messages = context.Value("q", start), context.SimpleQueue()
+    process = context.Process(target=_work, args=(cases, order, start, deadline, at, messages), daemon=True)
+    process.start()
+    seen, since = start, time.monotonic()
+    while process.is_alive() and messages.empty():
+        process.join(POLL_SECONDS)
+        if at.value != seen:
+            seen, since = at.value, time.monotonic()
+        if time.monotonic() - since > hang:
+            process.kill()
+            process.join()
+            return at.value + 1, "hangs", str(cases.arguments[order[at.value]])
+    if messages.empty():
+        process.join()
+    if messages.empty():
+        return at.value + 1, "crashes", f"{cases.arguments[order[at.value]]} ended the process: {process.exitcode}"
+    done, outcome, message = messages.get()
+    process.join()
+    return done, outcome, message
+
+
+def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messages) -> None:
+    """In the process: until a case goes wrong, all are done or time is up."""
+    for place in range(start, len(order)):
+        if place > start and time.monotonic() > deadline:
+            messages.put((place, "", ""))
+            return
+        at.value = place
+        name, argument = cases.arguments[order[place]]
+        before = _peak()
+        try:
+            allowed = cases.attempt(cases.files[name], argument)
+        except MemoryError as error:
+            messages.put((place + 1, "over_limit", f"{name} {argument}: {error!r}"))
+            return
+        except BaseException as error:  # pytest.fail raises none that is an Exception
+            messages.put((place + 1, "wrong", f"{name} {argument}: {error!r}"))
+            return
+        if _peak() - before > allowed + FREE_MEMORY:
+            messages.put((place + 1, "over_limit", f"{name} {argument}: {_peak() - before} bytes"))
+            return
+    messages.put((len(order), "", ""))
+
+
+def _peak() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT
