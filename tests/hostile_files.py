@@ -18,7 +18,7 @@ from athcodec import container as ct
 from athcodec import entropy
 from athcodec._native import BRANCH
 from athcodec.transform import Plan
-from files import Parts, add_still_segment, roots, still_file, still_hierarchy, still_rest, with_header
+from files import Parts, roots, still_file, with_header
 from plants import awkward
 
 SHEET, WHOLE = 1, 4
@@ -83,13 +83,12 @@ def stems_with_gaps(gaps: np.ndarray) -> bytes:
 
 
 def segments_of_one_frame(count: int) -> bytes:
-    plan, store = Plan(roots(1), 1), ct.ChunkStore(BytesIO())
-    plan.set_rest(np.zeros((1, 3)))
-    store.add(ct.HIERARCHY, still_hierarchy(plan))
-    store.add(ct.REST, still_rest(plan))
-    store.add(ct.TIME, ct.pack_steady_time(np.arange(count, dtype=float)))
-    for index in range(count):
-        add_still_segment(store, plan, index, 1, None)
+    parts, store = Parts.of(still_file()), ct.ChunkStore(BytesIO())
+    for chunk, payload in parts.chunks:
+        if chunk.kind == ct.TIME:
+            payload = ct.pack_steady_time(np.arange(count, dtype=float))
+        for segment in range(count if chunk.is_motion else 1):
+            store.add(chunk.kind, payload, chunk.level, segment)
     out = BytesIO()
     store.write(out, ct.Header(1, 1, count, count, 2, 2, 1.0), np.zeros((2, count, 2)))
     return out.getvalue()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -105,5 +104,3 @@ def total(files: list[Covered]) -> Covered:
     return Covered("all", sum(each.lines for each in files), tuple(line for each in files for line in each.missed))
 
 
-def as_json(files: list[Covered]) -> str:
-    return json.dumps({each.name: {"lines": each.lines, "missed": each.missed} for each in files}, indent=1)

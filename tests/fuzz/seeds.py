@@ -99,7 +99,7 @@ def _truncated(data: bytes, folder: Path, level: int) -> bytes:
 
 
 def finds() -> dict[str, bytes]:
-    """Files that once went wrong."""
+    """Files that once went wrong; a target's own inputs have its name behind the dot instead."""
     return {path.stem: path.read_bytes() for path in sorted(CORPUS.glob("*.ath"))}
 
 
@@ -139,6 +139,8 @@ def _prelude_inputs(data: bytes) -> Iterator[bytes]:
 
 def inputs(target: str) -> Iterator[bytes]:
     """What a target starts from."""
+    for path in sorted(CORPUS.glob(f"*.{target}")):
+        yield path.read_bytes()
     for data in [*valid_files().values(), *finds().values()]:
         if target != "prelude":
             yield from (data + way for way in _ways())

@@ -26,7 +26,7 @@ NO_FUZZER = ("no clang with -fsanitize=fuzzer was found (install clang, or name 
              "once, not mutated")
 
 COMMON = ["-g", "-O2", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fno-omit-frame-pointer", "-DATH_STATIC",
-          "-Wall", "-Wextra", f"-I{CORE}", f"-I{HERE}"]
+          "-Wall", "-Wextra", f"-I{HERE}"]
 ADDRESS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 SANITIZERS = {"address": [*ADDRESS, "-fsanitize=float-cast-overflow"],
               "memory": ["-fsanitize=memory", "-fsanitize-memory-track-origins", "-fno-sanitize-recover=all"],
@@ -79,9 +79,9 @@ def compiler() -> Compiler:
     raise BuildError("no C compiler: got none of clang, gcc, cc; expected one on the path")
 
 
-def decoder_sources() -> list[Path]:
-    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    return [CORE / name for name in names.split()]
+def decoder_sources(core: Path = CORE) -> list[Path]:
+    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (core / "CMakeLists.txt").read_text())
+    return [core / name for name in names.split()]
 
 
 def _run(command: list) -> None:
@@ -90,23 +90,23 @@ def _run(command: list) -> None:
         raise BuildError(f"{' '.join(map(str, command))}\n{done.stdout}")
 
 
-def _digest(words: list[str]) -> str:
+def _digest(words: list[str], core: Path) -> str:
     digest = hashlib.sha256("\0".join(words).encode())
-    for path in sorted([*CORE.glob("*.[ch]"), *HERE.glob("*.[ch]")]):
+    for path in sorted([*core.glob("*.[ch]"), *HERE.glob("*.[ch]")]):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def build(target: str, used: Compiler, sanitizer: str = "address", folder: Path = BUILD) -> Path:
-    """The program of a target. Raises BuildError."""
-    flags = COMMON + (ADDRESS if sanitizer == "address" and not used.fuzzer else SANITIZERS[sanitizer])
-    parts = folder / f"{sanitizer}-{_digest([used.path, *flags])}"
+def build(target: str, used: Compiler, sanitizer: str = "address", folder: Path = BUILD, core: Path = CORE) -> Path:
+    """The program of a target, with the decoder in `core`. Raises BuildError."""
+    flags = [*COMMON, f"-I{core}"] + (ADDRESS if sanitizer == "address" and not used.fuzzer else SANITIZERS[sanitizer])
+    parts = folder / f"{sanitizer}-{_digest([used.path, *flags], core)}"
     parts.mkdir(parents=True, exist_ok=True)
     engine = "-fsanitize=fuzzer" if used.fuzzer else str(HERE / "replay.c")
     mutator = ["mutator"] if used.fuzzer and target != "prelude" else []
     mine = [HERE / f"{name}.c" for name in (target, "harness", *mutator)]
     objects = []
-    for source in [*decoder_sources(), *mine]:
+    for source in [*decoder_sources(core), *mine]:
         objects.append(parts / f"{source.parent.name}-{source.stem}.o")
         if not objects[-1].exists():
             instrument = ["-fsanitize=fuzzer-no-link"] if used.fuzzer else []

@@ -1,0 +1,70 @@
+"""The fuzz targets of tests/fuzz, each for a share of the time, and the lines of the decoder that their inputs reach.
+
+C targets run under AddressSanitizer and UndefinedBehaviorSanitizer with libFuzzer, from a corpus that grows from run to
+run; the round trip is Python's. Where there is no clang, every seed is tried once.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from spec.robust import Row
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
+
+from fuzz import cli, coverage, targets  # noqa: E402
+
+LEAST_COVERAGE = 0.95
+HOURS = targets.BUILD / "hours.json"
+COUNTS = {"crash": "crashes", "hang": "hangs", "over_limit": "over_limit", "wrong": "wrong"}
+
+
+def run(budget: float) -> list[Row]:
+    fuzzer = targets.compiler().fuzzer
+    rows, seconds = [], budget / len(cli.ALL)
+    for target in cli.ALL:
+        outcome = cli.fuzz(target, seconds)
+        if fuzzer or target == cli.ROUNDTRIP:
+            _add_hours(target, seconds / 3600)
+        found = {COUNTS[outcome.kind]: 1} if outcome.kind else {}
+        rows.append(Row(target, outcome.tried, **found, note=_note(outcome, fuzzer)))
+    return [*rows, _coverage_row()]
+
+
+def _note(outcome: targets.Outcome, fuzzer: bool) -> str:
+    if outcome.kind:
+        return f"kept {outcome.artifact}" if outcome.artifact else outcome.log.strip().splitlines()[0]
+    if outcome.target == cli.ROUNDTRIP:
+        return "clips encoded and decoded"
+    return f"{outcome.edges:,} edges" if fuzzer else targets.NO_FUZZER
+
+
+def _coverage_row() -> Row:
+    files = coverage.measure()
+    if files is None:
+        return Row("lines of the decoder", 0, note=coverage.NO_CLANG)
+    whole = coverage.total(files)
+    return Row("lines of the decoder", whole.lines, wrong=int(whole.share < LEAST_COVERAGE),
+               note=f"{100 * whole.share:.1f} % reached, {100 * LEAST_COVERAGE:.0f} % wanted")
+
+
+# ---- hours ----
+
+
+def _hours() -> dict[str, float]:
+    return json.loads(HOURS.read_text()) if HOURS.exists() else {}
+
+
+def _add_hours(target: str, hours: float) -> None:
+    HOURS.parent.mkdir(parents=True, exist_ok=True)
+    HOURS.write_text(json.dumps(_hours() | {target: _hours().get(target, 0.0) + hours}))
+
+
+def figures() -> dict[str, str]:
+    lines = {"hours with this corpus": ", ".join(f"{target} {hours:.2f}" for target, hours in _hours().items()) or "none"}
+    files = coverage.measure()
+    for each in files or []:
+        lines[each.name] = f"{100 * each.share:.1f} % of {each.lines} lines"
+    return lines

@@ -1,0 +1,95 @@
+"""Every input that once went wrong, and what it must come to now. Files that are small are kept in corpus/.
+
+An .ath file there is used through Python and by all fuzz targets; one that is named after a target is that target's own
+input. A find without a test here is a failure.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import player
+from fuzz import targets
+from hostile_files import random_gaps, segments_of_one_frame, stems_with_gaps
+from test_damage import use
+
+CORPUS = Path(__file__).resolve().parent / "corpus"
+TESTED = {"colliding_gaps.ath", "integers_not_yet_written.prelude"}
+
+
+def seconds(action: Callable[[], object]) -> float:
+    """The least of three."""
+    taken = []
+    for _ in range(3):
+        start = time.perf_counter()
+        action()
+        taken.append(time.perf_counter() - start)
+    return min(taken)
+
+
+def test_every_find_has_a_test():
+    assert {path.name for path in CORPUS.iterdir()} == TESTED
+
+
+@pytest.mark.parametrize("path", sorted(CORPUS.glob("*.ath")), ids=lambda path: path.stem)
+def test_every_file_is_refused_or_plays(path):
+    use(path.read_bytes())
+
+
+@pytest.mark.parametrize("target", targets.TARGETS)
+def test_every_input_goes_through_the_targets(target):
+    paths = sorted([*CORPUS.glob("*.ath"), *CORPUS.glob(f"*.{target}")])
+    outcome = targets.replay(target, targets.build(target, targets.compiler()), paths)
+    assert outcome.kind == "", outcome.log
+
+
+def test_stems_whose_gaps_collide_open_as_fast_as_others():
+    """10,000 stems with gaps of one hash: each was compared with all before it, and time grew with their square."""
+    colliding = (CORPUS / "colliding_gaps.ath").read_bytes()
+    others = stems_with_gaps(random_gaps(np.random.default_rng(0), 10_000, 10))
+    first, second = (seconds(lambda data=data: athcodec.open(BytesIO(data))) for data in (colliding, others))
+    assert first < 2 * second
+
+
+def test_what_collides_has_the_bases_that_it_would_have_alone():
+    """After some probes a piece no longer looks for one like itself; it must decode to the same."""
+    rows = random_gaps(np.random.default_rng(2), 3, 10)
+    decoder = athcodec.open(BytesIO(stems_with_gaps(rows)))
+    assert np.array_equal(decoder.positions(0)[1:, 0], np.cumsum(rows, axis=1).ravel())
+
+
+def test_many_segments_play_in_time_proportional_to_their_number():
+    """Decoder.blocks went over all segments for each: 16,000 took 200 s."""
+
+    def play(data: bytes) -> None:
+        for _ in athcodec.open(BytesIO(data)).blocks():
+            pass
+
+    short, long = (seconds(lambda data=segments_of_one_frame(count): play(data)) for count in (500, 4000))
+    assert long < 2.5 * 8 * short
+
+
+def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others():
+    """ath_ranges looked at every chunk of the file, for each segment that was asked for."""
+
+    def ask(count: int) -> float:
+        decoder = athcodec.open(BytesIO(segments_of_one_frame(count)))
+        core: player.File = decoder._player
+        return seconds(lambda: [core.missing(1, segment) for segment in range(0, count, count // 250)])
+
+    assert ask(32_000) < 8 * ask(250), "128 times the chunks"
+
+
+def test_integers_are_not_looked_at_before_they_are_written():
+    """The permutation of the vertices entered a sum before it was decoded, which overflowed where memory held the least
+    integer. The target prelude.c fills it with that, under a sanitizer: the test above on all inputs runs it."""
+    path = CORPUS / "integers_not_yet_written.prelude"
+    program = targets.build("prelude", targets.compiler())
+    assert targets.replay("prelude", program, [path]).kind == ""

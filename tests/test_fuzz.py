@@ -1,0 +1,102 @@
+"""The fuzz targets build, find nothing in a short run, and notice what they are there to notice."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import warnings
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+import athcodec
+from fuzz import coverage, seeds, targets
+
+SECONDS = 1
+SEED = 1
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def used():
+    found = targets.compiler()
+    if not found.fuzzer:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn(targets.NO_FUZZER, stacklevel=1)
+    return found
+
+
+@pytest.mark.parametrize("target", targets.TARGETS)
+def test_a_short_run_of_each_target_finds_nothing(target, used, tmp_path):
+    program = targets.build(target, used)
+    if used.fuzzer:
+        outcome = targets.fuzz(target, program, SECONDS, tmp_path / "corpus", tmp_path / "finds", seed=SEED)
+        assert outcome.tried > 100 and outcome.edges > 500
+    else:
+        seeds.write_inputs(target, tmp_path / "seeds")
+        outcome = targets.replay(target, program, sorted((tmp_path / "seeds").iterdir()))
+    assert outcome.kind == "", outcome.log
+
+
+def test_every_seed_is_a_valid_file_and_small():
+    files = seeds.valid_files()
+    assert len(files) > 15
+    for data in files.values():
+        assert len(data) <= seeds.LARGEST
+        with athcodec.open(BytesIO(data), strict=True) as decoder:
+            decoder.check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file, sound, mistaken, target, kind", [
+    ("container.c", "if (length > body->size - 4) return ATH_BAD_CHUNK;", "", "motion", "crash"),
+    ("streams.h", "if (value < 0 || value >= count) return 0;", "if (value < 0) return 0;", "prelude", "crash"),
+    ("prepare.c", "    clear_piece(work, piece);\n    return", "    return", "motion", "wrong"),
+    ("file.c", "available < *needed", "0", "container", "crash"),
+    ("play.c", "segments[i]->level >= 0 &&", "", "decode", "crash"),
+], ids=["a length that is not checked", "a number that is not checked", "memory that is not cleared",
+        "a prefix that is not checked", "a segment that was not prepared"])
+def test_a_mistake_in_the_core_is_noticed(file, sound, mistaken, target, kind, used, tmp_path):
+    """Within seconds: what the targets promise can fail."""
+    core = tmp_path / "core"
+    shutil.copytree(targets.CORE, core)
+    text = (core / file).read_text()
+    assert text.count(sound) == 1
+    (core / file).write_text(text.replace(sound, mistaken))
+    program = targets.build(target, used, folder=tmp_path / "build", core=core)
+    outcome = targets.fuzz(target, program, 30, tmp_path / "corpus", tmp_path / "finds", seed=SEED)
+    assert outcome.kind == kind, outcome.log[-3000:]
+    assert outcome.artifact is not None and outcome.artifact.stat().st_size <= seeds.LARGEST
+
+
+def test_repairing_makes_checksums_fit_and_changes_nothing_else():
+    """Python's way of repairing, which the runs on hostile files use, leaves a valid file as it is."""
+    sys.path.append(str(ROOT))
+    from spec.robust.hostile import repaired
+
+    for data in seeds.valid_files().values():
+        assert repaired(data) == data
+        damaged = data[:12] + b"????" + data[16:]
+        assert repaired(damaged) == data
+
+
+@pytest.mark.slow
+def test_the_corpus_reaches_nearly_every_line_of_the_decoder(tmp_path):
+    """After half a minute for each target, from the seeds alone."""
+    used = targets.compiler()
+    for target in targets.TARGETS:
+        targets.fuzz(target, targets.build(target, used), 30, tmp_path / target, tmp_path / "finds", seed=SEED)
+    files = coverage.measure(tmp_path)
+    assert files is not None, coverage.NO_CLANG
+    assert coverage.total(files).share > 0.95, coverage.as_text(files)
+
+
+def test_random_clips_come_back_in_a_short_run_of_the_command():
+    words = ["--seconds", "1", "--target", "roundtrip", "--seed", str(SEED)]
+    done = subprocess.run([sys.executable, "-m", "tests.fuzz", *words], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert int(re.search(r"roundtrip: (\d+) inputs", done.stdout)[1]) >= 20

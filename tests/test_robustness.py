@@ -1,0 +1,51 @@
+"""`python -m spec.robustness` counts what it is there to count, and reports all of it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for spec, which is not installed
+
+from bad_cases import behave  # noqa: E402
+from spec import robustness  # noqa: E402
+from spec.robust import Row, _cases  # noqa: E402
+
+
+def test_crashes_hangs_floods_and_wrong_results_are_counted_and_the_rest_goes_on():
+    ways = ["well", "crash", "be wrong", "well", "hang", "flood", "crash", "well"]
+    cases = _cases.Cases("all ways", {"plant": b"seed"}, [("plant", how) for how in ways], behave)
+    row = _cases.run(cases, 60, hang=4)
+    assert (row.tried, row.crashes, row.hangs, row.over_limit, row.wrong) == (8, 2, 1, 1, 1)
+    assert row.faults == 5 and row.note.startswith("all; ")
+
+
+def test_cases_end_with_their_time():
+    cases = _cases.Cases("slow", {"plant": b"seed"}, [("plant", "nap")] * 500, behave)
+    row = _cases.run(cases, 1)
+    assert 0 < row.tried < 500 and row.faults == 0 and row.note == "of 500"
+
+
+def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monkeypatch):
+    rows = [Row("files", 1234, wrong=2, note="two of them"), Row("others", 5)]
+    old = {"older": {"about": "Kept.", "rows": [], "figures": {"hours": "3"}, "seconds": 1.0, "version": "0", "machine": "m"}}
+    (tmp_path / "robustness.json").write_text(json.dumps(old))
+    monkeypatch.setattr("spec.robust.hostile.run", lambda budget: rows)
+    monkeypatch.setattr("spec.robust.hostile.figures", lambda: {"slowest": "1 s"})
+    assert robustness.main(["--only", "hostile", "--seconds", "1", "--out", str(tmp_path)]) == 1
+    text = (tmp_path / "robustness.md").read_text()
+    assert "| files | 1,234 | 0 | 0 | 0 | 2 | two of them |" in text and "| others | 5 |" in text
+    assert "* slowest: 1 s" in text and "* hours: 3" in text
+    assert set(json.loads((tmp_path / "robustness.json").read_text())) == {"older", "hostile"}
+
+
+@pytest.mark.slow
+def test_hostile_files_do_no_harm(tmp_path):
+    done = subprocess.run([sys.executable, "-m", "spec.robustness", "--only", "hostile", "--seconds", "90", "--out",
+                           str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
