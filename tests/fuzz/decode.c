@@ -7,7 +7,7 @@ enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 10 };
 typedef struct {
     const ath_file *file;
     ath_info info;
-    const ath_segment *held[HELD];
+    const ath_segment *held[HELD + 1]; /* the last is the one in preparation, which is to be passed over */
     const uint8_t *bytes;
     size_t size;
     void *work, *memory;    /* of the preparation that is under way, if any */
@@ -35,6 +35,7 @@ static void abandon(user *u)
     free(u->work);
     free(u->memory);
     u->work = u->memory = NULL;
+    u->held[HELD] = NULL;
 }
 
 /* Begins a preparation that later calls take on, or never. */
@@ -47,6 +48,7 @@ static void begin(user *u, int32_t argument)
     u->work = fuzz_memory(work_size, 0xff);
     u->memory = fuzz_memory(size, 0xff);
     if (ath_prepare_start(u->work, work_size, u->file, segment, level, u->memory, size) != ATH_OK) abandon(u);
+    u->held[HELD] = (const ath_segment *)u->memory;
 }
 
 /* The bytes of a preparation that is under way stay fed: what reads them here is a copy of the file that stays. */
@@ -69,8 +71,8 @@ static void play(user *u, int32_t argument, int wide)
     ath_order order = argument & 4 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER;
     double at = place(u, argument);
     void *out = fuzz_memory(vertices * stride, 0);
-    int result = wide ? ath_positions_wide(u->file, u->held, HELD, at, order, out, stride)
-                      : ath_positions(u->file, u->held, HELD, at, order, out, stride);
+    int result = wide ? ath_positions_wide(u->file, u->held, HELD + 1, at, order, out, stride)
+                      : ath_positions(u->file, u->held, HELD + 1, at, order, out, stride);
     REQUIRE(result == ATH_OK || result == ATH_HELD || result == ATH_NOT_PREPARED, "playing gives its codes");
     free(out);
 }
@@ -78,7 +80,7 @@ static void play(user *u, int32_t argument, int wide)
 static void show_parts(user *u, int32_t argument, int wide)
 {
     double at = place(u, argument);
-    int32_t level = ath_shown_level(u->file, u->held, HELD, at), parts, nodes, exact;
+    int32_t level = ath_shown_level(u->file, u->held, HELD + 1, at), parts, nodes, exact;
     if (level < 0) return;
     ath_cut_size(u->file, level, &parts, &nodes, &exact);
     size_t number = wide ? sizeof(double) : sizeof(float);
@@ -92,11 +94,11 @@ static void show_parts(user *u, int32_t argument, int wide)
     }
     REQUIRE(next == u->info.vertex_count, "parts hold every vertex");
     if (wide) {
-        ath_matrices_wide(u->file, u->held, HELD, at, matrices, 12 * number);
-        ath_exact_wide(u->file, u->held, HELD, at, stems, 3 * number);
+        ath_matrices_wide(u->file, u->held, HELD + 1, at, matrices, 12 * number);
+        ath_exact_wide(u->file, u->held, HELD + 1, at, stems, 3 * number);
     } else {
-        ath_matrices(u->file, u->held, HELD, at, matrices, 12 * number);
-        ath_exact(u->file, u->held, HELD, at, stems, 3 * number);
+        ath_matrices(u->file, u->held, HELD + 1, at, matrices, 12 * number);
+        ath_exact(u->file, u->held, HELD + 1, at, stems, 3 * number);
     }
     free(cut);
     free(stems);

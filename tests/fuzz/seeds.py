@@ -54,6 +54,7 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
     "mirrored": (lambda: awkward(6, branches=6, motion="mirror", shuffled=True), {"rel_error": 1e-2}),
     "coincident": (lambda: awkward(7, branches=5, shape="coincident", motion="sway"), {"rel_error": 1e-2}),
     "sheets": (lambda: tube(10, 7, 9), {"rel_error": 1e-3}),
+    "learned": (lambda: tube(10, 7, 9), {"rel_error": 1e-3, "effort": "best"}),
     "long_stem": (lambda: plant(seed=8, branches=2, longest=75, frames=6), {"rel_error": 1e-2}),
     "bush": (lambda: bush(25, frames=5), {"rel_error": 1e-2}),
     "still": (lambda: awkward(9, branches=4, motion="static"), {"rel_error": 1e-2}),
