@@ -485,12 +485,13 @@ class Decoder:
                 self._player.drop(offset, size)
         return ready
 
-    def _prefetch(self, depth: int, first: int, last: int) -> None:
-        """What the frames first to last - 1 need and is not there yet, where that is more than one segment."""
-        needed = [i for i, (start, stop) in enumerate(self.segments) if start < last and first < stop]
-        if len(needed) > 1:
+    def _prefetched(self, depth: int, first: int, last: int) -> range:
+        """The segments that hold the frames first to last - 1; what they need is there, if they are more than one."""
+        segments = self._segments_within(first, last)
+        if len(segments) > 1:
             with self._lock:
-                self.container.prefetch(self._player.missing(depth, needed[0], needed[-1]))
+                self.container.prefetch(self._player.missing(depth, segments[0], segments[-1]))
+        return segments
 
     def _show(self, segment: int, depth: int, start: int, out: np.ndarray) -> None:
         """Fills `out`, (k, N, 3) float32 or float64, with the frames from `start` on, in the source's order."""
@@ -501,7 +502,7 @@ class Decoder:
     def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
-        for index in self._segments_within(first, last):
+        for index in self._prefetched(depth, first, last):
             start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
             yield low, self.positions(slice(low, high), depth, dtype)
@@ -514,7 +515,7 @@ class Decoder:
         depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
         shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
-        for index in self._segments_within(first, last):
+        for index in self._prefetched(depth, first, last):
             start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
             self._show(index, depth, low, shown[low - first: high - first])

@@ -439,9 +439,11 @@ void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 
-/* `end`: of the chunk written or counted last. */
-static void add_range(const ath_chunk *chunk, uint64_t *end, ath_range *ranges, int32_t capacity, int32_t *count)
+/* Nothing where the chunk is null, empty, or there and not asked for. `end`: of the chunk written or counted last. */
+static void add_range(const ath_chunk *chunk, int all, uint64_t *end, ath_range *ranges, int32_t capacity,
+                      int32_t *count)
 {
+    if (!chunk || chunk->length == 0 || (chunk->bytes && !all)) return;
     int joined = *count > 0 && chunk->offset == *end;
     *end = chunk->offset + chunk->length;
     if (!joined) (*count)++;
@@ -458,12 +460,13 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
     int32_t count = 0;
     uint64_t end = 0;
     for (int32_t d = 0; d <= level; d++) {
+        if (first_segment > 0) /* shapes stand with segment 0 */
+            add_range(ath_file_chunk(file, ATH_SHAPES, d, 0), all, &end, ranges, capacity, &count);
         uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first_segment);
         for (; i < file->header.chunk_count; i++) {
             const ath_chunk *chunk = file->chunks + i;
             if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last_segment) break;
-            if (chunk->length == 0 || (chunk->bytes && !all) || !ath_file_needs(file, chunk->kind, d, level)) continue;
-            add_range(chunk, &end, ranges, capacity, &count);
+            if (ath_file_needs(file, chunk->kind, d, level)) add_range(chunk, all, &end, ranges, capacity, &count);
         }
     }
     return count;

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
+@dataclass
 class Row:
     """One line of the report: how many inputs were tried, and how many of them went wrong in which way."""
 
