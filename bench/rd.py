@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
     codecs = chosen(args.codecs)
-    return codecs | ({codec.name: codec for codec in lossless()} if args.lossless else {})
+    return codecs | ({codec.name: codec for codec in all_codecs() if is_lossless(codec)} if args.lossless else {})
 
 
 def _listing(args: argparse.Namespace) -> dict[str, Any]:

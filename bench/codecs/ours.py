@@ -22,6 +22,7 @@ class Athcodec:
     kind = "athcodec"
     effort = "default"
     segment_frames = None
+    lossless = False
 
     def __init__(self, single_depth: bool = False):
         self.single_depth = single_depth
@@ -38,7 +39,8 @@ class Athcodec:
             summary = athcodec.encode(
                 source.clip,
                 file,
-                max_error=bound,
+                max_error=None if self.lossless else bound,
+                lossless=self.lossless,
                 attributes="none",
                 effort=self.effort,
                 segment_frames=self.segment_frames,
@@ -67,3 +69,13 @@ class LongSegments(Athcodec):
     def __init__(self):
         super().__init__()
         self.name = "athcodec, long segments"
+
+
+class LosslessAthcodec(Athcodec):
+    """With a level behind the others that gives every bit back."""
+
+    lossless = True
+
+    def __init__(self):
+        super().__init__()
+        self.name = "athcodec, lossless"
