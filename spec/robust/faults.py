@@ -155,15 +155,15 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 
 
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
-    """One line, exit code 1, the older file as it was and no other."""
+    """One line, exit code 1, the older file as it was and no other; or, where there was room after all, a whole one."""
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
     target.write_bytes(b"older")
     code, err = finished(place.words(verb, target), prepare)
     row.tried += 1
     row.hangs += code == -signal.SIGKILL
     row.crashes += code < 0 and code != -signal.SIGKILL
-    row.wrong += code >= 0 and not (code == 1 and ONE_LINE.fullmatch(err) is not None)
-    row.wrong += target.read_bytes() != b"older" or bool(place.left_over(target))
+    row.wrong += not (code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older"
+                      or code == 0 and is_whole(target)) or bool(place.left_over(target))
     target.unlink()
 
 
@@ -178,12 +178,13 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
         for verb in VERBS:
             target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
             command = [sys.executable, "-m", "athcodec", *place.words(verb, target)]
-            script = f'mount -t tmpfs -o size={size}k none "$1" && shift && "$@"; code=$?; ls -A "{place.folder}"; exit $code'
-            done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), *command],
+            script = 'mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; exit $code'
+            done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
                                   capture_output=True, text=True, timeout=PATIENCE)
+            refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
             row.tried += 1
             row.crashes += done.returncode > 1
-            row.wrong += done.returncode == 0 or not ONE_LINE.fullmatch(done.stderr) or done.stdout != ""
+            row.wrong += not (refused or done.returncode == 0 and done.stdout == f"{target.name}\n")
     row.note = "tmpfs, the error is ENOSPC"
     return row
 

@@ -32,7 +32,7 @@ from spec.robust import Row
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "athcodec" / "core"
-PATIENCE = 600.0  # seconds after which a process counts as hung
+PATIENCE = 300.0  # seconds after which a process counts as hung
 RACE_FOUND = 66  # ThreadSanitizer's exit code
 GET_HANDLER = 305  # PyDataMem_GetHandler's place in NumPy's table of functions
 
@@ -88,8 +88,11 @@ def thread_program(folder: Path) -> Path:
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
     """(exit code, stderr, result) of one run of threads.c."""
-    environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=0"}
-    done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
+    try:
+        done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        return -1, "hung", {}
     return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
 
 
@@ -280,7 +283,7 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
             "an open decoder": lambda: [lasting.positions(i, depth) for i in (0, -1) for depth in (1, 0)]}
         for which, call in calls.items():
             call()  # what is made once is there from now on
-            files, n, fired = _open_files(), 1, True
+            files, n, fired, error = _open_files(), 1, True, None
             while fired and time.monotonic() < until:
                 out.unlink(missing_ok=True)
                 memory.fail(n)

@@ -108,11 +108,20 @@ static void see_alone(plant *p)
     free(positions);
 }
 
+/* Of a segment at any level: coarse ones, which hold matrices, can take more than the finest. */
+static size_t largest_segment(const plant *p)
+{
+    size_t most = 0;
+    for (int32_t level = 0; level < p->info.level_count; level++)
+        if (ath_segment_size(p->file, level) > most) most = ath_segment_size(p->file, level);
+    return most;
+}
+
 /* One plant for a while: its own work and segment, the shared ones in between, and all that only reads. */
 static void visit(plant *p, uint32_t *state, int own)
 {
     void *work = memory_of(ath_work_size(p->file));
-    ath_segment *mine = memory_of(ath_segment_size(p->file, p->info.level_count - 1) * 2);
+    ath_segment *mine = memory_of(largest_segment(p));
     float *positions = memory_of((size_t)p->info.vertex_count * 3 * sizeof(float));
     float *matrices = memory_of(((size_t)p->info.node_count + 1) * 12 * sizeof(float));
     for (int i = 0; i < 8; i++) {
