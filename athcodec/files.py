@@ -1,8 +1,8 @@
 """Files that take their name only when they are whole, and what dead writers have left of theirs.
 
-A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the writer dies, and
-then renamed. Whoever next writes to the same target removes the parts that nobody holds any more. Where a file system
-has no locks, parts of dead writers stay: one of a living writer is never removed.
+A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the
+writer dies, and then renamed. Whoever next writes to the same target removes the parts that nobody holds any
+more. Where a file system has no locks, parts of dead writers stay: one of a living writer is never removed.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
 
 
 def check_target(path: str | os.PathLike[str]) -> str:
-    """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the directory is
-    missing or read-only, `path` is one, no plain file, or a read-only one."""
+    """The file that `path` names, behind any links. Raises OSError where nothing can be written there: the
+    directory is missing or read-only, `path` is one, no plain file, or a read-only one."""
     path = os.fspath(path)
     target = os.path.realpath(path)
     directory = os.path.dirname(target if os.path.islink(path) else path) or "."
@@ -57,7 +57,8 @@ def is_url(path: object) -> bool:
 
 
 class Part:
-    """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is open.
+    """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is
+    open.
 
     It has the permissions of the file that it replaces, or those of any new file. Raises OSError.
     """
@@ -110,7 +111,8 @@ class _Naming(io.FileIO):
 
 @contextmanager
 def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises OSError."""
+    """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises
+    OSError."""
     part = Part(path)
     try:
         with io.BufferedRandom(_Naming(part)) as out:

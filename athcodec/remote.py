@@ -1,10 +1,11 @@
 """Files behind a URL, read in few requests: http and https with byte ranges, and whatever else fsspec knows.
 
-A `Remote` is a file object for decoder.open. It reads ahead at the front, so that header and prelude arrive together, and
-is told which ranges come next (`prefetch`), so that a run of chunks is one request. It asks again a few times where a
-server drops the connection, stalls or is overloaded, and raises RemoteError, in one line, where that does not help, where
-the file is no longer the one that was opened, and where a server that ignores ranges has a large one. It knows nothing
-of what the bytes mean: checksums are the container's business.
+A `Remote` is a file object for decoder.open. It reads ahead at the front, so that header and prelude arrive
+together, and is told which ranges come next (`prefetch`), so that a run of chunks is one request. It asks
+again a few times where a server drops the connection, stalls or is overloaded, and raises RemoteError, in one
+line, where that does not help, where the file is no longer the one that was opened, and where a server that
+ignores ranges has a large one. It knows nothing of what the bytes mean: checksums are the container's
+business.
 """
 
 from __future__ import annotations
@@ -32,10 +33,12 @@ Range = tuple[int, int]
 
 
 class Remote:
-    """A seekable binary file behind `url`; `requests` and `bytes` count what was asked of the server and what came.
+    """A seekable binary file behind `url`; `requests` and `bytes` count what was asked of the server and what
+    came.
 
-    timeout: seconds without a byte until a request counts as failed. retries: how often it is made again. Further options
-    go to fsspec's file system, headers=... and client_kwargs=... for HTTP. Raises RemoteError.
+    timeout: seconds without a byte until a request counts as failed. retries: how often it is made again.
+    Further options go to fsspec's file system, headers=... and client_kwargs=... for HTTP. Raises
+    RemoteError.
     """
 
     def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):
@@ -51,8 +54,8 @@ class Remote:
         return self._source.doubt
 
     def prefetch(self, ranges: list[Range]) -> None:
-        """Fetches what is not there yet of these ascending ranges where it can be kept until it is read: one request for
-        each, and for those that are close together."""
+        """Fetches what is not there yet of these ascending ranges where it can be kept until it is read: one
+        request for each, and for those that are close together."""
         wanted = _joined([self._missing(offset, min(size, self.size - offset)) for offset, size in ranges])
         if sum(size for _, size in wanted) <= KEPT_BYTES:
             self.keep(self._source.fetch(wanted))
@@ -154,7 +157,8 @@ def _one_line(error: BaseException) -> str:
 
 
 class _AnySystem:
-    """Any fsspec file system, as far as all of them go: nothing tells a file that has changed but its checksums."""
+    """Any fsspec file system, as far as all of them go: nothing tells a file that has changed but its
+    checksums."""
 
     doubt = ", or the file has been changed since it was opened"
 
@@ -281,7 +285,8 @@ class _Http:
         match = _RANGE.fullmatch(said)
         if match is None or answer.headers.get("Content-Encoding", "identity") != "identity":
             raise self._refusal(f"got Content-Range {said!r}, Content-Encoding "
-                                f"{answer.headers.get('Content-Encoding')!r}; expected bytes as they are, of a known length")
+                                f"{answer.headers.get('Content-Encoding')!r}; expected bytes as they are, of a known "
+                                "length")
         first, last, length = map(int, match.groups())
         self._check_same(length, answer.headers)
         if (first, last + 1) != (offset, min(offset + size, length)):

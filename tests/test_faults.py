@@ -1,4 +1,5 @@
-"""What is left when writing goes wrong: nothing, or the older file; and what a source that misbehaves leads to.
+"""What is left when writing goes wrong: nothing, or the older file; and what a source that misbehaves leads
+to.
 
 Kills, full disks and read-only places are those of spec/robust/faults.py with a few rounds each; `python -m
 spec.robustness --only faults` has many.

@@ -1,6 +1,7 @@
 """The decoder under load: threads, seeks, many files at once, and memory that runs out.
 
-These are the runs of spec/robust/load.py with fewer rounds; `python -m spec.robustness --only load` has the long ones.
+These are the runs of spec/robust/load.py with fewer rounds; `python -m spec.robustness --only load` has the
+long ones.
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ from plants import plant
 
 
 class Server(ThreadingHTTPServer):
-    """Serves `data` under any path, with ranges; `fault` may answer a request in its own way, and says whether it did."""
+    """Serves `data` under any path, with ranges; `fault` may answer a request in its own way, and says
+    whether it did."""
 
     daemon_threads = True
     block_on_close = False
@@ -62,7 +63,8 @@ class Handler(BaseHTTPRequestHandler):
         if start >= len(self.server.data):
             self.send_head(416, {"Content-Range": f"bytes */{len(self.server.data)}", "Content-Length": "0"})
             return
-        part = {"Content-Range": f"bytes {start}-{stop - 1}/{len(self.server.data)}", "Content-Length": str(stop - start)}
+        part = {"Content-Range": f"bytes {start}-{stop - 1}/{len(self.server.data)}",
+                "Content-Length": str(stop - start)}
         self.send_head(206, part | headers)
         self.wfile.write(self.server.data[start:stop] if body is None else body)
 
@@ -186,7 +188,8 @@ def test_a_long_prelude_takes_a_second_request(server, local, monkeypatch):
 
 
 def runs(decoder: athcodec.Decoder, depth: int, first: int, last: int) -> list[tuple[int, int]]:
-    """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are close."""
+    """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are
+    close."""
     joined: list[list[int]] = []
     kinds = (16,) if depth == decoder.full_level_count - 1 else (16, 17)
     for chunk in decoder.container.chunks:

@@ -184,9 +184,9 @@ def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None
 
 
 class _Sink:
-    """The bytes of a part, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that there was
-    an interruption: it loses track of its objects and crashes when the program ends. So it is not told; `check` raises
-    what has happened."""
+    """The bytes of a part, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that
+    there was an interruption: it loses track of its objects and crashes when the program ends. So it is not told;
+    `check` raises what has happened."""
 
     def __init__(self, part: Part):
         self._file, self._path = open(part.descriptor, "r+b", buffering=0, closefd=False), part.path

@@ -1,10 +1,10 @@
 """The bound, attacked: clips made to break it, and an honest look at what comes back.
 
-`Attack` says by a few numbers what a clip is like: its hierarchy, rest pose, scale, place, and what its vertices do, which
-no plant does. `broken_promises` encodes and decodes it and returns what was promised and not kept: the bound in every frame
-of every vertex, the error that the file states for each level and segment, the rest pose, refusals that had no reason.
-Distances are measured here, in units of the bound, so that nothing overflows or vanishes. Made by hypothesis, which also
-makes what it finds as small as it can.
+`Attack` says by a few numbers what a clip is like: its hierarchy, rest pose, scale, place, and what its
+vertices do, which no plant does. `broken_promises` encodes and decodes it and returns what was promised and
+not kept: the bound in every frame of every vertex, the error that the file states for each level and segment,
+the rest pose, refusals that had no reason. Distances are measured here, in units of the bound, so that
+nothing overflows or vanishes. Made by hypothesis, which also makes what it finds as small as it can.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from spec.robust import Row
 
 HIERARCHIES = ("random", "chain", "bush", "roots", "one")
 RESTS = ("grown", "unrelated", "point", "line", "plane", "lattice", "scales")
-ACTIONS = ("spike", "flicker", "step", "explode", "collapse", "shuffle", "walk", "lattice", "leave", "mirror", "flatten",
-           "noise", "spin", "swap axes")
+ACTIONS = ("spike", "flicker", "step", "explode", "collapse", "shuffle", "walk", "lattice", "leave", "mirror",
+           "flatten", "noise", "spin", "swap axes")
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ def broken_promises(attack: Attack, folder: Path) -> list[str]:
 
 
 def _may_be_refused(clip: MotionClip, bound: float) -> bool:
-    """Bounds below 1e-35 or twice the spacing of the source's numbers, or 2^28 times smaller than the way from the rest
-    pose."""
+    """Bounds below 1e-35 or twice the spacing of the source's numbers, or 2^28 times smaller than the way
+    from the rest pose."""
     both = np.concatenate([clip.positions.reshape(-1, 3), clip.rest]).astype(np.float64)
     spacing = float(np.spacing(np.abs(clip.positions).max()))
     return bound <= max(2 * spacing, 1e-35) or math.hypot(*np.ptp(both, axis=0)) > 2.0**28 * bound
@@ -220,7 +220,8 @@ def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: A
 
 
 def _rounding(clip: MotionClip, bound: float) -> float:
-    """What rounding a rest pose to its own type may add, in bounds: it can lie further out than the motion."""
+    """What rounding a rest pose to its own type may add, in bounds: it can lie further out than the
+    motion."""
     return 2.0 * float(np.spacing(np.abs(clip.rest).max().astype(clip.rest_dtype))) / bound
 
 
@@ -233,7 +234,8 @@ SCALES = (1.0, 1e-200, 1e-38, 1e-30, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e12, 1e16)
 def attacks(draw, **fixed) -> Attack:
     """Everything drawn but what is fixed. What is simplest comes first in each choice."""
     drawn = dict(
-        seed=draw(st.integers(0, 10**6)), branches=draw(st.integers(1, 12)), longest=draw(st.sampled_from([1, 2, 3, 8, 70])),
+        seed=draw(st.integers(0, 10**6)), branches=draw(st.integers(1, 12)),
+        longest=draw(st.sampled_from([1, 2, 3, 8, 70])),
         hierarchy=draw(st.sampled_from(HIERARCHIES)), rest=draw(st.sampled_from(RESTS)),
         actions=tuple(draw(st.lists(st.sampled_from(ACTIONS), max_size=3))),
         frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 31, 33, 64, 100])),

@@ -1,8 +1,10 @@
-"""Faults while files are written, from outside: writers killed at random moments, disks that are full, sources that change.
+"""Faults while files are written, from outside: writers killed at random moments, disks that are full,
+sources that change.
 
-Everything runs as the command that users run, in processes of its own: `run` gives the rows of the table. A final name
-must hold nothing, what it held before, or a whole new file; the next writer to the same place must leave no temporary
-file; an error must be one line and exit code 1. The tests use the same functions with fewer rounds.
+Everything runs as the command that users run, in processes of its own: `run` gives the rows of the table. A
+final name must hold nothing, what it held before, or a whole new file; the next writer to the same place must
+leave no temporary file; an error must be one line and exit code 1. The tests use the same functions with
+fewer rounds.
 """
 
 from __future__ import annotations
@@ -144,7 +146,8 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: float = float("inf")) -> Row:
-    """Verbs that may write files of so many bytes only (RLIMIT_FSIZE): the write that goes beyond fails with EFBIG."""
+    """Verbs that may write files of so many bytes only (RLIMIT_FSIZE): the write that goes beyond fails with
+    EFBIG."""
     row = Row("no room to write", 0, note="RLIMIT_FSIZE, the error is EFBIG")
     for size in sizes:
         for verb in verbs:
@@ -155,7 +158,8 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 
 
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
-    """One line, exit code 1, the older file as it was and no other; or, where there was room after all, a whole one."""
+    """One line, exit code 1, the older file as it was and no other; or, where there was room after all, a
+    whole one."""
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
     target.write_bytes(b"older")
     code, err = finished(place.words(verb, target), prepare)
@@ -168,8 +172,8 @@ def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None
 
 
 def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
-    """Verbs on a real file system that is full (a tmpfs in a mount namespace of its own): ENOSPC. Where the system lets
-    nobody make one, nothing is tried and the note says so."""
+    """Verbs on a real file system that is full (a tmpfs in a mount namespace of its own): ENOSPC. Where the
+    system lets nobody make one, nothing is tried and the note says so."""
     row = Row("disk full", 0)
     if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
         row.note = "not tried: the system allows no mount namespace here"
@@ -178,7 +182,8 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
         for verb in VERBS:
             target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
             command = [sys.executable, "-m", "athcodec", *place.words(verb, target)]
-            script = 'mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; exit $code'
+            script = ('mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; '
+                      'exit $code')
             done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
                                   capture_output=True, text=True, timeout=PATIENCE)
             refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
@@ -221,8 +226,8 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
 
 
 def change_source(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Cuts or overwrites the source at a random moment of an encode: a file within its bound of what the source was, or one
-    line; nothing else."""
+    """Cuts or overwrites the source at a random moment of an encode: a file within its bound of what the
+    source was, or one line; nothing else."""
     rng, row, accepted = random.Random(seed), Row("source changes while it is read", 0), 0
     original = place.source.read_bytes()
     target = place.folder / "target.ath"

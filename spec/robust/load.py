@@ -1,8 +1,9 @@
 """The decoder under load: many threads, thousands of seeks, a thousand open files, and memory that runs out.
 
-What needs a process of its own (memory is measured, allocations fail, ThreadSanitizer watches the C core) runs in one:
-`python -m spec.robust.load JOB ...` prints one JSON object. `run` gives the rows of the table; the tests use the same
-functions with fewer rounds. Figures of memory are those of the whole process, after a warm-up.
+What needs a process of its own (memory is measured, allocations fail, ThreadSanitizer watches the C core)
+runs in one: `python -m spec.robust.load JOB ...` prints one JSON object. `run` gives the rows of the table;
+the tests use the same functions with fewer rounds. Figures of memory are those of the whole process, after a
+warm-up.
 """
 
 from __future__ import annotations
@@ -90,7 +91,8 @@ def race(program: Path, *words: object) -> tuple[int, str, dict]:
     """(exit code, stderr, result) of one run of threads.c."""
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
-        done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True,
+                              timeout=PATIENCE)
     except subprocess.TimeoutExpired:
         return -1, "hung", {}
     return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
@@ -100,12 +102,14 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
     code, err, result = race(program, threads, rounds, *files)
     row = Row("threads, C core, ThreadSanitizer", result.get("preparations", 0), crashes=int(code < 0))
     row.wrong = result.get("wrong", 0) + err.count("WARNING: ThreadSanitizer")
-    row.note = f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times meanwhile"
+    row.note = (f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times "
+                "meanwhile")
     return row
 
 
 def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
-    """Threads on one decoder for each file and on decoders of their own, against what one thread alone sees."""
+    """Threads on one decoder for each file and on decoders of their own, against what one thread alone
+    sees."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
     expected = [[decoder.positions(depth=depth) for depth in range(decoder.level_count)] for decoder in shared]
@@ -175,7 +179,7 @@ def seeks(path: Path, count: int) -> Row:
     return row
 
 
-ALLOWED_GROWTH = 1 << 20  # bytes: what an allocator may keep; one segment lost at each seek would be a hundred times that
+ALLOWED_GROWTH = 1 << 20  # bytes: what an allocator may keep; a segment lost at each seek is a hundred times that
 
 
 # ---- many at once ----
@@ -271,8 +275,9 @@ def _calls(path: str, out: str) -> dict[str, Call]:
 
 
 def run_out_of_memory(path: str, seconds: float) -> dict:
-    """Each call with its n-th array failing, for n from 1 until the call needs no more. What it may do is succeed, or raise
-    MemoryError or an error of athcodec's, and leave no file; a decoder that was open must go on as before."""
+    """Each call with its n-th array failing, for n from 1 until the call needs no more. What it may do is
+    succeed, or raise MemoryError or an error of athcodec's, and leave no file; a decoder that was open must
+    go on as before."""
     wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
         folder = Path(name)
@@ -324,14 +329,16 @@ def scarce(path: Path, seconds: float = 300.0) -> Row:
 
 
 def in_little_space(path: str, megabytes: float) -> dict:
-    """One decode with so much address space more than there is now (RLIMIT_AS): the frames, or an error that says so."""
+    """One decode with so much address space more than there is now (RLIMIT_AS): the frames, or an error that
+    says so."""
     with athcodec.open(path) as decoder:
         expected = decoder.positions(0)
         room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
         resource.setrlimit(resource.RLIMIT_AS, (room, resource.RLIM_INFINITY))
         error = _error_of(lambda: [each.copy() for _, each in decoder.blocks()] + [decoder.positions()])
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-        return {"error_name": type(error).__name__ if error else "", "same": np.array_equal(decoder.positions(0), expected)}
+        same = np.array_equal(decoder.positions(0), expected)
+        return {"error_name": type(error).__name__ if error else "", "same": same}
 
 
 def little_space(path: Path, sizes: list[float], until: float = float("inf")) -> Row:
@@ -349,7 +356,8 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Limits.memory_bytes from nothing to enough: LimitExceeded before anything large is allocated, or the right frames."""
+    """Limits.memory_bytes from nothing to enough: LimitExceeded before anything large is allocated, or the
+    right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()

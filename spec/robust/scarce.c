@@ -1,5 +1,5 @@
-/* NumPy's memory that runs out on command: stands between NumPy and the allocator of its arrays (NEP 49), in all threads,
- * and lets the n-th request fail, once. load.py installs it and arms it around each call that it tests. */
+/* NumPy's memory that runs out on command: stands between NumPy and the allocator of its arrays (NEP 49), in all
+ * threads, and lets the n-th request fail, once. load.py installs it and arms it around each call that it tests. */
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -42,5 +42,6 @@ int scarce_install(handler *current)
     return 1;
 }
 
-/* From now on the n-th request fails, counted from 1; 0: none does. Returns whether one has failed since it was called last. */
+/* From now on the n-th request fails, counted from 1; 0: none does. Returns whether one has failed since the last
+ * call. */
 int scarce_arm(long n) { return atomic_exchange(&left, n > 0 ? n : -1) == 0; }

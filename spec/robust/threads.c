@@ -1,7 +1,7 @@
 #define _POSIX_C_SOURCE 200809L /* barriers, locks for reading and writing */
-/* Many threads on the decoder's C core, for ThreadSanitizer (load.py builds and runs this): all that ath.h allows at once.
- * Threads prepare segments of shared and of their own files, play segments that all of them share, and one feeds and drops
- * bytes, alone among those that look at bytes. What they show is compared with what one thread alone has seen.
+/* Many threads on the decoder's C core, for ThreadSanitizer (load.py builds and runs this): all that ath.h allows at
+ * once. Threads prepare segments of shared and of their own files, play segments that all of them share, and one feeds
+ * and drops bytes, alone among those that look at bytes. What they show is compared with what one thread alone saw.
  *
  *     threads THREADS ROUNDS FILE...
  *     threads race 2 FILE     two threads on one ath_work, which ath.h forbids: the sanitizer has to say so
