@@ -124,7 +124,7 @@ def noise(frames: int) -> bytes:
 
 
 SLOW = {
-    "stems whose gaps collide in the table of bases": lambda scale: stems_with_gaps(colliding_gaps(10_000 * scale)),
+    "stems whose gaps collide in the table of bases": lambda scale: stems_with_gaps(colliding_gaps(15_000 * scale)),
     "stems of 64 vertices, no two alike": lambda scale: stems_with_gaps(
         random_gaps(np.random.default_rng(1), 250 * scale, 64)),
     "segments of one frame": lambda scale: segments_of_one_frame(2000 * scale),
