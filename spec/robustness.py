@@ -1,8 +1,9 @@
 """The command `python -m spec.robustness`: runs every class of hostile and unlucky input, and writes what came of it to
 spec/robustness.md and spec/robustness.json.
 
-Exit code 1 where anything crashed, hung, took more memory than its limits or gave a wrong result. What is tried, and how
-that is noticed, is known to the modules of spec/robust. Results of classes that a run leaves out stay in the report.
+Exit code 1 where anything crashed, hung, took more memory than its limits or gave a wrong result. What is tried, and
+how that is noticed, is known to the modules of spec/robust. Results of classes that a run leaves out stay in the
+report.
 """
 
 from __future__ import annotations

@@ -51,8 +51,8 @@ def test_every_input_goes_through_the_targets(target):
 
 
 def test_stems_whose_gaps_collide_open_nearly_as_fast_as_others():
-    """Stems with gaps of one hash were each compared with all before them: 40,000 took 7 s, and twice as many four times
-    as long."""
+    """Stems with gaps of one hash were each compared with all before them: 40,000 took 7 s, and twice as many four
+    times as long."""
     others = random_gaps(np.random.default_rng(0), 20_000, 10)
     first, second = (seconds(lambda data=stems_with_gaps(gaps): athcodec.open(BytesIO(data)))
                      for gaps in (colliding_gaps(20_000), others))

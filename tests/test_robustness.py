@@ -33,8 +33,8 @@ def test_cases_end_with_their_time():
 
 def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monkeypatch):
     rows = [Row("files", 1234, wrong=2, note="two of them"), Row("others", 5)]
-    old = {"older": {"about": "Kept.", "rows": [], "figures": {"hours": "3"}, "seconds": 1.0, "version": "0", "machine": "m"}}
-    (tmp_path / "robustness.json").write_text(json.dumps(old))
+    old = {"about": "Kept.", "rows": [], "figures": {"hours": "3"}, "seconds": 1.0, "version": "0", "machine": "m"}
+    (tmp_path / "robustness.json").write_text(json.dumps({"older": old}))
     monkeypatch.setattr("spec.robust.hostile.run", lambda budget: rows)
     monkeypatch.setattr("spec.robust.hostile.figures", lambda: {"slowest": "1 s"})
     assert robustness.main(["--only", "hostile", "--seconds", "1", "--out", str(tmp_path)]) == 1

@@ -63,7 +63,8 @@ def _add_hours(target: str, hours: float) -> None:
 
 
 def figures() -> dict[str, str]:
-    lines = {"hours with this corpus": ", ".join(f"{target} {hours:.2f}" for target, hours in _hours().items()) or "none"}
+    hours = ", ".join(f"{target} {hours:.2f}" for target, hours in _hours().items())
+    lines = {"hours with this corpus": hours or "none"}
     files = coverage.measure()
     for each in files or []:
         lines[each.name] = f"{100 * each.share:.1f} % of {each.lines} lines"

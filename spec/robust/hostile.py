@@ -1,4 +1,4 @@
-"""Files that are cut short, too long, damaged, or made to do harm: each is refused in one line or plays within its limits.
+"""Files that are cut short, too long, damaged, or made to do harm: each is refused in one line or plays within limits.
 
 Every prefix, every bit and every field of every small valid file, as far as the time goes; with the checksums as they
 are, damage has to be refused, with checksums repaired it may play as something else. Files made to be slow cost a
@@ -278,7 +278,8 @@ def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
         (1.5, Cases("flipped bits", small, each(small, checked_bits), flipped_bit)),
         (2, Cases("flipped bits, checksums repaired", small, each(small, lambda d: range(8 * len(d))),
                   flipped_bit_repaired)),
-        (1.5, Cases("spoilt fronts and chunks, checksums repaired", small, each(small, lambda _: range(10_000)), spoilt)),
+        (1.5, Cases("spoilt fronts and chunks, checksums repaired", small, each(small, lambda _: range(10_000)),
+                    spoilt)),
         (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), flood, few=True)),
         (2, Cases("files made to be slow", files, made(hostile_files.SLOW), slow_file, few=True)),
     ]

@@ -41,7 +41,8 @@ def roundtrip(seconds: float, seed: int) -> Outcome:
     command = [sys.executable, "-m", "fuzz.roundtrip", str(seconds), str(number)]
     path = {"PYTHONPATH": str(targets.HERE.parent)}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path,
+                              timeout=seconds + GRACE)
     except subprocess.TimeoutExpired as late:
         return Outcome(ROUNDTRIP, 0, "hang", f"no end {GRACE} s after its time: {late}")
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]

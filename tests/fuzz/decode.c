@@ -1,5 +1,5 @@
-/* Fuzz target: a whole decoder in use. The last bytes of an input say which limits it has, how much of the file is there,
- * and in which order bytes come and go while segments are prepared and played. */
+/* Fuzz target: a whole decoder in use. The last bytes of an input say which limits it has, how much of the file is
+ * there, and in which order bytes come and go while segments are prepared and played. */
 #include "harness.h"
 
 enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 10 };
@@ -67,7 +67,8 @@ static double place(const user *u, int32_t argument)
 
 static void play(user *u, int32_t argument, int wide)
 {
-    size_t vertices = (size_t)u->info.vertex_count, stride = (size_t)(3 + argument % 2) * (wide ? sizeof(double) : sizeof(float));
+    size_t vertices = (size_t)u->info.vertex_count, number = wide ? sizeof(double) : sizeof(float);
+    size_t stride = (size_t)(3 + argument % 2) * number;
     ath_order order = argument & 4 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER;
     double at = place(u, argument);
     void *out = fuzz_memory(vertices * stride, 0);
@@ -117,7 +118,8 @@ static void ask(user *u, int32_t argument)
     free(ranges);
     int32_t ready = ath_ready_level(u->file, segment);
     REQUIRE(ready >= -1 && ready < u->info.level_count, "a ready level is one of the file's");
-    if (ready >= 0) REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
+    if (ready >= 0)
+        REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
     double largest, rms;
     ath_level_error(u->file, level, argument & 2 ? segment : -1, &largest, &rms);
     level = ath_depth_for(u->file, argument & 4 ? segment : -1, argument, 0.02 * argument, 1080.0, 1.0);
@@ -126,29 +128,38 @@ static void ask(user *u, int32_t argument)
     int32_t last = u->info.vertex_count - 1;
     REQUIRE(ath_vertex_source(u->file)[last] <= last, "vertices are those of the source");
     REQUIRE(ath_branch_source(u->file)[u->info.branch_count - 1] < u->info.branch_count, "so are branches");
-    REQUIRE(ath_branches(u->file)[0].parent == -1 && ath_times(u->file)[0] <= ath_times(u->file)[u->info.frame_count - 1],
-            "the first branch is a root, and times ascend");
+    const double *times = ath_times(u->file);
+    REQUIRE(ath_branches(u->file)[0].parent == -1, "the first branch is a root");
+    REQUIRE(times[0] <= times[u->info.frame_count - 1], "times ascend");
     REQUIRE(ath_fault(u->file) == -1, "an opened file has no fault");
 }
 
 /* Memory that is too small or not aligned, and levels and segments that there are not. */
+static int refuses(const user *u, void *work, size_t work_size, int32_t segment, int32_t level, void *memory,
+                   size_t size, int expected)
+{
+    return ath_prepare_start(work, work_size, u->file, segment, level, memory, size) == expected;
+}
+
 static void misuse(user *u, int32_t argument)
 {
     size_t work_size = ath_work_size(u->file), size = ath_segment_size(u->file, 0), less = 1 + (size_t)argument;
     if (work_size > MOST_MEMORY || size > MOST_MEMORY) return;
     uint8_t *work = fuzz_memory(work_size + 1, 0), *memory = fuzz_memory(size, 0);
     int32_t segments = u->info.segment_count, levels = u->info.level_count;
-    REQUIRE(ath_prepare_start(work, work_size - less, u->file, 0, 0, memory, size) == ATH_NO_MEMORY, "too little is seen");
-    REQUIRE(ath_prepare_start(work + 1, work_size, u->file, 0, 0, memory, size) == ATH_NO_MEMORY, "alignment is seen");
-    REQUIRE(ath_prepare_start(work, work_size, u->file, 0, 0, memory, size - 1) == ATH_NO_MEMORY, "too little is seen");
-    REQUIRE(ath_prepare_start(work, work_size, u->file, segments, 0, memory, size) == ATH_BAD_ARGUMENT, "no such segment");
-    REQUIRE(ath_prepare_start(work, work_size, u->file, -1, 0, memory, size) == ATH_BAD_ARGUMENT, "no such segment");
-    REQUIRE(ath_prepare_start(work, work_size, u->file, 0, levels, memory, size) == ATH_BAD_ARGUMENT, "no such level");
+    REQUIRE(refuses(u, work, work_size - less, 0, 0, memory, size, ATH_NO_MEMORY), "too little is seen");
+    REQUIRE(refuses(u, work + 1, work_size, 0, 0, memory, size, ATH_NO_MEMORY), "alignment is seen");
+    REQUIRE(refuses(u, work, work_size, 0, 0, memory, size - 1, ATH_NO_MEMORY), "too little is seen");
+    REQUIRE(refuses(u, work, work_size, segments, 0, memory, size, ATH_BAD_ARGUMENT), "no such segment");
+    REQUIRE(refuses(u, work, work_size, -1, 0, memory, size, ATH_BAD_ARGUMENT), "no such segment");
+    REQUIRE(refuses(u, work, work_size, 0, levels, memory, size, ATH_BAD_ARGUMENT), "no such level");
     REQUIRE(ath_build((ath_file *)(uintptr_t)u->file, memory, 0) == ATH_NO_MEMORY, "too little is seen");
-    REQUIRE(ath_open(memory, size < 64 ? size : 64, u->bytes, u->size, NULL) == ATH_NO_MEMORY, "too little is seen");
+    size = size < 64 ? size : 64;
+    REQUIRE(ath_open(memory, size, u->bytes, u->size, NULL) == ATH_NO_MEMORY, "too little is seen");
     free(work);
     free(memory);
-    for (int32_t result = -1; result < 72; result += 1 + argument % 3) REQUIRE(ath_result_name(result)[0] != 0, "a name");
+    for (int32_t result = -1; result < 72; result += 1 + argument % 3)
+        REQUIRE(ath_result_name(result)[0] != 0, "every result has a name");
 }
 
 static void rest(user *u, int32_t argument)

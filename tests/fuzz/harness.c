@@ -53,7 +53,8 @@ void fuzz_put_u32(uint8_t *at, uint32_t value)
 size_t fuzz_chunks_at(const uint8_t *file, size_t size)
 {
     if (size < HEADER) return 0;
-    uint64_t at = HEADER + (uint64_t)ENTRY * fuzz_u32(file + CHUNK_COUNT_AT) + (uint64_t)8 * file[44] * fuzz_u32(file + 40);
+    uint64_t entries = fuzz_u32(file + CHUNK_COUNT_AT), errors = (uint64_t)file[44] * fuzz_u32(file + 40);
+    uint64_t at = HEADER + ENTRY * entries + 8 * errors;
     return at <= size ? (size_t)at : 0;
 }
 

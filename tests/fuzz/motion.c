@@ -1,6 +1,6 @@
-/* Fuzz target: the motion streams of every segment at every level of a file whose checksums fit, decoded twice, in one go
- * and in steps, over memory that held other things: the bits have to be the same. Each chunk lies in memory of its own, so
- * that reading beyond it is seen. */
+/* Fuzz target: the motion streams of every segment at every level of a file whose checksums fit, decoded twice, in one
+ * go and in steps, over memory that held other things: the bits have to be the same. Each chunk lies in memory of its
+ * own, so that reading beyond it is seen. */
 #include "harness.h"
 
 enum { MOST_MEMORY = 8 << 20, MOST_SEGMENTS = 8 };

@@ -33,7 +33,8 @@ static void check_branches(const ath_branch *branches, int32_t count, int32_t ve
 {
     for (int32_t b = 0; b < count; b++) {
         const ath_branch *branch = branches + b;
-        REQUIRE(branch->parent < b && branch->count > 0 && branch->first + branch->count <= vertices, "branches are in range");
+        REQUIRE(branch->parent < b && branch->count > 0, "parents come before their children");
+        REQUIRE(branch->first + branch->count <= vertices, "stems are in range");
         REQUIRE(branch->subtree >= 1 && b + branch->subtree <= count, "subtrees are in range");
         REQUIRE((branch->parent < 0) == (branch->attach < 0), "what hangs, hangs on a vertex");
     }
@@ -112,8 +113,17 @@ static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t 
     size_t count = (size_t)rank * (size_t)frames;
     int32_t *basis = integers(count);
     if (ath_decode_temporal(model, stream.bytes, stream.size, rank, frames, limit, basis) == ATH_OK)
-        for (size_t i = 0; i < count; i++) REQUIRE(basis[i] >= -limit && basis[i] <= limit, "a basis keeps to its limit");
+        for (size_t i = 0; i < count; i++)
+            REQUIRE(basis[i] >= -limit && basis[i] <= limit, "a basis keeps to its limit");
     free(basis);
+}
+
+static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, const uint8_t *head,
+                       double *rest)
+{
+    if (head[6] & 1)
+        return ath_decode_exact_rest(model, body.bytes, body.size, branches, count, head[6] & 2, rest);
+    return ath_decode_rest(model, body.bytes, body.size, branches, count, step_from(head + 6), rest);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -127,16 +137,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ath_bytes body = own(take(&rest_of_input, rest_of_input.left));
     void *model = fuzz_memory(ath_prelude_model_size(), 0x7f);
     if (method & 4) decode_time(model, body, frames);
-    if (method & 8) decode_basis(model, body, ath_min(frames, 256), 1 + data[7] % ath_min(frames, 256), 8 + (method >> 4) % 9);
+    int32_t shorter = ath_min(frames, ATH_SEGMENT_FRAMES);
+    if (method & 8) decode_basis(model, body, shorter, 1 + data[7] % shorter, 8 + (method >> 4) % 9);
     ath_branch *branches = fuzz_memory((size_t)branch_count * sizeof *branches, 0);
     int32_t *branch_source = integers((size_t)branch_count), *vertex_source = integers((size_t)vertices);
     double *rest = fuzz_memory(3 * (size_t)vertices * sizeof *rest, 0xa5);
     if (ath_decode_hierarchy(model, hierarchy.bytes, hierarchy.size, branch_count, vertices, branches, branch_source,
                              vertex_source) == ATH_OK) {
         check_branches(branches, branch_count, vertices);
-        int result = method & 1 ? ath_decode_exact_rest(model, body.bytes, body.size, branches, branch_count, method & 2, rest)
-                                : ath_decode_rest(model, body.bytes, body.size, branches, branch_count, step_from(data + 6),
-                                                  rest);
+        int result = decode_pose(model, body, branches, branch_count, data, rest);
         int finite = result == ATH_OK && all_finite(rest, 3 * (size_t)vertices);
         REQUIRE(finite || result != ATH_OK || !(method & 1), "exact numbers are finite");
         if (finite) plan(branches, branch_count, vertices, rest);

@@ -1,7 +1,7 @@
 """Random clips there and back: the bound, the hierarchy and the times must come back, whatever the plant.
 
-`python -m fuzz.roundtrip SECONDS SEED` prints a line of JSON: clips tried, and what the first failure said. It runs in a
-process of its own, so that a crash of the core is one of the findings and no end of the run.
+`python -m fuzz.roundtrip SECONDS SEED` prints lines of JSON: clips tried, and what the first failure said. It runs in
+a process of its own, so that a crash of the core is one of the findings and no end of the run.
 """
 
 from __future__ import annotations

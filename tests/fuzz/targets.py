@@ -61,7 +61,7 @@ class Outcome:
 def _links_fuzzer(compiler: str) -> bool:
     with TemporaryDirectory() as folder:
         source = Path(folder, "probe.c")
-        source.write_text("int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { (void)d; (void)n; return 0; }\n")
+        source.write_text("int LLVMFuzzerTestOneInput(const char *data, unsigned long size) { return !data && size; }\n")
         done = subprocess.run([compiler, "-fsanitize=fuzzer,address", source, "-o", Path(folder, "probe")],
                               capture_output=True)
     return done.returncode == 0
@@ -134,14 +134,14 @@ def _number(pattern: str, log: str) -> int:
     return int(found[-1]) if found else 0
 
 
-def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0, runs: int = -1) -> Outcome:
+def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0) -> Outcome:
     """Mutates for some time, from the seeds and what the corpus has, which grows."""
     start = BUILD / "seeds" / target
     seeds.write_inputs(target, start)
     for folder in (corpus, finds):
         folder.mkdir(parents=True, exist_ok=True)
     before = set(finds.iterdir())
-    command = [program, corpus, start, f"-max_total_time={max(1, round(seconds))}", f"-timeout={TIMEOUT}", f"-runs={runs}",
+    command = [program, corpus, start, f"-max_total_time={max(1, round(seconds))}", f"-timeout={TIMEOUT}",
                f"-rss_limit_mb={RSS_MB}", f"-malloc_limit_mb={MALLOC_MB}", f"-max_len={seeds.LARGEST}", f"-seed={seed}",
                f"-dict={HERE / 'ath.dict'}", f"-artifact_prefix={finds}/{target}-", "-print_final_stats=1", "-reload=0"]
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
