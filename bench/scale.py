@@ -37,8 +37,7 @@ ENCODES, DECODES = 3, 5
 FRAMES_AHEAD = 7
 REAL = {"vertices, 200 frames": ("mj_1k_200f", "mj_4k_200f", "mj_8k_200f", "refined_50k_200f"),
         "frames, 1k vertices": ("mj_1k_200f", "mj_1k_1200f"),
-        "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f"),
-        "frames, 8k vertices": ("mj_8k_200f", "mj_8k_1200f")}
+        "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f")}
 SIZES = {"quick": ((1, 3), 120, (120, 240), 1),  # copies, their frames; frames, their copies
          "full": ((1, 2, 5, 10, 20, 50), 200, (200, 400, 800, 1200), 8)}
 
