@@ -1,0 +1,1851 @@
+"""The .ath format decoded in plain Python and NumPy, to learn it from and to hold other decoders to.
+
+Written from FORMAT.md alone, section by section and in its words; nothing of athcodec is imported. Where FORMAT.md
+computes vertex by vertex and frame by frame, arrays take all frames at once: that changes no result, because every sum
+still runs in the order written (`in_order`). It decodes whole levels of whole files, slowly; it does not play, write or
+repair them.
+
+    python spec/reference_decoder.py FILE [--depth D] [--strict] [--out positions.npy] [--checksum]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+import struct
+import sys
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+
+import numpy as np
+import zstandard
+
+# ---- errors and limits -----------------------------------------------------------------------------------------------
+
+
+class AthError(Exception):
+    """A file that is refused; `name` is that of FORMAT.md, "Errors"."""
+
+    def __init__(self, name: str, reason: str):
+        super().__init__(f"{name}: {reason}")
+        self.name = name
+
+
+def require(condition: bool, reason: str, error: str = "BAD_CHUNK") -> None:
+    if not condition:
+        raise AthError(error, reason)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """FORMAT.md, "Limits": each field is Max_..., with its default."""
+
+    chunks: int = 1 << 20
+    table_bytes: int = 16 << 20
+    metadata_bytes: int = 1 << 20
+    vertices: int = 1 << 26
+    branches: int = 1 << 20
+    frames: int = 1 << 20
+    hierarchy_depth: int = 4096
+    attributes: int = 256
+    string_bytes: int = 4096
+    chunk_bytes: int = 256 << 20
+    decoded_chunk_bytes: int = 256 << 20
+    memory_bytes: int = 2 << 30
+
+
+# ---- reading fields --------------------------------------------------------------------------------------------------
+
+
+def reader(code: str):
+    form = struct.Struct("<" + code)
+    return lambda data, at: form.unpack_from(data, at)[0]
+
+
+u16, u32, u64, f32, f64 = map(reader, "HIQfd")
+finite = math.isfinite
+
+
+def _crc_table() -> list[int]:
+    table = []
+    for byte in range(256):
+        for _ in range(8):
+            byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
+        table.append(byte)
+    return table
+
+
+CRC_TABLE = _crc_table()
+
+
+def crc32c(data: bytes) -> int:
+    """FORMAT.md, "Checksums"; a byte at a time instead of a bit at a time."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc = crc >> 8 ^ CRC_TABLE[(crc ^ byte) & 255]
+    return crc ^ 0xFFFFFFFF
+
+
+# ---- the front: header, chunk table, error table ---------------------------------------------------------------------
+
+MAGIC = b"\x89ATH\r\n\x1a\n"
+VERSION = (0, 3)
+HEADER_BYTES, ENTRY_BYTES, ERROR_BYTES = 64, 16, 8
+SEGMENT_FRAMES, MOST_LEVELS, NO_LEVEL = 256, 32, 255
+
+OPTIONAL = 0x8000
+HIERARCHY, REST, TIME = 1, 2, 3
+METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
+STEMS, AFFINES, CORRECTIONS, SHAPES = 16, 17, 18, 19
+ATTRIBUTE = OPTIONAL | 32
+KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
+         STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES", ATTRIBUTE: "ATTRIBUTE"}
+
+
+@dataclass(frozen=True)
+class Header:
+    checksum: int
+    file_length: int
+    chunk_count: int
+    vertex_count: int
+    branch_count: int
+    frame_count: int
+    segment_count: int
+    level_count: int
+    full_level_count: int
+    wide: bool
+    max_error: float
+
+    @property
+    def error_table_at(self) -> int:
+        return HEADER_BYTES + ENTRY_BYTES * self.chunk_count
+
+    @property
+    def chunks_at(self) -> int:
+        return self.error_table_at + ERROR_BYTES * self.level_count * self.segment_count
+
+    def segment(self, s: int) -> tuple[int, int]:
+        """First frame of a segment, and the one behind its last."""
+        return self.frame_count * s // self.segment_count, self.frame_count * (s + 1) // self.segment_count
+
+
+@dataclass(frozen=True)
+class Chunk:
+    kind: int
+    level: int
+    segment: int
+    length: int
+    checksum: int
+    offset: int
+
+    @property
+    def key(self) -> tuple:
+        """What grows along the file."""
+        kind_id = self.kind & ~OPTIONAL
+        if 16 <= kind_id < 32:
+            return (1, self.level, self.segment, self.kind)
+        return (0, kind_id) if kind_id < 16 else (2, kind_id)
+
+    @property
+    def is_motion(self) -> bool:
+        return self.key[0] == 1
+
+    @property
+    def repeatable(self) -> bool:
+        return bool(self.kind & OPTIONAL) and self.kind & ~OPTIONAL >= 32
+
+    def __str__(self) -> str:
+        name = KINDS.get(self.kind, f"kind {self.kind:#06x}")
+        return f"{name} of level {self.level}, segment {self.segment}" if self.is_motion else name
+
+
+def read_header(data: bytes, limits: Limits) -> Header:
+    require(len(data) > 0 and data[:8] == MAGIC[:len(data)], "Magic is not that of a file in this format",
+            "NOT_AN_ATH_FILE")
+    if len(data) >= 12:
+        version = u16(data, 8), u16(data, 10)
+        require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
+    require(len(data) >= HEADER_BYTES, "ends inside its header", "TRUNCATED")
+    header = Header(u32(data, 12), u64(data, 16), u32(data, 24), u32(data, 28), u32(data, 32), u32(data, 36),
+                    u32(data, 40), data[44], data[45], bool(data[47] & 1), f64(data, 48))
+    for name, count, most in (("Vertex_Count", header.vertex_count, limits.vertices),
+                              ("Branch_Count", header.branch_count, limits.branches),
+                              ("Frame_Count", header.frame_count, limits.frames),
+                              ("Segment_Count", header.segment_count, limits.frames),
+                              ("Chunk_Count", header.chunk_count, limits.chunks)):
+        require(count > 0, f"{name} is 0", "BAD_HEADER")
+        require(count <= most, f"{name} is {count}, more than {most}", "LIMIT_EXCEEDED")
+    for name, valid in (("Branch_Count", header.branch_count <= header.vertex_count),
+                        ("Segment_Count", header.segment_count <= header.frame_count),
+                        ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
+                        ("Full_Level_Count", 2 <= header.full_level_count <= MOST_LEVELS),
+                        ("Level_Count", 1 <= header.level_count <= header.full_level_count),
+                        ("Clip_Count", data[46] == 1), ("Flags", data[47] < 2),
+                        ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
+                        ("Reserved", u64(data, 56) == 0)):
+        require(valid, f"{name} is out of range", "BAD_HEADER")
+    return header
+
+
+def check_tables(data: bytes, header: Header, limits: Limits) -> None:
+    require(header.chunks_at - HEADER_BYTES <= limits.table_bytes, "tables are too long", "LIMIT_EXCEEDED")
+    require(len(data) >= header.chunks_at, "ends inside its tables", "TRUNCATED")
+    front = data[:12] + bytes(4) + data[16:header.chunks_at]
+    require(crc32c(front) == header.checksum, "header and tables are damaged", "BAD_CHECKSUM")
+    for at in range(header.error_table_at, header.chunks_at, 4):
+        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length", "BAD_CHUNK_TABLE")
+
+
+def read_chunk_table(data: bytes, header: Header, limits: Limits) -> list[Chunk]:
+    chunks, offset = [], header.chunks_at
+    for at in range(HEADER_BYTES, header.error_table_at, ENTRY_BYTES):
+        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12), offset)
+        check_kind(chunk.kind)
+        require(chunk.length <= limits.chunk_bytes, f"{chunk} is too long", "LIMIT_EXCEEDED")
+        level_fits = chunk.level < header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
+        segment_fits = chunk.segment < (header.segment_count if chunk.is_motion else 1)
+        require(data[at + 2] == 0 and level_fits and segment_fits, f"{chunk}: its place does not exist",
+                "BAD_CHUNK_TABLE")
+        if chunks:
+            before = chunks[-1]
+            require(before.key < chunk.key or (before.key == chunk.key and chunk.repeatable),
+                    f"{chunk} may not follow {before}", "BAD_CHUNK_TABLE")
+        chunks.append(chunk)
+        offset += chunk.length
+    require(offset == header.file_length, "File_Length is not the end of the last chunk", "BAD_CHUNK_TABLE")
+    return chunks
+
+
+def check_kind(kind: int) -> None:
+    """Kinds that are not known are skipped where they are optional and share their number with no known one."""
+    taken = {known & ~OPTIONAL for known in KINDS}
+    skipped = kind & OPTIONAL and kind & ~OPTIONAL not in taken
+    require(kind in KINDS or bool(skipped), f"kind {kind:#06x} is not known", "UNKNOWN_CHUNK")
+
+
+# ---- range coder -----------------------------------------------------------------------------------------------------
+
+MASK = (1 << 64) - 1
+SLOWEST = 60
+RATES = [131072 // (2 * seen + 5) for seen in range(SLOWEST)] + [690]
+LEAST, MOST = 48, 65536 - 48
+
+
+class Context:
+    """The probability of a 1, in 1/65536, and how many bits it has seen."""
+
+    __slots__ = ("one", "seen")
+
+    def __init__(self, one: int):
+        self.one = min(max(one, LEAST), MOST)
+        self.seen = 0
+
+
+class RangeDecoder:
+    """One stream: binary decisions, each under a context that learns from it, or raw."""
+
+    def __init__(self, stream: bytes):
+        self.stream, self.at, self.range = stream, 0, MASK
+        self.code = self.word() << 32
+        self.code |= self.word()
+
+    def word(self) -> int:
+        """Four bytes, big-endian; those behind the end are 0."""
+        four = self.stream[self.at:self.at + 4]
+        self.at += 4
+        return int.from_bytes(four, "big") << 8 * (4 - len(four))
+
+    def narrow(self, bound: int) -> int:
+        if self.code < bound:
+            self.range, bit = bound, 1
+        else:
+            self.code -= bound
+            self.range -= bound
+            bit = 0
+        if self.range < 1 << 32:
+            self.range <<= 32
+            self.code = (self.code << 32 | self.word()) & MASK
+        return bit
+
+    def bit(self, context: Context) -> int:
+        one = context.one
+        bit = self.narrow((self.range >> 16) * one)
+        if bit:
+            one += (65536 - one) * RATES[context.seen] >> 16
+        else:
+            one -= one * RATES[context.seen] >> 16
+        context.one = LEAST if one < LEAST else MOST if one > MOST else one
+        if context.seen < SLOWEST:
+            context.seen += 1
+        return bit
+
+    def raw_bit(self) -> int:
+        return self.narrow(self.range >> 1)
+
+    def finish(self) -> None:
+        """Everything is decoded: nothing may be left over, and no byte may be there that could be left out."""
+        require(not self.stream or self.stream[-1] != 0, "a stream ends in a zero byte")
+        require(self.at >= len(self.stream) and self.code < self.range, "a stream is not used up where it should be")
+
+
+# ---- numbers ---------------------------------------------------------------------------------------------------------
+
+LONGEST = 30  # bits of a magnitude
+CLASSES = 28
+
+
+def number_class(expected: int) -> int:
+    """0, 1, 2, 3, 4, 6, 8, 12, 16, ... begin a class."""
+    length = expected.bit_length()
+    if length < 2:
+        return length
+    return min(2 * length - 2 + (expected >> length - 2 & 1), CLASSES - 1)
+
+
+class NumberModel:
+    """Contexts of integers: of the bit length by the class of the magnitude expected, of the bits below the leading."""
+
+    def __init__(self):
+        self.size = []
+        for c in range(CLASSES):
+            mean = 2 * c + 1 if c < 2 else 5 + 2 * (c & 1) << c // 2 - 1
+            more = (mean << 16) // (mean + 32)
+            contexts = [Context(more)]
+            for _ in range(LONGEST - 1):
+                contexts.append(Context(more))
+                more = more * more >> 16
+            self.size.append(contexts)
+        self.mantissa = [[Context(30000) for _ in range(4)] for _ in range(LONGEST)]
+
+
+def code_unsigned(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
+    size = model.size[number_class(expected)]
+    length = 0
+    while length < LONGEST and coder.bit(size[length]):
+        length += 1
+    return code_mantissa(coder, model.mantissa, length) if length > 0 else 0
+
+
+def code_mantissa(coder: RangeDecoder, contexts: list, length: int) -> int:
+    value = 1
+    for taken in range(length - 1):
+        if taken < 2:
+            bit = coder.bit(contexts[length - 1][0 if taken == 0 else 1 + (value & 1)])
+        else:
+            bit = coder.raw_bit()
+        value = value << 1 | bit
+    return value
+
+
+def code_signed(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
+    magnitude = code_unsigned(coder, model, expected)
+    if magnitude == 0:
+        return 0
+    return -magnitude if coder.raw_bit() else magnitude
+
+
+def clipped(value: int) -> int:
+    return min(abs(value), 1 << 20)
+
+
+def divide_to_zero(a: int, b: int) -> int:
+    return a // b if a >= 0 else -(-a // b)
+
+
+# ---- hierarchy stream ------------------------------------------------------------------------------------------------
+
+SHEET, LOOSE, WHOLE = 1, 2, 4
+
+
+@dataclass
+class Branch:
+    """A branch in file order: parents come before children, subtrees are ranges."""
+
+    parent: int  # -1: a root
+    depth: int
+    first: int  # vertex
+    count: int
+    flags: int
+    lag: int
+    attach: int = -1  # the vertex it hangs on
+    subtree: int = 1  # branches in it
+    last_place: int = 0  # where on this stem the last child so far hangs
+
+
+def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
+    """Branches, and both permutations: number i here is number source[i] of the source."""
+    coder = RangeDecoder(stream)
+    branches = decode_branches(coder, branch_count, vertex_count)
+    decode_attaches(coder, branches)
+    sources = NumberModel()
+    branch_source = decode_numbers(coder, sources, [(0, branch_count)], branch_count)
+    stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
+    for b in sorted(range(branch_count), key=lambda b: branch_source[b]):
+        stem_start[b] = start
+        start += branches[b].count
+    runs = [(stem_start[b], branches[b].count) for b in range(branch_count)]
+    vertex_source = decode_numbers(coder, sources, runs, vertex_count)
+    coder.finish()
+    measure_subtrees(branches)
+    return branches, branch_source, vertex_source
+
+
+def decode_branches(coder: RangeDecoder, branch_count: int, vertex_count: int) -> list[Branch]:
+    ups, counts, lags = NumberModel(), NumberModel(), NumberModel()
+    flag_contexts = [[Context(16384), Context(16384)] for _ in range(3)]
+    branches, left, last_up, mean_count = [], vertex_count, 0, [128] * 16
+    flags = lag = 0
+    for b in range(branch_count):
+        parent = b - 1
+        if b > 0:
+            last_up = up = code_unsigned(coder, ups, min(last_up, 1000) * 16)
+            for _ in range(up):
+                require(parent >= 0, "a parent lies above the root")
+                parent = branches[parent].parent
+        depth = branches[parent].depth + 1 if parent >= 0 else 0
+        c = min(depth, 15)
+        more = code_unsigned(coder, counts, mean_count[c])
+        require(more < left, "stems have more vertices than the file")
+        mean_count[c] += divide_to_zero(min(more, 1 << 16) * 16 - mean_count[c], 4)
+        before, flags = flags, 0
+        for i in range(3):
+            flags |= coder.bit(flag_contexts[i][before >> i & 1]) << i
+        lag += code_signed(coder, lags, 0)
+        require(0 <= lag <= 65535, "a Lag is out of range")
+        require(parent >= 0 or not flags & LOOSE, "a root is LOOSE")
+        branches.append(Branch(parent, depth, vertex_count - left, more + 1, flags, lag))
+        left -= more + 1
+    require(left == 0, "stems have fewer vertices than the file")
+    return branches
+
+
+def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
+    attaches, mean = NumberModel(), 64
+    for branch in branches:
+        if branch.parent < 0:
+            continue
+        parent = branches[branch.parent]
+        step = code_signed(coder, attaches, mean)
+        place = parent.last_place + step
+        require(abs(step) <= 1 << 28 and 0 <= place < parent.count, "an attach vertex is not on the parent's stem")
+        branch.attach = parent.first + place
+        parent.last_place = place
+        mean = mean - (mean + 3) // 4 + clipped(step) * 4
+
+
+def decode_numbers(coder: RangeDecoder, model: NumberModel, runs: list, total: int) -> list[int]:
+    """A permutation of `total` numbers, in runs of (expected first number, length)."""
+    regular, numbers = not coder.bit(Context(32768)), []
+    for expected, length in runs:
+        for _ in range(length):
+            value = expected if regular else expected + code_signed(coder, model, 16)
+            require(0 <= value < total, "a permutation has a number out of range")
+            numbers.append(value)
+            expected = value + 1
+    require(len(set(numbers)) == total, "a permutation has a number twice")
+    return numbers
+
+
+def measure_subtrees(branches: list[Branch]) -> None:
+    for branch in reversed(branches):
+        if branch.parent >= 0:
+            branches[branch.parent].subtree += branch.subtree
+    whole_until = 0
+    for b, branch in enumerate(branches):
+        if branch.flags & WHOLE:
+            require(b >= whole_until, "a branch in the subtree of a WHOLE one is WHOLE")
+            whole_until = b + branch.subtree
+
+
+# ---- rest pose -------------------------------------------------------------------------------------------------------
+
+RUN_VERTICES = 32
+
+
+def decode_rest(stream: bytes, branches: list[Branch], step: float) -> list[list[float]]:
+    """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex."""
+    coder, rows = RangeDecoder(stream), CoefficientModel()
+    models = [NumberModel(), NumberModel()]  # from the third vertex of a stem on; its first two
+    mean = [[64, 64, 64], [64, 64, 64]]
+    rest = []
+    for branch in branches:
+        single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
+        for i in range(single_vertices):
+            predicted = predict_rest(branch, rest, i)
+            start = 1 if i < 2 else 0
+            m, point = mean[start], []
+            for k in range(3):
+                steps = code_signed(coder, models[start], (m[k] + (m[0] + m[1] + m[2])) // 4)
+                point.append(predicted[k] + float(steps) * step)
+                m[k] = m[k] - (m[k] + 7) // 8 + clipped(steps) * 2
+            rest.append(point)
+        left = branch.count - single_vertices
+        runs = (left + RUN_VERTICES - 1) // RUN_VERTICES
+        for r in range(runs):
+            n = left * (r + 1) // runs - left * r // runs
+            base = rest[branch.attach] if len(rest) == branch.first else rest[-1]
+            row, _ = decode_row(coder, rows, RUN_VERTICES, n, 0)
+            modes = cantilever((1,) * n, 100.0, 0.0)
+            moved = [in_order(modes * np.array(row[k][:n], float)[:, None]) * step for k in range(3)]
+            rest += [[base[k] + float(moved[k][i]) for k in range(3)] for i in range(n)]
+    coder.finish()
+    return rest
+
+
+def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
+    """Where vertex i of a stem should be, from those before it."""
+    def on_stem(j: int):  # -1: the attach vertex, None for a root
+        if j >= 0:
+            return rest[branch.first + j]
+        return rest[branch.attach] if branch.attach >= 0 else None
+
+    before, lag = on_stem(i - 1) or [0.0, 0.0, 0.0], max(branch.lag, 1)
+    if i < lag or on_stem(i - lag - 1) is None:
+        return before
+    start, end = on_stem(i - lag - 1), on_stem(i - lag)
+    return [before[k] + (end[k] - start[k]) for k in range(3)]
+
+
+# ---- exact numbers: rest poses and times bit for bit -----------------------------------------------------------------
+
+
+class ExactModel:
+    def __init__(self):
+        self.size = [[Context(60000) for _ in range(64)] for _ in range(65)]
+        self.mantissa = [[Context(30000) for _ in range(4)] for _ in range(64)]
+
+
+def single(x: float) -> float:
+    """Rounded to the nearest binary32."""
+    return float(np.float32(x))
+
+
+def to_bits(x: float, n: int) -> int:
+    return u32(struct.pack("<f", x), 0) if n == 32 else u64(struct.pack("<d", x), 0)
+
+
+def from_bits(bits: int, n: int) -> float:
+    return f32(struct.pack("<I", bits), 0) if n == 32 else f64(struct.pack("<Q", bits), 0)
+
+
+def ordered(bits: int, n: int) -> int:
+    """Bits of a number as an integer that ascends with the numbers."""
+    return (1 << n) - 1 - bits if bits >> n - 1 else bits + (1 << n - 1)
+
+
+def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, before: int):
+    """A number of n bits, and the bit length of its difference from the one expected; `before`: the length before."""
+    expected = single(expected) if n == 32 else expected
+    at = ordered(to_bits(expected if finite(expected) else 0.0, n), n)
+    length = 0
+    while length < n and coder.bit(model.size[before][length]):
+        length += 1
+    if length > 0:
+        magnitude = code_mantissa(coder, model.mantissa, length)
+        at = at + (-magnitude if coder.raw_bit() else magnitude) & (1 << n) - 1
+    number = from_bits(at - (1 << n - 1) if at >> n - 1 else (1 << n) - 1 - at, n)
+    require(finite(number), "a number is infinite or NaN")
+    return number, length
+
+
+def decode_exact_rest(stream: bytes, branches: list[Branch], wide: bool) -> list[list[float]]:
+    coder, model, rest, before = RangeDecoder(stream), ExactModel(), [], [0, 0, 0]
+    for branch in branches:
+        for i in range(branch.count):
+            expected, point = predict_rest(branch, rest, i), []
+            for k in range(3):
+                number, before[k] = code_exact(coder, model, 64 if wide else 32, expected[k], before[k])
+                point.append(number)
+            rest.append(point)
+    coder.finish()
+    return rest
+
+
+def decode_times(stream: bytes, frame_count: int) -> list[float]:
+    coder, model, times, before = RangeDecoder(stream), ExactModel(), [], 0
+    for i in range(frame_count):
+        expected = times[i - 1] if i > 0 else 0.0
+        if i > 1:
+            expected = expected + (times[i - 1] - times[i - 2])
+        number, before = code_exact(coder, model, 64, expected, before)
+        times.append(number)
+    coder.finish()
+    return times
+
+
+def frame_times(chunk: bytes, frame_count: int) -> list[float]:
+    """TIME: seconds of every frame."""
+    require(len(chunk) > 0 and chunk[0] <= 2, "TIME has an unknown Method")
+    if chunk[0] == 2:
+        times = decode_times(chunk[1:], frame_count)
+    else:
+        require(len(chunk) == 17, "TIME has not First and Step alone")
+        first, step = f64(chunk, 1), f64(chunk, 9)
+        require(finite(step) and step > 0.0, "Step of TIME is not above 0")
+        times = [first + (float(i) / step if chunk[0] else float(i) * step) for i in range(frame_count)]
+    ascending = all(a < b for a, b in zip(times, times[1:]))
+    require(ascending and all(map(finite, times)), "times are not finite and ascending")
+    return times
+
+
+# ---- temporal basis and coefficient streams --------------------------------------------------------------------------
+
+
+def decode_temporal(stream: bytes, rank: int, frames: int, bits: int) -> list[list[int]]:
+    """A learned basis over time, as integers."""
+    coder, model, basis = RangeDecoder(stream), NumberModel(), []
+    for _ in range(rank):
+        mean, before, slope, row = 1024, 0, 0, []
+        for t in range(frames):
+            rest = code_signed(coder, model, mean)
+            value = before + slope + rest
+            require(abs(value) <= 1 << bits - 1, "an entry of a learned basis is beyond 1")
+            slope = value - before if t > 0 else 0
+            before = value
+            mean = mean - (mean + 3) // 4 + clipped(rest) * 4
+            row.append(value)
+        basis.append(row)
+    coder.finish()
+    return basis
+
+
+SLOTS, SHIFT_SLOT, OMEGA_SLOT = 66, 64, 65
+
+
+class CoefficientModel:
+    def __init__(self):
+        self.number = NumberModel()
+        self.empty = [[Context(32768) for _ in range(6)] for _ in range(6)]
+        self.count_size = [[Context(40000) for _ in range(10)] for _ in range(6)]
+        self.count_mantissa = [[Context(32768) for _ in range(4)] for _ in range(10)]
+        self.history = [[0] * SEGMENT_FRAMES for _ in range(SLOTS)]  # magnitudes per slot and frequency
+        self.history_count = [0] * SLOTS
+
+
+def count_class(n: int) -> int:
+    return 0 if n == 0 else 1 if n <= 2 else 2 if n <= 6 else 3 if n <= 14 else 4 if n <= 30 else 5
+
+
+def decode_count(coder: RangeDecoder, model: CoefficientModel, history: int, above: int, rank: int) -> int:
+    """How many frequencies of a row are coded."""
+    if coder.bit(model.empty[count_class(history)][count_class(above)]):
+        return 0
+    size, length = model.count_size[count_class((history + above + 1) // 2)], 1
+    while length < 10 and coder.bit(size[length]):
+        length += 1
+    count = 1
+    for taken in range(length - 1):
+        c = 0 if taken == 0 else 1 + (count & 1) if taken == 1 else 3
+        count = count << 1 | coder.bit(model.count_mantissa[length - 1][c])
+    require(count <= rank, "a row has more frequencies than its basis")
+    return count
+
+
+def at_frequency(axis: list[int], k: int) -> int:
+    return clipped(axis[k]) if 0 <= k < len(axis) else 0
+
+
+def decode_row(coder: RangeDecoder, model: CoefficientModel, frames: int, rank: int, slot: int, above=None,
+               above_count: int = 0):
+    """Three axes of `frames` integers over frequency, and how many frequencies were coded.
+
+    What is near in frequency, on the other axes, in the row above and in rows of the same slot tells how large a number
+    is expected to be.
+    """
+    history = model.history[slot]
+    count = decode_count(coder, model, model.history_count[slot], above_count, rank)
+    row = [[0] * frames for _ in range(3)]
+    for k in range(count):
+        before = over = beside = 0
+        for axis in row:
+            before += 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2)
+        for axis in above or ():
+            over += 2 * at_frequency(axis, k) + at_frequency(axis, k - 1) + at_frequency(axis, k + 1)
+        for a, axis in enumerate(row):
+            near = 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2) + at_frequency(axis, k - 3)
+            around = history[k] if a == 0 else (beside * 16 // a + history[k]) // 2
+            expected = (near * 16 + before * 2 + over + around * 8) // 16
+            axis[k] = code_signed(coder, model.number, expected)
+            beside += clipped(axis[k])
+    model.history_count[slot] = count
+    for k in range(frames):
+        total = clipped(row[0][k]) + clipped(row[1][k]) + clipped(row[2][k])
+        history[k] = history[k] - (history[k] + 3) // 4 + total * 4 // 3
+    return row, count
+
+
+# ---- plan: what all segments share -----------------------------------------------------------------------------------
+
+PIECE_VERTICES = 64
+SHAPE_MODES = 16
+
+
+@dataclass
+class Piece:
+    """At most 64 consecutive vertices of one stem."""
+
+    number: int
+    first: int  # vertex
+    count: int
+    attach: int  # vertex, -1: none
+    parent: int  # piece of that vertex, -1: none
+    flags: int
+    level: int  # that completes it
+    low_level: int = -1  # that holds its tracks and first modes instead
+    low_modes: int = 0
+
+    @property
+    def base_level(self) -> int:
+        return self.low_level if self.low_level >= 0 else self.level
+
+    @property
+    def has_shift(self) -> bool:
+        """Whether it has a translation track."""
+        return self.parent < 0 or bool(self.flags & LOOSE)
+
+    @property
+    def vertices(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+
+@dataclass
+class Node:
+    """A branch whose subtree moves by one map at the levels `level` to `last`."""
+
+    number: int
+    piece: int
+    first: int  # vertex
+    count: int
+    level: int
+    last: int
+    coded: bool  # whether it has a map of its own; else the first modes of its only piece make one
+
+    @property
+    def vertices(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+
+class Plan:
+    """Pieces and nodes of a hierarchy; once the rest pose is set, also their bases."""
+
+    def __init__(self, branches: list[Branch]):
+        self.pieces: list[Piece] = []
+        self.nodes: list[Node] = []
+        self.rest = np.zeros((0, 3))
+        self._bases: dict[int, np.ndarray] = {}
+        is_node = self._find_nodes(branches)
+        piece_of_vertex: list[int] = []
+        for b, branch in enumerate(branches):
+            if is_node[b]:
+                self._add_node(branches, b)
+            self._add_pieces(branch, self.nodes[-1] if is_node[b] else None, piece_of_vertex)
+
+    def _find_nodes(self, branches: list[Branch]) -> list[bool]:
+        """Branches that no proper ancestor with WHOLE contains."""
+        is_node, self.height, b = [False] * len(branches), 0, 0
+        while b < len(branches):
+            is_node[b] = True
+            self.height = max(self.height, branches[b].depth)
+            b += branches[b].subtree if branches[b].flags & WHOLE else 1
+        return is_node
+
+    def _add_node(self, branches: list[Branch], b: int) -> None:
+        branch, last_branch = branches[b], branches[b + branches[b].subtree - 1]
+        self.nodes.append(Node(
+            len(self.nodes), len(self.pieces), branch.first, last_branch.first + last_branch.count - branch.first,
+            level=branch.depth, last=self.height if branch.flags & WHOLE else branch.depth,
+            coded=branch.subtree > 1 or branch.count > PIECE_VERTICES))
+
+    def _add_pieces(self, branch: Branch, node: Node | None, piece_of_vertex: list[int]) -> None:
+        parts = (branch.count + PIECE_VERTICES - 1) // PIECE_VERTICES
+        for j in range(parts):
+            start, stop = branch.count * j // parts, branch.count * (j + 1) // parts
+            first = branch.first + start
+            attach = branch.attach if j == 0 else first - 1
+            piece = Piece(len(self.pieces), first, stop - start, attach,
+                          parent=piece_of_vertex[attach] if attach >= 0 else -1,
+                          flags=branch.flags if j == 0 else branch.flags & ~LOOSE, level=self.height + 1)
+            if node is not None and not branch.flags & WHOLE:
+                piece.level = branch.depth + 1
+            if node is not None and not node.coded:
+                piece.low_level = branch.depth
+                piece.low_modes = min(branch.count, 3 if branch.flags & SHEET else 2)
+            piece_of_vertex += [piece.number] * piece.count
+            self.pieces.append(piece)
+
+    def has_stems(self, level: int) -> bool:
+        return any(level in (piece.level, piece.low_level) for piece in self.pieces)
+
+    def has_affines(self, level: int, shown: int) -> bool:
+        """Whether playing `shown` needs the maps of `level`."""
+        return any(node.coded and node.level == level and shown <= node.last for node in self.nodes)
+
+    # From here on the rest pose is needed.
+
+    def attach_point(self, piece: Piece) -> np.ndarray:
+        return self.rest[piece.attach if piece.attach >= 0 else piece.first]
+
+    def from_attach(self, piece: Piece) -> np.ndarray:
+        """(count, 3): rest vertices relative to the attach vertex."""
+        return self.rest[piece.vertices] - self.attach_point(piece)
+
+    def basis(self, piece: Piece) -> np.ndarray:
+        """(modes, count): functions over the piece's vertices."""
+        if piece.number not in self._bases:
+            modes = cantilever(piece_gaps(self, piece), 0.1, 0.001)
+            self._bases[piece.number] = sheet(self, piece, modes) if piece.flags & SHEET else modes
+        return self._bases[piece.number]
+
+    def shape_modes(self, piece: Piece) -> int:
+        return min(len(self.basis(piece)), SHAPE_MODES)
+
+    def base_shapes(self, piece: Piece) -> int:
+        """The most shapes that the piece's base level may hold."""
+        modes = self.shape_modes(piece)
+        return 3 * (min(piece.low_modes, modes) if piece.low_level >= 0 else modes)
+
+    def whitening(self, node: Node) -> list[np.ndarray]:
+        """Up to three functionals, orthonormal over the subtree's rest vertices."""
+        x = self.rest[node.vertices] - self.attach_point(self.pieces[node.piece])
+        moment = in_order(x[:, :, None] * x[:, None, :]) / float(node.count)
+        rows, used, largest = [], set(), 0.0
+        for r in range(3):
+            best, best_axis, best_w = 0.0, -1, None
+            for axis in range(3):
+                if axis in used:
+                    continue
+                w, left = np.zeros(3), moment[axis, axis]
+                w[axis] = 1.0
+                for e in rows:
+                    shared = e[0] * moment[0, axis] + e[1] * moment[1, axis] + e[2] * moment[2, axis]
+                    left = left - shared * shared
+                    w = w - shared * e
+                if left > best:
+                    best, best_axis, best_w = left, axis, w
+            if r == 0:
+                largest = best
+            if best_axis < 0 or not best > largest * 1e-4:
+                break
+            used.add(best_axis)
+            rows.append(best_w / np.sqrt(best))
+        return rows
+
+
+# ---- bases -----------------------------------------------------------------------------------------------------------
+
+
+def in_order(terms: np.ndarray) -> np.ndarray:
+    """0.0 + terms[0] + terms[1] + ..., each rounded before the next is added: accumulate is defined to do that.
+
+    The last 0.0 makes up for the first, which is left out: it tells only where all terms are -0.0.
+    """
+    if len(terms) == 0:
+        return np.zeros(terms.shape[1:])
+    return np.add.accumulate(terms, axis=0)[-1] + 0.0
+
+
+def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
+    """Distances along a piece in quarters of their mean, 1 to 64."""
+    before = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices][:-1]])
+    x, y, z = (plan.rest[piece.vertices] - before).T
+    lengths = np.sqrt(x * x + y * y + z * z)
+    if piece.flags & SHEET:
+        lengths[:] = 0.0
+    total = in_order(lengths)
+    quarters = 4.0 * lengths * float(piece.count) / total + 0.5 if total > 0.0 else np.full(piece.count, 4.0)
+    return tuple(64 if q >= 64.0 else int(q) if q >= 1.0 else 1 for q in quarters.tolist())
+
+
+@cache
+def cantilever(gaps: tuple[int, ...], turn: float, rough: float) -> np.ndarray:
+    """(n, n): modes of a randomly bent cantilever, eigenvectors of its covariance, largest eigenvalue first."""
+    n, total = len(gaps), float(sum(gaps))
+    s = np.cumsum(gaps) / total
+    high, low = np.maximum(s[:, None], s), np.minimum(s[:, None], s)
+    bend = low * low * (3.0 * high - low) / 6.0
+    q, d, e = tridiagonalise(bend + turn * (low * high) + rough * low)
+    diagonalise(q, d, e)
+    modes = []
+    for _ in range(n):
+        best = max(range(n), key=lambda i: d[i])  # the first of equals
+        sign = -1.0 if q[best, n - 1] < 0.0 else 1.0
+        modes.append(sign * q[best])
+        d[best] = -1e300
+    return np.array(modes)
+
+
+def tridiagonalise(a: np.ndarray):
+    """Householder's reduction: rows q, diagonal d, and e beside it."""
+    n = len(a)
+    q = np.eye(n)
+    for k in range(n - 2):
+        rest = slice(k + 1, n)
+        column = a[rest, k].copy()
+        norm2, head = float(in_order(column * column)), float(column[0])
+        if not norm2 - head * head > norm2 * 1e-30:
+            continue
+        norm = math.sqrt(norm2)
+        alpha = -norm if head > 0.0 else norm
+        scale = 1.0 / (norm2 - head * alpha)
+        v = column
+        v[0] = head - alpha
+        p = in_order((a[rest, rest] * v).T) * scale
+        half = 0.5 * scale * in_order(v * p)
+        p = p - half * v
+        a[rest, rest] = a[rest, rest] - v[:, None] * p - p[:, None] * v
+        a[k + 1, k] = a[k, k + 1] = alpha
+        a[k + 2:, k] = a[k, k + 2:] = 0.0
+        total = in_order(v[:, None] * q[rest]) * scale
+        q[rest] = q[rest] - total * v[:, None]
+    return q, a.diagonal().tolist(), a.diagonal(-1).tolist() + [0.0]
+
+
+def diagonalise(q: np.ndarray, d: list[float], e: list[float]) -> None:
+    """The implicit QL method: afterwards row i of q belongs to the eigenvalue d[i]."""
+    n = len(d)
+    for l in range(n):
+        for _ in range(50):
+            m = l
+            while m < n - 1 and abs(e[m]) > (abs(d[m]) + abs(d[m + 1])) * 1e-16:
+                m += 1
+            if m == l:
+                break
+            g = (d[l + 1] - d[l]) / (2.0 * e[l])
+            r = math.sqrt(g * g + 1.0)
+            g = d[m] - d[l] + e[l] / (g + r if g >= 0.0 else g - r)
+            s, c, p, early = 1.0, 1.0, 0.0, False
+            for i in range(m - 1, l - 1, -1):
+                f, b = s * e[i], c * e[i]
+                r = math.sqrt(f * f + g * g)
+                e[i + 1] = r
+                if r == 0.0:
+                    d[i + 1] = d[i + 1] - p
+                    e[m] = 0.0
+                    early = True
+                    break
+                s = f / r
+                c = g / r
+                g = d[i + 1] - p
+                r = (d[i] - g) * s + 2.0 * c * b
+                p = s * r
+                d[i + 1] = g + p
+                g = c * r - b
+                high, low = q[i + 1].copy(), q[i].copy()
+                q[i + 1] = s * low + c * high
+                q[i] = c * low - s * high
+            if early:
+                continue
+            d[l] = d[l] - p
+            e[l] = g
+            e[m] = 0.0
+
+
+def sheet(plan: Plan, piece: Piece, modes: np.ndarray) -> np.ndarray:
+    """The affine functions over a flat piece's vertices, then what is left of the modes."""
+    columns = plan.from_attach(piece).T
+    length2 = in_order((columns * columns).T)
+    basis: list[np.ndarray] = []
+    for _ in range(3):
+        best = 0
+        for k in range(1, 3):
+            if length2[k] > length2[best]:
+                best = k
+        if length2[best] > 0.0 and len(basis) < piece.count:
+            append_orthonormal(basis, columns[best], 1e-4)
+        length2[best] = -1.0
+    for mode in modes:
+        if len(basis) < piece.count:
+            append_orthonormal(basis, mode, 1e-10)
+    return np.array(basis).reshape(-1, piece.count)
+
+
+def append_orthonormal(basis: list, x: np.ndarray, keep: float) -> None:
+    before = in_order(x * x)
+    for _ in range(2):
+        for mode in basis:
+            x = x - in_order(mode * x) * mode
+    after = in_order(x * x)
+    if after > before * keep:
+        basis.append(x * (1.0 / np.sqrt(after)))
+
+
+PI = 3.14159265358979323846
+
+
+@cache
+def cosine_waves(frames: int) -> np.ndarray:
+    """(frames, frames): the orthonormal DCT-II, wave k at frame t."""
+    first, other = math.sqrt(1.0 / frames), math.sqrt(2.0 / frames)
+    cosines = [cos_of_fraction(j, frames) for j in range(4 * frames)]
+    return np.array([[(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)] for t in range(frames)]
+                     for k in range(frames)])
+
+
+def cos_of_fraction(j: int, frames: int) -> float:
+    """cos(pi j / (2 frames)), 0 <= j < 4 frames."""
+    if j > 2 * frames:
+        j = 4 * frames - j
+    sign = 1.0
+    if j > frames:
+        j, sign = 2 * frames - j, -1.0
+    if 2 * j <= frames:
+        return sign * cos_series(PI * j / (2 * frames))
+    return sign * sin_series(PI * (frames - j) / (2 * frames))
+
+
+def cos_series(x: float) -> float:
+    x2, total = x * x, 1.0
+    for k in range(18, 0, -2):
+        total = 1.0 - total * x2 / (k * (k - 1))
+    return total
+
+
+def sin_series(x: float) -> float:
+    x2, total = x * x, 1.0
+    for k in range(19, 1, -2):
+        total = 1.0 - total * x2 / (k * (k - 1))
+    return x * total
+
+
+# ---- motion of one segment at one level ------------------------------------------------------------------------------
+
+
+@dataclass
+class LevelStream:
+    """How the integers of a level's STEMS are read."""
+
+    step: float
+    omega: float  # rotation factor
+    waves: np.ndarray  # (rank, frames)
+
+
+@dataclass
+class Motion:
+    """The integers of a segment: rows of three axes of integers over frequency. What no chunk holds is missing."""
+
+    frames: int
+    cosines: np.ndarray
+    streams: dict[int, LevelStream] = field(default_factory=dict)  # by level
+    shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
+    coefficients: dict[int, list] = field(default_factory=dict)  # by piece.first + mode
+    shift: dict[int, list] = field(default_factory=dict)  # by piece
+    omega: dict[int, list] = field(default_factory=dict)  # by piece
+    node_rows: dict[int, list] = field(default_factory=dict)  # by node
+    node_shift: dict[int, list] = field(default_factory=dict)  # by node
+    node_step: dict[int, float] = field(default_factory=dict)  # by node
+
+    def shapes_of(self, piece: Piece) -> list[np.ndarray]:
+        return self.shapes.get(piece.number, [])
+
+
+def decode_shapes(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
+    """Shapes that pieces have at their base level, or that the level which completes them adds."""
+    coder, model, counts, before = RangeDecoder(stream), CoefficientModel(), NumberModel(), [0, 0]
+    for piece in plan.pieces:
+        if level not in (piece.base_level, piece.level):
+            continue
+        own, most, part = motion.shapes_of(piece), plan.base_shapes(piece), 0
+        if level != piece.base_level:
+            if len(own) < most:
+                continue
+            part, most = 1, 3 * plan.shape_modes(piece) - most
+        before[part] = count = code_unsigned(coder, counts, before[part] * 16)
+        require(count <= most, "a piece has more shapes than modes and axes")
+        above, above_count = None, 0
+        for _ in range(count):
+            above, above_count = decode_row(coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own), above,
+                                            above_count)
+            numbers = np.array(above, float).T.ravel()  # axis a of mode m at 3 m + a
+            length2 = in_order(numbers * numbers)
+            require(length2 > 0.0, "a shape is all 0")
+            own = [*own, (numbers * (1.0 / np.sqrt(length2))).reshape(SHAPE_MODES, 3)]
+        motion.shapes[piece.number] = own
+    coder.finish()
+
+
+def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
+    """Steps and waves of a level; returns its Stems_Stream."""
+    require(len(chunk) >= 8, "STEMS is too short")
+    step, rotation, bits, rank = f32(chunk, 0), chunk[4], chunk[5], u16(chunk, 6)
+    require(finite(step) and step > 0.0 and rotation <= 4, "Step or Rotation of STEMS is out of range")
+    require(rank == 0 if bits == 0 else 8 <= bits <= 16 and 1 <= rank <= motion.frames,
+            "Basis_Bits or Basis_Rank is out of range")
+    waves, body = motion.cosines, chunk[8:]
+    if bits:
+        require(len(body) >= 4 and u32(body, 0) <= len(body) - 4, "Basis_Length is more than the chunk holds")
+        stream, body = body[4:4 + u32(body, 0)], body[4 + u32(body, 0):]
+        waves = np.array(decode_temporal(stream, rank, motion.frames, bits), float) * 2.0 ** -(bits - 1)
+    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves)
+    return body
+
+
+def decode_stems(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
+    """Tracks of the pieces that begin at a level, and modes of those that begin or are completed there."""
+    coder, model = RangeDecoder(stream), CoefficientModel()
+    frames, rank = motion.frames, len(motion.streams[level].waves)
+    for piece in plan.pieces:
+        if level == piece.base_level:
+            if piece.has_shift:
+                motion.shift[piece.number], _ = decode_row(coder, model, frames, rank, SHIFT_SLOT)
+            if omega_step(plan, piece, motion.streams[level]) > 0.0:
+                motion.omega[piece.number], _ = decode_row(coder, model, frames, rank, OMEGA_SLOT)
+        start = stop = 0
+        if level == piece.low_level:
+            stop = min(piece.low_modes, len(plan.basis(piece)))
+        if level == piece.level:
+            start, stop = piece.low_modes, len(plan.basis(piece))
+        above, count, shapes = None, 0, len(motion.shapes_of(piece))
+        for m in range(start, stop):
+            if shapes and shapes <= 3 * m < 3 * plan.shape_modes(piece):
+                continue  # the row would hold no shape
+            above, count = decode_row(coder, model, frames, rank, m, above, count)
+            motion.coefficients[piece.first + m] = above
+    coder.finish()
+
+
+def decode_affines(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
+    """Maps of the coded nodes of a level."""
+    coder, model, steps = RangeDecoder(stream), CoefficientModel(), NumberModel()
+    exponent, frames = 0, motion.frames
+    for node in plan.nodes:
+        if not node.coded or node.level != level:
+            continue
+        change = code_signed(coder, steps, 32)
+        require(abs(change) <= 400 and abs(exponent + change) <= 200, "the step of a map is out of range")
+        exponent += change
+        motion.node_step[node.number] = half_octave(exponent)
+        above, count, rows = None, 0, []
+        for r in range(len(plan.whitening(node))):
+            above, count = decode_row(coder, model, frames, frames, r, above, count)
+            rows.append(above)
+        motion.node_rows[node.number] = rows
+        if plan.pieces[node.piece].has_shift:
+            motion.node_shift[node.number], _ = decode_row(coder, model, frames, frames, SHIFT_SLOT)
+    coder.finish()
+
+
+def half_octave(exponent: int) -> float:
+    """The square root of 2 to a power."""
+    odd = exponent & 1
+    return (1.4142135623730951 if odd else 1.0) * 2.0 ** ((exponent - odd) // 2)
+
+
+# ---- corrections -----------------------------------------------------------------------------------------------------
+
+BLOCK_FRAMES = 8
+
+
+class CorrectionModel:
+    def __init__(self):
+        self.vertex = [Context(4000 if i == 0 else 32768) for i in range(4)]
+        self.block = [[Context(8000) for _ in range(4)] for _ in range(2)]
+        self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)] for i in range(3)]
+        self.zero = [[Context(32768) for _ in range(3)] for _ in range(2)]
+        self.sign = [[Context(32768) for _ in range(3)] for _ in range(3)]
+        self.size = NumberModel()
+
+
+def decode_corrections(stream: bytes, vertex_count: int, frames: int) -> np.ndarray:
+    """(vertices, 3, frames) integers."""
+    coder, model = RangeDecoder(stream), CorrectionModel()
+    none = [(0, 0, 0)] * frames
+    above, before, result = none, 0, []
+    for _ in range(vertex_count):
+        corrected = coder.bit(model.vertex[before])
+        above = decode_corrected_frames(coder, model, above, frames) if corrected else none
+        before = (before << 1 | corrected) & 3
+        result.append(above)
+    coder.finish()
+    return np.array(result, np.int64).transpose(0, 2, 1)
+
+
+def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: list, frames: int) -> list:
+    """A vertex that has corrections: blocks of frames, frames of a block. What must be true is not coded."""
+    row = [(0, 0, 0)] * frames
+    some = [any(q) for q in above]
+    found_any = block_before = 0
+    for start in range(0, frames, BLOCK_FRAMES):
+        stop = min(start + BLOCK_FRAMES, frames)
+        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0):min(stop + BLOCK_FRAMES, frames)])
+        last_chance = stop == frames and not found_any
+        block = block_before = 1 if last_chance else coder.bit(model.block[block_before][around])
+        if not block:
+            continue
+        found_any, found = 1, 0
+        for t in range(start, stop):
+            earlier = 2 if t > 0 and any(row[t - 1]) else 1 if t > 1 and any(row[t - 2]) else 0
+            near = 2 if some[t] else 1 if any(some[max(t - 1, 0):t + 2]) else 0
+            if (t == stop - 1 and not found) or coder.bit(model.frame[earlier][near][found]):
+                found = 1
+                row[t] = decode_correction(coder, model, row[t - 1] if earlier == 2 else above[t])
+    return row
+
+
+def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) -> tuple:
+    """Three integers, not all 0, that are expected to be like others."""
+    q, nonzero_any = [0, 0, 0], 0
+    for axis in range(3):
+        sign = 0 if like[axis] == 0 else 1 if like[axis] < 0 else 2
+        if axis < 2 or nonzero_any:
+            c = 1 if sign else 2 if any(like) else 0
+            if not coder.bit(model.zero[nonzero_any][c]):
+                continue
+        nonzero_any = 1
+        negative = coder.bit(model.sign[axis][sign])
+        magnitude = code_unsigned(coder, model.size, clipped(like[axis]) * 16) + 1
+        q[axis] = -magnitude if negative else magnitude
+    return tuple(q)
+
+
+# ---- reconstruction --------------------------------------------------------------------------------------------------
+#
+# Vectors over time have the shape (3, frames), matrices (3, 3, frames); vertices come in front: (count, 3, frames).
+
+
+def mat_vec(R: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """R x of one vector or of many."""
+    x0, x1, x2 = (x[..., k, None, :] for k in range(3))
+    return R[:, 0] * x0 + R[:, 1] * x1 + R[:, 2] * x2
+
+
+def mat_mul(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    return A[:, 0, None] * B[0] + A[:, 1, None] * B[1] + A[:, 2, None] * B[2]
+
+
+def matrix(*nine) -> np.ndarray:
+    """(3, 3, frames) from nine rows over time, row-major."""
+    return np.array(nine).reshape(3, 3, -1)
+
+
+def rotation(x, y, z) -> np.ndarray:
+    """The quaternion (1, x, y, z), normalised and squared."""
+    n2 = x * x + y * y + z * z
+    unit = 1.0 / (1.0 + n2)
+    w = (1.0 - n2) * unit
+    x, y, z = 2.0 * x * unit, 2.0 * y * unit, 2.0 * z * unit
+    return matrix(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+                  2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+                  2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+
+
+def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
+    """(3, frames): integers over frequency as numbers over time; integers that are 0 are left out. None: no row."""
+    if row is None:
+        return np.zeros((3, waves.shape[1]))
+    tracks = []
+    for axis in row:
+        numbers = np.array(axis[:len(waves)])
+        there = np.flatnonzero(numbers)
+        tracks.append(in_order((numbers[there].astype(float) * step)[:, None] * waves[there]))
+    return np.array(tracks)
+
+
+def shift_step(piece: Piece, stream: LevelStream) -> float:
+    return stream.step / math.sqrt(float(piece.count))
+
+
+def omega_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
+    """0.0: no rotation is coded."""
+    d = plan.from_attach(piece).ravel()
+    lever2 = in_order(d * d)
+    if not lever2 > 0.0 or not stream.omega > 0.0:
+        return 0.0
+    return stream.omega * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
+
+
+class Pose:
+    """All vertices of one segment at one level, placed piece by piece and node by node."""
+
+    def __init__(self, plan: Plan, motion: Motion, level: int):
+        self.plan, self.motion, self.frames = plan, motion, motion.frames
+        self.placed = np.empty((len(plan.rest), 3, motion.frames))
+        self.kept: dict[int, tuple] = {}  # (c, R) of the pieces placed
+        for piece in plan.pieces:
+            if piece.level <= level:
+                self.place_piece(piece)
+        for node in plan.nodes:
+            if node.level <= level <= node.last:
+                self.place_node(node)
+
+    # Attach frames: a piece hangs on a point c and in a rotation R.
+
+    def attach_frame(self, piece: Piece):
+        plan, still = self.plan, np.ones(self.frames)
+        if piece.parent < 0:
+            return plan.attach_point(piece)[:, None] * still, np.eye(3)[:, :, None] * still
+        parent, (base, R) = plan.pieces[piece.parent], self.kept[piece.parent]
+        c = self.placed[piece.attach].copy()
+        if parent.flags & SHEET:
+            return c, R
+        before, after = piece.attach - 1, min(piece.attach + 1, parent.first + parent.count - 1)
+        inside = before >= parent.first
+        rest_start = plan.rest[before] if inside else plan.attach_point(parent)
+        start, end = (self.placed[before] if inside else base), self.placed[after]
+        tangent = plan.rest[after] - rest_start
+        length2 = in_order(tangent * tangent)
+        if not length2 > 1e-200:
+            return c, R
+        tangent = tangent * (1.0 / np.sqrt(length2))
+        return c, follow_tangent(R, tangent[:, None], end - start)
+
+    def turned_frames(self, piece: Piece):
+        """The attach frame, moved and turned by the piece's own tracks."""
+        stream = self.motion.streams[piece.base_level]
+        c, R = self.attach_frame(piece)
+        if piece.has_shift:
+            c = c + over_time(self.motion.shift.get(piece.number), shift_step(piece, stream), stream.waves)
+        step = omega_step(self.plan, piece, stream)
+        if step > 0.0:
+            x, y, z = 0.25 * over_time(self.motion.omega.get(piece.number), step, stream.waves)
+            R = mat_mul(R, rotation(x, y, z))
+        return c, R
+
+    # Exact pieces.
+
+    def mode_stream(self, piece: Piece, m: int) -> LevelStream:
+        return self.motion.streams[piece.base_level if m < piece.low_modes else piece.level]
+
+    def row_step(self, piece: Piece, m: int) -> float:
+        """Modes of a cantilever are finer the more they carry."""
+        step = self.mode_stream(piece, m).step
+        if self.motion.shapes_of(piece) and m < self.plan.shape_modes(piece):
+            return 0.875 * step
+        if piece.flags & SHEET:
+            return step
+        return step * ([0.75, 0.875, 0.9375, 1.0][m] if m < 4 else 1.125)
+
+    def mode_row(self, piece: Piece, m: int) -> np.ndarray:
+        row = self.motion.coefficients.get(piece.first + m)
+        return over_time(row, self.row_step(piece, m), self.mode_stream(piece, m).waves)
+
+    def place_piece(self, piece: Piece) -> None:
+        c, R = self.turned_frames(piece)
+        x = self.plan.from_attach(piece)[:, :, None] * np.ones(self.frames)
+        for moves, track in self.piece_terms(piece):
+            x = x + moves[:, :, None] * track
+        self.placed[piece.vertices] = c + mat_vec(R, x)
+        if piece.flags & SHEET:
+            R = self.sheet_rotation(piece, c, R)
+        self.kept[piece.number] = c, R
+
+    def piece_terms(self, piece: Piece):
+        """How far a shape or mode moves each vertex along the axes, (count, 3), and its track: (frames,) or (3, frames).
+
+        What is 0.0 throughout is left out: adding it could change the sign of a zero, or make a NaN.
+        """
+        shapes = self.motion.shapes_of(piece)
+        for m, mode in enumerate(self.plan.basis(piece)):
+            row = self.mode_row(piece, m)
+            if shapes and m < self.plan.shape_modes(piece):
+                for shape, track in zip(shapes[3 * m:3 * m + 3], row):
+                    if np.any(track != 0.0):
+                        yield self.shape_moves(piece, shape), track
+            elif np.any(row != 0.0):
+                yield np.repeat(mode[:, None], 3, axis=1), row
+
+    def shape_moves(self, piece: Piece, shape: np.ndarray) -> np.ndarray:
+        modes = self.plan.basis(piece)[:self.plan.shape_modes(piece)]
+        return in_order(modes[:, :, None] * shape[:len(modes), None, :])
+
+    def sheet_rotation(self, piece: Piece, c: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """How a sheet has turned as a whole: the rotation nearest to its placed vertices, in 4 steps."""
+        d = self.plan.from_attach(piece)
+        size2 = in_order((d * d).ravel())
+        moved = self.placed[piece.vertices] - c
+        H = in_order(moved[:, :, None, :] * d[:, None, :, None])
+        H = H + 0.01 * size2 * R
+        if size2 > 1e-200:
+            for _ in range(4):
+                R = turn_towards(H, 1e-9 * size2, R)
+        return R
+
+    # Nodes.
+
+    def place_node(self, node: Node) -> None:
+        c, R = self.node_frames(node)
+        x = self.plan.rest[node.vertices] - self.plan.attach_point(self.plan.pieces[node.piece])
+        self.placed[node.vertices] = c + mat_vec(R, x[:, :, None])
+
+    def node_frames(self, node: Node):
+        """A node's map takes rest position x0 to c + R (x0 - a)."""
+        c, R, parts = self.coded_map(node) if node.coded else self.stem_map(node)
+        E = np.zeros((3, 3, self.frames))
+        for functional, track in parts:
+            if functional.ndim == 1:
+                E = E + track[:, None, :] * functional[None, :, None]
+            else:
+                E = E + track * functional[:, :, None]
+        return c, R + mat_mul(R, E)
+
+    def coded_map(self, node: Node):
+        """By rows of its own; functionals are (3,) with a track per axis."""
+        motion, piece = self.motion, self.plan.pieces[node.piece]
+        step = motion.node_step[node.number]
+        c, R = self.attach_frame(piece)
+        if piece.has_shift:
+            c = c + over_time(motion.node_shift.get(node.number), step, motion.cosines)
+        rows = motion.node_rows[node.number]
+        return c, R, [(functional, over_time(row, step, motion.cosines))
+                      for functional, row in zip(self.plan.whitening(node), rows)]
+
+    def stem_map(self, node: Node):
+        """By the first modes or shapes of its only piece; functionals of shapes are (3, 3) with one track."""
+        plan, piece = self.plan, self.plan.pieces[node.piece]
+        c, R = self.turned_frames(piece)
+        shapes, parts = self.motion.shapes_of(piece), []
+        for m in range(min(piece.low_modes, len(plan.basis(piece)))):
+            row = self.mode_row(piece, m)
+            if not shapes:
+                parts.append((self.affine_part(node, plan.basis(piece)[m]), row))
+            elif m < plan.shape_modes(piece):
+                parts += [(self.map_of_shape(node, piece, shape), track)
+                          for shape, track in zip(shapes[3 * m:3 * m + 3], row)]
+        return c, R, parts
+
+    def affine_part(self, node: Node, mode: np.ndarray) -> np.ndarray:
+        """The linear function over the rest pose that is closest to a mode."""
+        x = self.plan.rest[node.vertices] - self.plan.attach_point(self.plan.pieces[node.piece])
+        moment, g = in_order(mode[:, None] * x), np.zeros(3)
+        for w in self.plan.whitening(node):
+            dot = (w[0] * moment[0] + w[1] * moment[1] + w[2] * moment[2]) / float(node.count)
+            g = g + dot * w
+        return g
+
+    def map_of_shape(self, node: Node, piece: Piece, shape: np.ndarray) -> np.ndarray:
+        modes = self.plan.basis(piece)[:self.plan.shape_modes(piece)]
+        return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m, mode in enumerate(modes)]))
+
+
+def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """R, turned by the least rotation that takes R tangent to v; R itself where v vanishes or is opposed."""
+    u = mat_vec(R, tangent)
+    u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    u = u * (1.0 / np.sqrt(np.where(u2 > 1e-200, u2, 1.0)))
+    v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    v = v * (1.0 / np.sqrt(np.where(v2 > 1e-200, v2, 1.0)))
+    cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    follows = (v2 > 1e-200) & (cosine > -0.9)
+    c = np.where(follows, cosine, 1.0)
+    h = np.where(follows, 1.0 / (1.0 + cosine), 1.0)
+    x = np.where(follows, u[1] * v[2] - u[2] * v[1], 0.0)
+    y = np.where(follows, u[2] * v[0] - u[0] * v[2], 0.0)
+    z = np.where(follows, u[0] * v[1] - u[1] * v[0], 0.0)
+    return mat_mul(matrix(c + h * x * x, h * x * y - z, h * x * z + y,
+                          h * x * y + z, c + h * y * y, h * y * z - x,
+                          h * x * z - y, h * y * z + x, c + h * z * z), R)
+
+
+def turn_towards(H: np.ndarray, least: float, R: np.ndarray) -> np.ndarray:
+    """A step of Newton's method towards the rotation nearest to H; down the gradient where H is mirrored."""
+    C = H[:, None, 0] * R[None, :, 0] + H[:, None, 1] * R[None, :, 1] + H[:, None, 2] * R[None, :, 2]
+    C = C.reshape(9, -1)
+    wx, wy, wz = C[7] - C[5], C[2] - C[6], C[3] - C[1]
+    a, b, c = C[4] + C[8], C[0] + C[8], C[0] + C[4]
+    d, e, f = -0.5 * (C[1] + C[3]), -0.5 * (C[2] + C[6]), -0.5 * (C[5] + C[7])
+    ab = a * b - d * d
+    xx, xy, xz = b * c - f * f, e * f - d * c, d * f - e * b
+    determinant = a * xx + d * xy + e * xz
+    newton = (a > least) & (ab > least * least) & (determinant > least * least * least)
+    scale = 0.25 / determinant
+    yy, yz = a * c - e * e, d * e - a * f
+    downhill = 0.25 / (np.abs(C[0] + C[4] + C[8]) + least)
+    x = np.where(newton, (xx * wx + xy * wy + xz * wz) * scale, wx * downhill)
+    y = np.where(newton, (xy * wx + yy * wy + yz * wz) * scale, wy * downhill)
+    z = np.where(newton, (xz * wx + yz * wy + ab * wz) * scale, wz * downhill)
+    return mat_mul(rotation(x, y, z), R)
+
+
+# ---- static data -----------------------------------------------------------------------------------------------------
+
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+ZSTD_WINDOW = 8 << 20
+ELEMENT_BYTES, FIELD_BYTES = 1 << 20, 1 << 31
+PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
+                        re.ASCII)
+DERIVED_TYPES = {"|i1", "|u1"} | {order + kind + size for order in "<>" for kind in "iu" for size in "248"}
+
+
+def parse_json(text: bytes, what: str) -> dict:
+    """A JSON object as of FORMAT.md, "JSON"."""
+    def unique(pairs: list) -> dict:
+        require(len(dict(pairs)) == len(pairs), f"{what}: an object has a member twice")
+        return dict(pairs)
+
+    def number(literal: str) -> float:
+        require(finite(float(literal)), f"{what}: {literal} is not finite")
+        return float(literal)
+
+    try:
+        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number, parse_constant=number)
+        json.dumps(value, ensure_ascii=False).encode("utf-8")  # refuses halves of surrogate pairs
+    except (ValueError, RecursionError):
+        raise AthError("BAD_CHUNK", f"{what}: is not JSON") from None
+    require(isinstance(value, dict), f"{what}: is no JSON object")
+    return value
+
+
+def unzstd(data: bytes, size: int | None, what: str, limit: int) -> bytes:
+    """One zstd frame that states its size, which must be `size` where that is known."""
+    require(data[:4] == ZSTD_MAGIC, f"{what}: is no zstd frame")
+    try:
+        frame = zstandard.get_frame_parameters(data)
+        stated = zstandard.frame_content_size(data)
+    except zstandard.ZstdError:
+        raise AthError("BAD_CHUNK", f"{what}: has a bad zstd frame header") from None
+    require(stated > 0 and stated == (stated if size is None else size), f"{what}: has a zstd frame of another size")
+    require(stated <= limit, f"{what}: unpacks to too much", "LIMIT_EXCEEDED")
+    require(frame.window_size <= max(ZSTD_WINDOW, stated), f"{what}: has too large a zstd window", "LIMIT_EXCEEDED")
+    try:
+        unpacked = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
+    except (zstandard.ZstdError, MemoryError):
+        raise AthError("BAD_CHUNK", f"{what}: has a zstd frame that does not decode") from None
+    require(len(unpacked) == stated, f"{what}: has a zstd frame that misstates its size")
+    return unpacked
+
+
+def unshuffle(data: bytes, size: int) -> bytes:
+    """Elements of `size` bytes from planes: all first bytes, then all second ones, and so on."""
+    return np.frombuffer(data, np.uint8).reshape(size, -1).T.tobytes()
+
+
+def is_shape(shape: object, below: int = 1 << 40) -> bool:
+    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
+
+
+def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
+    """A Type of FORMAT.md, "Static arrays", as NumPy's."""
+    if isinstance(description, str):
+        require(PLAIN_TYPE.fullmatch(description) is not None, f"{what}: has an unknown type")
+        return np.dtype(description)
+    require(isinstance(description, list) and len(description) > 0 and nesting > 0, f"{what}: has an unknown type")
+    names, formats, offsets, size = [], [], [], 0
+    for entry in description:
+        require(isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str), f"{what}: has a bad field")
+        kind = field_type(parse_type(entry[1], what, nesting - 1), entry[2:], what)
+        if entry[0]:
+            names.append(entry[0])
+            formats.append(kind)
+            offsets.append(size)
+        else:
+            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V", f"{what}: has a bad gap")
+        size += kind.itemsize
+    require(len(set(names)) == len(names), f"{what}: has two fields of the same name")
+    require(size < FIELD_BYTES, f"{what}: has a record that is too long")
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+
+
+def field_type(kind: np.dtype, shapes: list, what: str) -> np.dtype:
+    """The Type of a field with its Shape, if it has one."""
+    if not shapes:
+        return kind
+    require(is_shape(shapes[0], FIELD_BYTES) and kind.itemsize * math.prod(shapes[0]) < FIELD_BYTES,
+            f"{what}: has a field with a bad shape")
+    require(kind.itemsize > 0 or kind.names is not None, f"{what}: has a field of many texts without characters")
+    return np.dtype((kind, tuple(shapes[0])))
+
+
+def parse_array(chunk: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
+    """Head and array of a static array; None where there is none."""
+    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2, f"{what}: Head_Length is more than the chunk holds")
+    head, body = parse_json(chunk[2:2 + u16(chunk, 0)], what), chunk[2 + u16(chunk, 0):]
+    if "dtype" not in head:
+        require(len(body) == 0, f"{what}: has data without a type")
+        return head, None
+    kind, shape = parse_type(head["dtype"], what), head.get("shape")
+    require(0 < kind.itemsize <= ELEMENT_BYTES, f"{what}: has elements of {kind.itemsize} bytes")
+    require(is_shape(shape), f"{what}: has a bad shape")
+    widest = math.prod(n or 1 for n in shape) * kind.itemsize
+    require(widest <= limits.decoded_chunk_bytes, f"{what}: is too large", "LIMIT_EXCEEDED")
+    if math.prod(shape) == 0:
+        require(len(body) == 0, f"{what}: has data though it has no elements")
+        return head, np.zeros(shape, kind)
+    data = unshuffle(unzstd(body, widest, what, limits.decoded_chunk_bytes), kind.itemsize)
+    return head, np.frombuffer(data, kind).reshape(shape)
+
+
+def parse_metadata(chunk: bytes, limits: Limits) -> bytes:
+    """Text of METADATA."""
+    require(len(chunk) > 0 and chunk[0] <= 1, "METADATA has an unknown Method")
+    text = chunk[1:] if chunk[0] == 0 else unzstd(chunk[1:], None, "METADATA", limits.metadata_bytes)
+    require(len(text) <= limits.metadata_bytes, "METADATA is too long", "LIMIT_EXCEEDED")
+    parse_json(text, "METADATA")
+    return text
+
+
+# ---- a file ----------------------------------------------------------------------------------------------------------
+
+
+class AthFile:
+    """An opened file. What it is refused for, when opened or asked, is an AthError; the first one of FORMAT.md, "Opening".
+
+    strict: it has to be as long as it says. Else what has arrived of it, at least its prelude, can be decoded.
+    """
+
+    def __init__(self, data: bytes, strict: bool = False, limits: Limits | None = None):
+        self.data, self.limits = bytes(data), limits or Limits()
+        self.header = read_header(self.data, self.limits)
+        check_tables(self.data, self.header, self.limits)
+        self.chunks = read_chunk_table(self.data, self.header, self.limits)
+        self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
+        self._check_length(strict)
+        frames = -(-self.header.frame_count // self.header.segment_count)
+        require(self.header.vertex_count * (60 * frames + 512) <= self.limits.memory_bytes, "needs too much memory",
+                "LIMIT_EXCEEDED")
+        with np.errstate(all="ignore"):  # infinities and NaN are results like others
+            self._read_hierarchy(self.content(HIERARCHY))
+            self._check_motion_chunks()
+            self._read_rest(self.content(REST))
+            self.times = frame_times(self.content(TIME), self.header.frame_count)
+
+    def _check_length(self, strict: bool) -> None:
+        behind = [c.offset for c in self.chunks if c.key[0] > 0]
+        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude", "TRUNCATED")
+        if strict:
+            require(len(self.data) >= self.header.file_length, "is shorter than File_Length", "TRUNCATED")
+            require(len(self.data) <= self.header.file_length, "is longer than File_Length", "TRAILING_BYTES")
+
+    def is_available(self, chunk: Chunk) -> bool:
+        return chunk.offset + chunk.length <= len(self.data)
+
+    def bytes_of(self, chunk: Chunk) -> bytes:
+        require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
+        content = self.data[chunk.offset:chunk.offset + chunk.length]
+        require(crc32c(content) == chunk.checksum, f"{chunk} is damaged", "BAD_CHECKSUM")
+        return content
+
+    def find(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> Chunk | None:
+        return self._places.get((kind, level, segment))
+
+    def content(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> bytes:
+        chunk = self.find(kind, level, segment)
+        require(chunk is not None, f"the chunk table lacks {KINDS[kind]}", "BAD_CHUNK_TABLE")
+        return self.bytes_of(chunk)
+
+    # Prelude.
+
+    def _read_hierarchy(self, chunk: bytes) -> None:
+        require(len(chunk) >= 16, "HIERARCHY is too short")
+        for name, at in (("Epsilon", 0), ("Xi", 4)):
+            require(finite(f32(chunk, at)) and f32(chunk, at) >= 0.0, f"{name} is not finite and 0 or more")
+        self.branches, self.branch_source, self.vertex_source = decode_hierarchy(
+            chunk[16:], self.header.branch_count, self.header.vertex_count)
+        deepest = max(branch.depth for branch in self.branches)
+        require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
+        self.plan = Plan(self.branches)
+        require(self.plan.height + 2 == self.header.full_level_count, "Full_Level_Count is not that of the hierarchy",
+                "BAD_HEADER")
+
+    def _check_motion_chunks(self) -> None:
+        """FORMAT.md, "Levels and chunks"."""
+        plan, wanted, allowed = self.plan, set(), set()
+        for level in range(self.header.level_count):
+            for s in range(self.header.segment_count):
+                wanted |= {(STEMS, level, s)} if plan.has_stems(level) else set()
+                wanted |= {(AFFINES, level, s)} if plan.has_affines(level, level) else set()
+                allowed |= {(CORRECTIONS, level, s)} if level == plan.height + 1 else set()
+            allowed |= {(SHAPES, level, 0)} if plan.has_stems(level) else set()
+        there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
+        require(wanted <= there <= wanted | allowed, "motion chunks are not those that the hierarchy asks for",
+                "BAD_CHUNK_TABLE")
+
+    def _read_rest(self, chunk: bytes) -> None:
+        require(len(chunk) >= 36, "REST is too short")
+        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0, "Method, Rest_Type or Reserved is out of range")
+        self.origin = np.array([f64(chunk, 4 + 8 * k) for k in range(3)])
+        step = f64(chunk, 28)
+        require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
+        self.rest_type = np.dtype("<f8" if chunk[1] else "<f4")
+        if chunk[0] == 0:
+            rest = np.array(decode_rest(chunk[36:], self.branches, step))
+            shown = rest + self.origin
+        else:
+            shown = np.array(decode_exact_rest(chunk[36:], self.branches, bool(chunk[1])))
+            rest = shown - self.origin
+        require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
+        self.plan.rest = rest
+        self._shown_rest = shown.astype(self.rest_type)
+
+    def rest(self) -> np.ndarray:
+        """(vertices, 3) of Rest_Type, source order."""
+        return self._in_source_order(self._shown_rest)
+
+    def _in_source_order(self, by_vertex: np.ndarray) -> np.ndarray:
+        out = np.empty_like(by_vertex)
+        out[self.vertex_source] = by_vertex
+        return out
+
+    # Motion.
+
+    @property
+    def position_type(self) -> np.dtype:
+        return np.dtype("<f8" if self.header.wide else "<f4")
+
+    @cached_property
+    def deepest(self) -> int:
+        """The deepest complete level."""
+        late = [c.level for c in self.chunks if c.is_motion and c.kind in KINDS and not self.is_available(c)]
+        complete = min(late, default=self.header.level_count) - 1
+        require(complete >= 0, "not even level 0 has arrived", "TRUNCATED")
+        return complete
+
+    def positions(self, level: int | None = None) -> np.ndarray:
+        """(frames, vertices, 3) in source order, of the deepest complete level or the one named."""
+        level = self.deepest if level is None else level
+        if not 0 <= level < self.header.level_count:
+            raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
+        with np.errstate(all="ignore"):
+            segments = [self._segment(s, level) for s in range(self.header.segment_count)]
+        return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0, 1))
+
+    def _segment(self, s: int, level: int) -> np.ndarray:
+        """(vertices, 3, frames) in file order."""
+        start, stop = self.header.segment(s)
+        motion = self._motion(s, stop - start, level)
+        placed = Pose(self.plan, motion, level).placed
+        positions = (placed + self.origin[:, None]).astype(self.position_type)
+        if self.find(CORRECTIONS, level, s):
+            chunk = self.content(CORRECTIONS, level, s)
+            require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0,
+                    "Correction_Step is not above 0")
+            q = decode_corrections(chunk[4:], self.header.vertex_count, motion.frames)
+            corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
+            positions = np.where(q != 0, corrected, positions)
+        return positions
+
+    def _motion(self, s: int, frames: int, level: int) -> Motion:
+        """All integers that playing a segment at a level takes."""
+        plan, motion = self.plan, Motion(frames, cosine_waves(frames))
+        for d in range(level + 1):
+            if self.find(SHAPES, d):
+                decode_shapes(self.content(SHAPES, d), plan, motion, d)
+            if plan.has_stems(d):
+                decode_stems(read_stems_head(self.content(STEMS, d, s), motion, d), plan, motion, d)
+            if plan.has_affines(d, level):
+                decode_affines(self.content(AFFINES, d, s), plan, motion, d)
+        return motion
+
+    # Static data.
+
+    def metadata_text(self) -> bytes:
+        """Text of METADATA, b"{}" where there is none."""
+        return parse_metadata(self.content(METADATA), self.limits) if self.find(METADATA) else b"{}"
+
+    def metadata(self) -> dict:
+        return parse_json(self.metadata_text(), "METADATA")
+
+    def faces(self) -> np.ndarray | None:
+        if not self.find(FACES):
+            return None
+        _, array = parse_array(self.content(FACES), "FACES", self.limits)
+        self._check_indices(array, "FACES")
+        return array
+
+    def edges(self) -> np.ndarray | None:
+        if not self.find(EDGES):
+            return None
+        head, array = parse_array(self.content(EDGES), "EDGES", self.limits)
+        if array is None:
+            return self._derived_edges(head.get("derived"))
+        self._check_indices(array, "EDGES")
+        require(array.shape[1] == 2, "EDGES has not two columns")
+        return array
+
+    def _check_indices(self, array: np.ndarray | None, what: str) -> None:
+        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu", f"{what} has no rows of integers")
+        require(array.size == 0 or (0 <= array.min() and array.max() < self.header.vertex_count),
+                f"{what} names a vertex that is not there")
+
+    def _derived_edges(self, type_name: object) -> np.ndarray:
+        """An edge from each vertex to the one before it on its stem, or to the attach vertex."""
+        require(isinstance(type_name, str) and type_name in DERIVED_TYPES, "EDGES has neither array nor derived edges")
+        require(np.iinfo(type_name).max >= self.header.vertex_count - 1, "the type of derived edges is too small")
+        pairs = []
+        for branch in self.branches:
+            for v in range(branch.first, branch.first + branch.count):
+                before = v - 1 if v > branch.first else branch.attach
+                if before >= 0:
+                    pairs.append((self.vertex_source[before], self.vertex_source[v]))
+        pairs.sort(key=lambda pair: pair[1])
+        return np.array(pairs, type_name).reshape(-1, 2)
+
+    def attributes(self) -> dict[str, np.ndarray]:
+        """Named arrays, of those that have arrived."""
+        arrays: dict[str, np.ndarray] = {}
+        for chunk in self.chunks:
+            if chunk.kind != ATTRIBUTE or not self.is_available(chunk):
+                continue
+            require(len(arrays) < self.limits.attributes, "there are too many attributes", "LIMIT_EXCEEDED")
+            head, array = parse_array(self.bytes_of(chunk), "ATTRIBUTE", self.limits)
+            name = head.get("name")
+            require(isinstance(name, str) and name != "" and array is not None, "an attribute has no name or no array")
+            require(len(name.encode("utf-8")) <= self.limits.string_bytes, "the name of an attribute is too long",
+                    "LIMIT_EXCEEDED")
+            require(name not in arrays, "two attributes have the same name")
+            arrays[name] = array
+            total = sum(each.nbytes for each in arrays.values())
+            require(total <= self.limits.memory_bytes, "attributes are too large", "LIMIT_EXCEEDED")
+        return arrays
+
+    def static_bytes(self) -> bytes:
+        """All static data one after the other: Text of METADATA, then the elements of all arrays in file order."""
+        arrays = [self.faces(), self.edges(), *self.attributes().values()]
+        text = self.metadata_text() if self.find(METADATA) else b""
+        return text + b"".join(array.tobytes() for array in arrays if array is not None)
+
+
+# ---- command ---------------------------------------------------------------------------------------------------------
+
+
+def raw(data: bytes, what: str) -> bytes:
+    """What the command protocol of conformance.py asks for."""
+    file = AthFile(data, strict=what == "strict")
+    if what in ("strict", "open"):
+        return b""
+    if what == "static":
+        return file.static_bytes()
+    if what == "rest":
+        return file.rest().tobytes()
+    if what == "time":
+        return np.array(file.times, "<f8").tobytes()
+    return file.positions(int(what)).tobytes()
+
+
+def show(options: argparse.Namespace, data: bytes) -> None:
+    file = AthFile(data, strict=options.strict)
+    level = file.deepest if options.depth is None else options.depth
+    positions = file.positions(level)
+    frames, vertices, _ = positions.shape
+    print(f"{frames} frames of {vertices} vertices, {positions.dtype}, level {level} of {file.header.level_count - 1}")
+    if options.checksum:
+        print(f"{crc32c(positions.tobytes()):08x}")
+    if options.out:
+        np.save(options.out, positions)
+
+
+def main(words: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description="Decodes a level of an .ath file, by the letter of FORMAT.md.")
+    parser.add_argument("file")
+    parser.add_argument("what", nargs="?", help=argparse.SUPPRESS)
+    parser.add_argument("--depth", type=int, help="level; by default the deepest complete one")
+    parser.add_argument("--strict", action="store_true", help="the file has to be as long as it says")
+    parser.add_argument("--out", help="write the positions, (frames, vertices, 3), to this .npy file")
+    parser.add_argument("--checksum", action="store_true", help="print their CRC-32C, little-endian, source order")
+    parser.add_argument("--raw", action="store_true", help="answer as spec/conformance.py asks: FILE WHAT")
+    options = parser.parse_args(words)
+    try:
+        with open(options.file, "rb") as source:
+            data = source.read()
+        if options.raw:
+            sys.stdout.buffer.write(raw(data, options.what or "open"))
+        else:
+            show(options, data)
+    except (AthError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

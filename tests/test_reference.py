@@ -1,0 +1,214 @@
+"""The reference decoder against the C core, bit for bit: on what the encoder writes, on files by hand with everything
+that FORMAT.md allows, and on damaged ones; and its command line."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.errors import FormatError
+from files import Parts
+from plants import awkward, bush, chain_plant, clip_of, grow, plant, random_hierarchy, tube
+from test_format import HandMade, Sapling
+
+SOURCE = Path(__file__).resolve().parents[1] / "spec" / "reference_decoder.py"
+
+
+def load_reference():
+    """The module by its path: `spec` is no part of what is installed."""
+    description = importlib.util.spec_from_file_location("reference_decoder", SOURCE)
+    module = importlib.util.module_from_spec(description)
+    sys.modules[description.name] = module
+    description.loader.exec_module(module)
+    return module
+
+
+reference = load_reference()
+
+
+def assert_same_bits(data: bytes) -> None:
+    """Every level, the rest pose, the times and the static data; NaN only as such."""
+    file = reference.AthFile(data, strict=True)
+    with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        for level in range(decoder.level_count):
+            assert_same_numbers(file.positions(level), decoder.positions(depth=level))
+        assert_same_numbers(file.rest(), decoder.rest)
+        assert np.array(file.times).tobytes() == decoder.time.tobytes()
+        assert file.metadata() == decoder.metadata
+        assert_same_static([file.faces(), file.edges(), *file.attributes().values()],
+                           [decoder.faces, decoder.edges, *decoder.attributes.values()])
+        assert list(file.attributes()) == list(decoder.attributes)
+
+
+def assert_same_numbers(got: np.ndarray, expected: np.ndarray) -> None:
+    assert got.dtype == expected.dtype and got.shape == expected.shape
+    assert np.array_equal(np.isnan(got), np.isnan(expected))
+    assert np.nan_to_num(got, nan=0.0).tobytes() == np.nan_to_num(expected, nan=0.0).tobytes()
+
+
+def assert_same_static(got: list, expected: list) -> None:
+    for one, other in zip(got, expected, strict=True):
+        assert (one is None) == (other is None)
+        if one is not None:
+            assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
+
+
+def encoded(clip, folder: Path, **options) -> bytes:
+    athcodec.encode(clip, folder / "clip.ath", **options)
+    return (folder / "clip.ath").read_bytes()
+
+
+def chunk_kinds(data: bytes) -> set[str]:
+    return {athcodec.container.KIND_NAMES[chunk.kind] for chunk, _ in Parts.of(data).chunks}
+
+
+# ---- what the encoder writes ----
+
+
+@pytest.mark.parametrize("options", [
+    {"effort": "fast"}, {"rel_error": 1e-3, "segment_frames": 256}, {"max_error": 1e-5, "effort": "fast"}],
+    ids=["default bound", "coarse, one segment", "fine"])
+def test_the_sample_has_the_same_bits(options, sample_clip, tmp_path):
+    assert_same_bits(encoded(sample_clip, tmp_path, **options))
+
+
+def test_files_with_shapes_and_every_kind_of_chunk_have_the_same_bits(full_ath):
+    data = full_ath.read_bytes()
+    assert chunk_kinds(data) == set(athcodec.container.KIND_NAMES.values())
+    assert_same_bits(data)
+
+
+def test_a_bush_in_several_segments_has_the_same_bits(bushy_ath):
+    assert_same_bits(bushy_ath.read_bytes())
+
+
+def test_learned_time_bases_have_the_same_bits(tmp_path):
+    rng = np.random.default_rng(3)
+    labels, parents = random_hierarchy(rng, branches=20, longest=9)
+    rest = grow(rng, labels, parents)
+    signals, reach = rng.normal(size=(48, 3)), 0.3 * rng.normal(size=(3, len(rest), 3))
+    data = encoded(clip_of(rest + np.einsum("tk,knc->tnc", signals, reach), rest, labels, parents), tmp_path,
+                   rel_error=1e-4, segment_frames=24)
+    file = reference.AthFile(data)
+    assert any(file.content(16, c.level, c.segment)[5] for c in file.chunks if c.kind == 16), "no basis was learned"
+    assert_same_bits(data)
+
+
+@pytest.mark.parametrize("make, options", [
+    (lambda: awkward(seed=8, branches=9, frames=20, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
+    (lambda: plant(seed=2, roots=2, offset=50.0), {"exact_rest": True}),
+    (lambda: plant(seed=3, dtype=np.float64), {"exact_rest": True}),
+    (lambda: tube(rings=10, around=8, frames=20), {}),
+    (lambda: awkward(seed=4, shape="flat", motion="spin", longest=12), {}),
+    (lambda: awkward(seed=5, motion="mirror", longest=70, shuffled=True), {}),
+    (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
+    (lambda: chain_plant(branches=12, longest=3), {"segment_frames": 16}),
+    (lambda: bush(branches=25), {"rel_error": 1e-2}),
+], ids=["wide", "exact rest", "wide exact rest", "tube", "flat sheets", "mirrored", "coincident", "chain", "bush"])
+def test_plants_of_all_sorts_have_the_same_bits(make, options, tmp_path):
+    assert_same_bits(encoded(make(), tmp_path, effort="fast", **options))
+
+
+def test_uneven_times_and_static_data_have_the_same_bits(forked_clip, tmp_path):
+    assert_same_bits(encoded(forked_clip, tmp_path, max_error=1e-3))
+
+
+# ---- what no encoder writes ----
+
+
+@pytest.mark.parametrize("seed, wide, exact", [(1, False, None), (4, True, np.float64)])
+def test_every_feature_has_the_same_bits(seed, wide, exact):
+    assert_same_bits(HandMade(seed, wide, exact).file())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_saplings_have_the_same_bits(seed):
+    assert_same_bits(Sapling(seed).file())
+
+
+def outcome(call) -> object:
+    """What a call gives, or the name of what it refuses a file for."""
+    try:
+        return call()
+    except (FormatError, reference.AthError) as error:
+        return error.name
+
+
+def test_spoilt_chunks_are_refused_alike_or_mean_the_same(full_ath):
+    """Motion, hierarchy, rest and times with some bytes changed, and checksums that fit."""
+    parts, rng = Parts.of(full_ath.read_bytes()), np.random.default_rng(0)
+    motion_or_prelude = [i for i, (c, _) in enumerate(parts.chunks) if c.is_motion or c.kind < 4]
+    refused = 0
+    for _ in range(60):
+        i, chunks = int(rng.choice(motion_or_prelude)), list(parts.chunks)
+        content = bytearray(chunks[i][1])
+        content[rng.integers(len(content))] ^= 1 << rng.integers(8)
+        chunks[i] = chunks[i][0], bytes(content)
+        data = parts.with_chunks(chunks)
+        level = chunks[i][0].level if chunks[i][0].is_motion else parts.header.level_count - 1
+        got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
+        expected = outcome(lambda data=data, level=level: athcodec.open(io.BytesIO(data)).positions(depth=level))
+        if isinstance(expected, str) or isinstance(got, str):
+            refused += 1
+            assert isinstance(got, str) and got == expected
+        else:
+            assert_same_numbers(got, expected)
+    assert 5 < refused < 55
+
+
+# ---- files that end early ----
+
+
+def test_a_prefix_plays_as_far_as_it_goes(bushy_ath):
+    data = bushy_ath.read_bytes()
+    for size in np.random.default_rng(1).integers(0, len(data), 12).tolist():
+        got = outcome(lambda size=size: reference.AthFile(data[:size]).positions())
+        expected = outcome(lambda size=size: athcodec.open(io.BytesIO(data[:size])).positions())
+        assert type(got) is type(expected)
+        assert got == expected if isinstance(got, str) else np.array_equal(got, expected)
+        with pytest.raises(reference.AthError, match="TRUNCATED"):
+            reference.AthFile(data[:size], strict=True)
+
+
+# ---- the command, and what it is made of ----
+
+
+def run(*words) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, str(SOURCE), *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+def test_the_command_shows_a_level_and_writes_it(bushy_ath, tmp_path):
+    done = run(bushy_ath, "--depth", 1, "--out", tmp_path / "positions.npy", "--checksum")
+    assert done.returncode == 0, done.stderr
+    with athcodec.open(bushy_ath) as decoder:
+        expected = decoder.positions(depth=1)
+    assert np.load(tmp_path / "positions.npy").tobytes() == expected.tobytes()
+    assert "level 1 of" in done.stdout
+    assert done.stdout.split()[-1] == f"{athcodec.container.crc32c(expected.tobytes()):08x}"
+
+
+def test_the_command_names_what_is_wrong_and_fails(bushy_ath, tmp_path):
+    (tmp_path / "cut.ath").write_bytes(bushy_ath.read_bytes()[:-1])
+    done = run("--strict", tmp_path / "cut.ath")
+    assert done.returncode == 1 and done.stderr.startswith("TRUNCATED: ") and "\n" not in done.stderr.strip()
+    assert run(tmp_path / "none.ath").returncode == 1
+    assert run(bushy_ath, "--depth", 99).returncode == 1
+
+
+def test_it_needs_numpy_and_zstandard_alone():
+    """Else it would not be a second decoder."""
+    text = SOURCE.read_text(encoding="utf-8")
+    third_party = {line.split()[1].split(".")[0] for line in text.splitlines()
+                   if line.startswith(("import ", "from ")) and line.split()[1].split(".")[0] not in sys.stdlib_module_names}
+    assert third_party == {"numpy", "zstandard"}
+
+
+def test_its_limits_are_those_of_the_package():
+    assert vars(reference.Limits()) == vars(athcodec.container.Limits())
