@@ -474,6 +474,7 @@ def pack_corrections(step: float, stream: bytes) -> bytes:
 # ---- static data --------------------------------------------------------------------------------------------------
 
 _ZSTD_WINDOW = 8 << 20
+_ZSTD_SINGLE_SEGMENT = 0x20
 ITEM_BYTES = 1 << 20
 
 
@@ -490,16 +491,24 @@ def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str,
     return np.frombuffer(raw.reshape(dtype.itemsize, -1).T.tobytes(), dtype).reshape(shape)
 
 
+def _check_window(data: bytes, expected: int, what: str) -> None:
+    """Reads Window_Descriptor (RFC 8878, 3.1.1.1.2) itself: zstd does not tell the largest windows from no frame, and
+    max_window_size does not bind where all is decompressed in one call."""
+    if data[:4] == zstandard.FRAME_HEADER and len(data) > 5 and not data[4] & _ZSTD_SINGLE_SEGMENT:
+        exponent, mantissa = data[5] >> 3, data[5] & 7
+        window = (8 + mantissa) << 7 + exponent
+        if window > max(_ZSTD_WINDOW, expected):
+            raise LimitExceeded(f"{what}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
+
+
 def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits) -> bytes:
     """One zstd frame that says it holds `expected` bytes and does; anything else raises BadChunk or LimitExceeded."""
     if expected > limits.decoded_chunk_bytes:
         raise LimitExceeded(f"{what}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
+    _check_window(data, expected, what)
     try:
         if expected == 0 or zstandard.frame_content_size(data) != expected:
             raise BadChunk(f"{what}: got a zstd frame of another size; expected {expected} bytes")
-        window = zstandard.get_frame_parameters(data).window_size  # max_window_size below does not bind in one call
-        if window > _ZSTD_WINDOW and window > expected:
-            raise LimitExceeded(f"{what}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
         return zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW).decompress(data, allow_extra_data=False)
     except (zstandard.ZstdError, MemoryError) as error:
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
@@ -626,6 +635,7 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
         raise BadChunk("METADATA: got an unknown method; expected 0 or 1")
     text = data[1:]
     if data[0] == 1:
+        _check_window(text, 0, "METADATA")
         try:
             size = zstandard.frame_content_size(text)
         except zstandard.ZstdError:

@@ -685,6 +685,17 @@ def test_any_other_zstd_frame_is_refused(data, expected):
         exact(data, expected)
 
 
+@pytest.mark.parametrize("descriptor", [13 << 3 | 1, 21 << 3, 255])
+def test_a_frame_that_asks_for_a_large_window_is_beyond_the_limit(descriptor):
+    """The largest are beyond what zstd can tell from no frame."""
+    frame = bytes.fromhex("28b52ffdc0") + bytes([descriptor]) + struct.pack("<Q", 5) + b"\x29\0\0plant"
+    with pytest.raises(LimitExceeded, match="window"):
+        exact(frame, 5)
+    with pytest.raises(LimitExceeded, match="window"):
+        ct.parse_metadata(b"\1" + frame, Limits())
+    assert exact(frame[:5] + bytes([13 << 3]) + frame[6:], 5) == b"plant", "8 MiB"
+
+
 def test_the_frame_that_zstd_answers_with_a_memory_error_is_refused():
     frame = bytes.fromhex("28b52ffde06c06060663636363")
     claimed = zstandard.frame_content_size(frame)
