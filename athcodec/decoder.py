@@ -326,7 +326,8 @@ class Decoder:
     def rest(self) -> np.ndarray:
         """Rest pose as decoded, (N, 3), float32 or what the source had."""
         dtype = np.float64 if self._player.info.rest_wide else np.float32
-        return self._player.rest(player.SOURCE_ORDER).astype(dtype, copy=False)
+        with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
+            return self._player.rest(player.SOURCE_ORDER).astype(dtype, copy=False)
 
     @property
     def origin(self) -> np.ndarray:
