@@ -1,1 +1,1 @@
-"""The format's own material: the reference decoder, the vectors and the programs that hold decoders to them."""
+"""The format's own: the reference decoder, the vectors, and the program that holds decoders to them."""

@@ -1,9 +1,9 @@
 """The .ath format decoded in plain Python and NumPy, to learn it from and to hold other decoders to.
 
-Written from FORMAT.md alone, section by section and in its words; nothing of athcodec is imported. Where FORMAT.md
-computes vertex by vertex and frame by frame, arrays take all frames at once: that changes no result, because every sum
-still runs in the order written (`in_order`). It decodes whole levels of whole files, slowly; it does not play, write or
-repair them.
+Written from FORMAT.md alone, section by section and in its words; nothing of athcodec is imported. Where
+FORMAT.md computes vertex by vertex and frame by frame, arrays take all frames at once: that changes no
+result, because every sum still runs in the order written (`in_order`). It decodes whole levels of whole
+files, slowly; it does not play, write or repair them.
 
     python spec/reference_decoder.py FILE [--depth D] [--strict] [--out positions.npy] [--checksum]
 """
@@ -22,7 +22,7 @@ from functools import cache, cached_property
 import numpy as np
 import zstandard
 
-# ---- errors and limits -----------------------------------------------------------------------------------------------
+# ---- errors and limits -------------------------------------------------------------------------------------
 
 
 class AthError(Exception):
@@ -56,7 +56,7 @@ class Limits:
     memory_bytes: int = 2 << 30
 
 
-# ---- reading fields --------------------------------------------------------------------------------------------------
+# ---- reading fields ----------------------------------------------------------------------------------------
 
 
 def reader(code: str):
@@ -88,7 +88,7 @@ def crc32c(data: bytes) -> int:
     return crc ^ 0xFFFFFFFF
 
 
-# ---- the front: header, chunk table, error table ---------------------------------------------------------------------
+# ---- the front: header, chunk table, error table -----------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 VERSION = (0, 3)
@@ -100,8 +100,10 @@ HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 STEMS, AFFINES, CORRECTIONS, SHAPES = 16, 17, 18, 19
 ATTRIBUTE = OPTIONAL | 32
-KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
-         STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES", ATTRIBUTE: "ATTRIBUTE"}
+KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES",
+         EDGES: "EDGES",
+         STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
+         ATTRIBUTE: "ATTRIBUTE"}
 
 
 @dataclass(frozen=True)
@@ -195,13 +197,15 @@ def check_tables(data: bytes, header: Header, limits: Limits) -> None:
     front = data[:12] + bytes(4) + data[16:header.chunks_at]
     require(crc32c(front) == header.checksum, "header and tables are damaged", "BAD_CHECKSUM")
     for at in range(header.error_table_at, header.chunks_at, 4):
-        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length", "BAD_CHUNK_TABLE")
+        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length",
+                "BAD_CHUNK_TABLE")
 
 
 def read_chunk_table(data: bytes, header: Header, limits: Limits) -> list[Chunk]:
     chunks, offset = [], header.chunks_at
     for at in range(HEADER_BYTES, header.error_table_at, ENTRY_BYTES):
-        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12), offset)
+        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12),
+                      offset)
         check_kind(chunk.kind)
         require(chunk.length <= limits.chunk_bytes, f"{chunk} is too long", "LIMIT_EXCEEDED")
         level_fits = chunk.level < header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
@@ -219,13 +223,14 @@ def read_chunk_table(data: bytes, header: Header, limits: Limits) -> list[Chunk]
 
 
 def check_kind(kind: int) -> None:
-    """Kinds that are not known are skipped where they are optional and share their number with no known one."""
+    """Kinds that are not known are skipped where they are optional and their number is not that of a known
+    one."""
     taken = {known & ~OPTIONAL for known in KINDS}
     skipped = kind & OPTIONAL and kind & ~OPTIONAL not in taken
     require(kind in KINDS or bool(skipped), f"kind {kind:#06x} is not known", "UNKNOWN_CHUNK")
 
 
-# ---- range coder -----------------------------------------------------------------------------------------------------
+# ---- range coder -------------------------------------------------------------------------------------------
 
 MASK = (1 << 64) - 1
 SLOWEST = 60
@@ -285,12 +290,13 @@ class RangeDecoder:
         return self.narrow(self.range >> 1)
 
     def finish(self) -> None:
-        """Everything is decoded: nothing may be left over, and no byte may be there that could be left out."""
+        """Everything is decoded: nothing may be left over, nor a byte that could have been left out."""
         require(not self.stream or self.stream[-1] != 0, "a stream ends in a zero byte")
-        require(self.at >= len(self.stream) and self.code < self.range, "a stream is not used up where it should be")
+        require(self.at >= len(self.stream) and self.code < self.range,
+                "a stream is not used up where it should be")
 
 
-# ---- numbers ---------------------------------------------------------------------------------------------------------
+# ---- numbers -----------------------------------------------------------------------------------------------
 
 LONGEST = 30  # bits of a magnitude
 CLASSES = 28
@@ -304,20 +310,37 @@ def number_class(expected: int) -> int:
     return min(2 * length - 2 + (expected >> length - 2 & 1), CLASSES - 1)
 
 
+class Contexts(dict):
+    """Lists of contexts by a number, each made when it is first asked for: most never are."""
+
+    def __init__(self, starts):
+        super().__init__()
+        self.starts = starts  # of a number: the probabilities that its contexts start with
+
+    def __missing__(self, number: int) -> list[Context]:
+        self[number] = [Context(one) for one in self.starts(number)]
+        return self[number]
+
+
+@cache
+def size_starts(c: int) -> list[int]:
+    """Probabilities of one more bit of length, for class c."""
+    mean = 2 * c + 1 if c < 2 else 5 + 2 * (c & 1) << c // 2 - 1
+    more = (mean << 16) // (mean + 32)
+    starts = [more]
+    for _ in range(LONGEST - 1):
+        starts.append(more)
+        more = more * more >> 16
+    return starts
+
+
 class NumberModel:
-    """Contexts of integers: of the bit length by the class of the magnitude expected, of the bits below the leading."""
+    """Contexts of integers: of the bit length, by the class of the magnitude expected, and of the bits below the
+    leading one, by the length."""
 
     def __init__(self):
-        self.size = []
-        for c in range(CLASSES):
-            mean = 2 * c + 1 if c < 2 else 5 + 2 * (c & 1) << c // 2 - 1
-            more = (mean << 16) // (mean + 32)
-            contexts = [Context(more)]
-            for _ in range(LONGEST - 1):
-                contexts.append(Context(more))
-                more = more * more >> 16
-            self.size.append(contexts)
-        self.mantissa = [[Context(30000) for _ in range(4)] for _ in range(LONGEST)]
+        self.size = Contexts(size_starts)
+        self.mantissa = Contexts(lambda length: [30000] * 4)
 
 
 def code_unsigned(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
@@ -328,11 +351,11 @@ def code_unsigned(coder: RangeDecoder, model: NumberModel, expected: int) -> int
     return code_mantissa(coder, model.mantissa, length) if length > 0 else 0
 
 
-def code_mantissa(coder: RangeDecoder, contexts: list, length: int) -> int:
+def code_mantissa(coder: RangeDecoder, contexts: Contexts, length: int) -> int:
     value = 1
     for taken in range(length - 1):
         if taken < 2:
-            bit = coder.bit(contexts[length - 1][0 if taken == 0 else 1 + (value & 1)])
+            bit = coder.bit(contexts[length][0 if taken == 0 else 1 + (value & 1)])
         else:
             bit = coder.raw_bit()
         value = value << 1 | bit
@@ -354,7 +377,7 @@ def divide_to_zero(a: int, b: int) -> int:
     return a // b if a >= 0 else -(-a // b)
 
 
-# ---- hierarchy stream ------------------------------------------------------------------------------------------------
+# ---- hierarchy stream --------------------------------------------------------------------------------------
 
 SHEET, LOOSE, WHOLE = 1, 2, 4
 
@@ -429,7 +452,8 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         parent = branches[branch.parent]
         step = code_signed(coder, attaches, mean)
         place = parent.last_place + step
-        require(abs(step) <= 1 << 28 and 0 <= place < parent.count, "an attach vertex is not on the parent's stem")
+        require(abs(step) <= 1 << 28 and 0 <= place < parent.count,
+                "an attach vertex is not on the parent's stem")
         branch.attach = parent.first + place
         parent.last_place = place
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
@@ -459,7 +483,7 @@ def measure_subtrees(branches: list[Branch]) -> None:
             whole_until = b + branch.subtree
 
 
-# ---- rest pose -------------------------------------------------------------------------------------------------------
+# ---- rest pose ---------------------------------------------------------------------------------------------
 
 RUN_VERTICES = 32
 
@@ -508,13 +532,13 @@ def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
     return [before[k] + (end[k] - start[k]) for k in range(3)]
 
 
-# ---- exact numbers: rest poses and times bit for bit -----------------------------------------------------------------
+# ---- exact numbers: rest poses and times bit for bit -------------------------------------------------------
 
 
 class ExactModel:
     def __init__(self):
-        self.size = [[Context(60000) for _ in range(64)] for _ in range(65)]
-        self.mantissa = [[Context(30000) for _ in range(4)] for _ in range(64)]
+        self.size = Contexts(lambda before: [60000] * 64)
+        self.mantissa = Contexts(lambda length: [30000] * 4)
 
 
 def single(x: float) -> float:
@@ -536,7 +560,8 @@ def ordered(bits: int, n: int) -> int:
 
 
 def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, before: int):
-    """A number of n bits, and the bit length of its difference from the one expected; `before`: the length before."""
+    """A number of n bits, and the bit length of its difference from the expected one; `before`: the last
+    one's."""
     expected = single(expected) if n == 32 else expected
     at = ordered(to_bits(expected if finite(expected) else 0.0, n), n)
     length = 0
@@ -590,7 +615,7 @@ def frame_times(chunk: bytes, frame_count: int) -> list[float]:
     return times
 
 
-# ---- temporal basis and coefficient streams --------------------------------------------------------------------------
+# ---- temporal basis and coefficient streams ----------------------------------------------------------------
 
 
 def decode_temporal(stream: bytes, rank: int, frames: int, bits: int) -> list[list[int]]:
@@ -651,8 +676,8 @@ def decode_row(coder: RangeDecoder, model: CoefficientModel, frames: int, rank: 
                above_count: int = 0):
     """Three axes of `frames` integers over frequency, and how many frequencies were coded.
 
-    What is near in frequency, on the other axes, in the row above and in rows of the same slot tells how large a number
-    is expected to be.
+    What is near in frequency, on the other axes, in the row above and in rows of the same slot tells how
+    large a number is expected to be.
     """
     history = model.history[slot]
     count = decode_count(coder, model, model.history_count[slot], above_count, rank)
@@ -676,7 +701,7 @@ def decode_row(coder: RangeDecoder, model: CoefficientModel, frames: int, rank: 
     return row, count
 
 
-# ---- plan: what all segments share -----------------------------------------------------------------------------------
+# ---- plan: what all segments share -------------------------------------------------------------------------
 
 PIECE_VERTICES = 64
 SHAPE_MODES = 16
@@ -754,7 +779,8 @@ class Plan:
     def _add_node(self, branches: list[Branch], b: int) -> None:
         branch, last_branch = branches[b], branches[b + branches[b].subtree - 1]
         self.nodes.append(Node(
-            len(self.nodes), len(self.pieces), branch.first, last_branch.first + last_branch.count - branch.first,
+            len(self.nodes), len(self.pieces), branch.first,
+            last_branch.first + last_branch.count - branch.first,
             level=branch.depth, last=self.height if branch.flags & WHOLE else branch.depth,
             coded=branch.subtree > 1 or branch.count > PIECE_VERTICES))
 
@@ -833,11 +859,11 @@ class Plan:
         return rows
 
 
-# ---- bases -----------------------------------------------------------------------------------------------------------
+# ---- bases -------------------------------------------------------------------------------------------------
 
 
 def in_order(terms: np.ndarray) -> np.ndarray:
-    """0.0 + terms[0] + terms[1] + ..., each rounded before the next is added: accumulate is defined to do that.
+    """0.0 + terms[0] + terms[1] + ..., each sum rounded before the next: accumulate is defined to do that.
 
     The last 0.0 makes up for the first, which is left out: it tells only where all terms are -0.0.
     """
@@ -860,7 +886,8 @@ def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
 
 @cache
 def cantilever(gaps: tuple[int, ...], turn: float, rough: float) -> np.ndarray:
-    """(n, n): modes of a randomly bent cantilever, eigenvectors of its covariance, largest eigenvalue first."""
+    """(n, n): modes of a randomly bent cantilever, its covariance's eigenvectors, largest eigenvalue
+    first."""
     n, total = len(gaps), float(sum(gaps))
     s = np.cumsum(gaps) / total
     high, low = np.maximum(s[:, None], s), np.minimum(s[:, None], s)
@@ -979,7 +1006,8 @@ def cosine_waves(frames: int) -> np.ndarray:
     """(frames, frames): the orthonormal DCT-II, wave k at frame t."""
     first, other = math.sqrt(1.0 / frames), math.sqrt(2.0 / frames)
     cosines = [cos_of_fraction(j, frames) for j in range(4 * frames)]
-    return np.array([[(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)] for t in range(frames)]
+    return np.array([[(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)]
+                      for t in range(frames)]
                      for k in range(frames)])
 
 
@@ -1009,7 +1037,7 @@ def sin_series(x: float) -> float:
     return x * total
 
 
-# ---- motion of one segment at one level ------------------------------------------------------------------------------
+# ---- motion of one segment at one level --------------------------------------------------------------------
 
 
 @dataclass
@@ -1023,7 +1051,7 @@ class LevelStream:
 
 @dataclass
 class Motion:
-    """The integers of a segment: rows of three axes of integers over frequency. What no chunk holds is missing."""
+    """The integers of a segment: rows of three axes over frequency. What no chunk holds is missing."""
 
     frames: int
     cosines: np.ndarray
@@ -1055,7 +1083,8 @@ def decode_shapes(stream: bytes, plan: Plan, motion: Motion, level: int) -> None
         require(count <= most, "a piece has more shapes than modes and axes")
         above, above_count = None, 0
         for _ in range(count):
-            above, above_count = decode_row(coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own), above,
+            above, above_count = decode_row(coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own),
+                                            above,
                                             above_count)
             numbers = np.array(above, float).T.ravel()  # axis a of mode m at 3 m + a
             length2 = in_order(numbers * numbers)
@@ -1132,7 +1161,7 @@ def half_octave(exponent: int) -> float:
     return (1.4142135623730951 if odd else 1.0) * 2.0 ** ((exponent - odd) // 2)
 
 
-# ---- corrections -----------------------------------------------------------------------------------------------------
+# ---- corrections -------------------------------------------------------------------------------------------
 
 BLOCK_FRAMES = 8
 
@@ -1141,7 +1170,8 @@ class CorrectionModel:
     def __init__(self):
         self.vertex = [Context(4000 if i == 0 else 32768) for i in range(4)]
         self.block = [[Context(8000) for _ in range(4)] for _ in range(2)]
-        self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)] for i in range(3)]
+        self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)]
+                      for i in range(3)]
         self.zero = [[Context(32768) for _ in range(3)] for _ in range(2)]
         self.sign = [[Context(32768) for _ in range(3)] for _ in range(3)]
         self.size = NumberModel()
@@ -1168,7 +1198,8 @@ def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: 
     found_any = block_before = 0
     for start in range(0, frames, BLOCK_FRAMES):
         stop = min(start + BLOCK_FRAMES, frames)
-        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0):min(stop + BLOCK_FRAMES, frames)])
+        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0):min(stop + BLOCK_FRAMES,
+            frames)])
         last_chance = stop == frames and not found_any
         block = block_before = 1 if last_chance else coder.bit(model.block[block_before][around])
         if not block:
@@ -1199,9 +1230,10 @@ def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) 
     return tuple(q)
 
 
-# ---- reconstruction --------------------------------------------------------------------------------------------------
+# ---- reconstruction ----------------------------------------------------------------------------------------
 #
-# Vectors over time have the shape (3, frames), matrices (3, 3, frames); vertices come in front: (count, 3, frames).
+# Vectors over time have the shape (3, frames), matrices (3, 3, frames); vertices come first: (count, 3,
+# frames).
 
 
 def mat_vec(R: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -1231,7 +1263,8 @@ def rotation(x, y, z) -> np.ndarray:
 
 
 def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
-    """(3, frames): integers over frequency as numbers over time; integers that are 0 are left out. None: no row."""
+    """(3, frames): integers over frequency as numbers over time; those that are 0 are left out. None: no
+    row."""
     if row is None:
         return np.zeros((3, waves.shape[1]))
     tracks = []
@@ -1331,7 +1364,7 @@ class Pose:
         self.kept[piece.number] = c, R
 
     def piece_terms(self, piece: Piece):
-        """How far a shape or mode moves each vertex along the axes, (count, 3), and its track: (frames,) or (3, frames).
+        """How far a shape or mode moves each vertex, (count, 3), and its track: (frames,) or (3, frames).
 
         What is 0.0 throughout is left out: adding it could change the sign of a zero, or make a NaN.
         """
@@ -1415,7 +1448,8 @@ class Pose:
 
     def map_of_shape(self, node: Node, piece: Piece, shape: np.ndarray) -> np.ndarray:
         modes = self.plan.basis(piece)[:self.plan.shape_modes(piece)]
-        return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m, mode in enumerate(modes)]))
+        return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m,
+                                  mode in enumerate(modes)]))
 
 
 def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -1457,12 +1491,13 @@ def turn_towards(H: np.ndarray, least: float, R: np.ndarray) -> np.ndarray:
     return mat_mul(rotation(x, y, z), R)
 
 
-# ---- static data -----------------------------------------------------------------------------------------------------
+# ---- static data -------------------------------------------------------------------------------------------
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 ZSTD_WINDOW = 8 << 20
 ELEMENT_BYTES, FIELD_BYTES = 1 << 20, 1 << 31
-PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
+PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)"
+                        r"|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
                         re.ASCII)
 DERIVED_TYPES = {"|i1", "|u1"} | {order + kind + size for order in "<>" for kind in "iu" for size in "248"}
 
@@ -1478,7 +1513,8 @@ def parse_json(text: bytes, what: str) -> dict:
         return float(literal)
 
     try:
-        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number, parse_constant=number)
+        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number,
+                           parse_constant=number)
         json.dumps(value, ensure_ascii=False).encode("utf-8")  # refuses halves of surrogate pairs
     except (ValueError, RecursionError):
         raise AthError("BAD_CHUNK", f"{what}: is not JSON") from None
@@ -1486,17 +1522,27 @@ def parse_json(text: bytes, what: str) -> dict:
     return value
 
 
+def zstd_window(data: bytes) -> int:
+    """Window_Size that a frame header asks for (RFC 8878, 3.1.1.1.2); 0 where it is the content's size."""
+    if len(data) < 6 or data[4] & 0x20:  # Single_Segment_flag
+        return 0
+    exponent, mantissa = data[5] >> 3, data[5] & 7
+    return (1 << 10 + exponent) + (1 << 10 + exponent >> 3) * mantissa
+
+
 def unzstd(data: bytes, size: int | None, what: str, limit: int) -> bytes:
     """One zstd frame that states its size, which must be `size` where that is known."""
     require(data[:4] == ZSTD_MAGIC, f"{what}: is no zstd frame")
+    most = max(ZSTD_WINDOW, size or 0)
+    require(zstd_window(data) <= most, f"{what}: has a zstd window of more than {most} bytes",
+            "LIMIT_EXCEEDED")
     try:
-        frame = zstandard.get_frame_parameters(data)
         stated = zstandard.frame_content_size(data)
     except zstandard.ZstdError:
         raise AthError("BAD_CHUNK", f"{what}: has a bad zstd frame header") from None
-    require(stated > 0 and stated == (stated if size is None else size), f"{what}: has a zstd frame of another size")
+    require(stated > 0 and stated == (stated if size is None else size),
+            f"{what}: has a zstd frame of another size")
     require(stated <= limit, f"{what}: unpacks to too much", "LIMIT_EXCEEDED")
-    require(frame.window_size <= max(ZSTD_WINDOW, stated), f"{what}: has too large a zstd window", "LIMIT_EXCEEDED")
     try:
         unpacked = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
     except (zstandard.ZstdError, MemoryError):
@@ -1511,7 +1557,8 @@ def unshuffle(data: bytes, size: int) -> bytes:
 
 
 def is_shape(shape: object, below: int = 1 << 40) -> bool:
-    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
+    return isinstance(shape,
+                      list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
 
 
 def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
@@ -1519,17 +1566,20 @@ def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
     if isinstance(description, str):
         require(PLAIN_TYPE.fullmatch(description) is not None, f"{what}: has an unknown type")
         return np.dtype(description)
-    require(isinstance(description, list) and len(description) > 0 and nesting > 0, f"{what}: has an unknown type")
+    require(isinstance(description, list) and len(description) > 0 and nesting > 0,
+            f"{what}: has an unknown type")
     names, formats, offsets, size = [], [], [], 0
     for entry in description:
-        require(isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str), f"{what}: has a bad field")
+        require(isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str),
+                f"{what}: has a bad field")
         kind = field_type(parse_type(entry[1], what, nesting - 1), entry[2:], what)
         if entry[0]:
             names.append(entry[0])
             formats.append(kind)
             offsets.append(size)
         else:
-            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V", f"{what}: has a bad gap")
+            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V",
+                    f"{what}: has a bad gap")
         size += kind.itemsize
     require(len(set(names)) == len(names), f"{what}: has two fields of the same name")
     require(size < FIELD_BYTES, f"{what}: has a record that is too long")
@@ -1542,13 +1592,15 @@ def field_type(kind: np.dtype, shapes: list, what: str) -> np.dtype:
         return kind
     require(is_shape(shapes[0], FIELD_BYTES) and kind.itemsize * math.prod(shapes[0]) < FIELD_BYTES,
             f"{what}: has a field with a bad shape")
-    require(kind.itemsize > 0 or kind.names is not None, f"{what}: has a field of many texts without characters")
+    require(kind.itemsize > 0 or kind.names is not None,
+            f"{what}: has a field of many texts without characters")
     return np.dtype((kind, tuple(shapes[0])))
 
 
 def parse_array(chunk: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
     """Head and array of a static array; None where there is none."""
-    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2, f"{what}: Head_Length is more than the chunk holds")
+    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2,
+            f"{what}: Head_Length is more than the chunk holds")
     head, body = parse_json(chunk[2:2 + u16(chunk, 0)], what), chunk[2 + u16(chunk, 0):]
     if "dtype" not in head:
         require(len(body) == 0, f"{what}: has data without a type")
@@ -1574,13 +1626,14 @@ def parse_metadata(chunk: bytes, limits: Limits) -> bytes:
     return text
 
 
-# ---- a file ----------------------------------------------------------------------------------------------------------
+# ---- a file ------------------------------------------------------------------------------------------------
 
 
 class AthFile:
-    """An opened file. What it is refused for, when opened or asked, is an AthError; the first one of FORMAT.md, "Opening".
+    """An opened file. What is wrong with it is an AthError when it is opened, in the order of FORMAT.md,
+    "Opening", or asked.
 
-    strict: it has to be as long as it says. Else what has arrived of it, at least its prelude, can be decoded.
+    strict: it has to be as long as it says. Else what has arrived of it, at least the prelude, is decoded.
     """
 
     def __init__(self, data: bytes, strict: bool = False, limits: Limits | None = None):
@@ -1591,7 +1644,8 @@ class AthFile:
         self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
         self._check_length(strict)
         frames = -(-self.header.frame_count // self.header.segment_count)
-        require(self.header.vertex_count * (60 * frames + 512) <= self.limits.memory_bytes, "needs too much memory",
+        require(self.header.vertex_count * (60 * frames + 512) <= self.limits.memory_bytes,
+                "needs too much memory",
                 "LIMIT_EXCEEDED")
         with np.errstate(all="ignore"):  # infinities and NaN are results like others
             self._read_hierarchy(self.content(HIERARCHY))
@@ -1601,7 +1655,8 @@ class AthFile:
 
     def _check_length(self, strict: bool) -> None:
         behind = [c.offset for c in self.chunks if c.key[0] > 0]
-        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude", "TRUNCATED")
+        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude",
+                "TRUNCATED")
         if strict:
             require(len(self.data) >= self.header.file_length, "is shorter than File_Length", "TRUNCATED")
             require(len(self.data) <= self.header.file_length, "is longer than File_Length", "TRAILING_BYTES")
@@ -1634,7 +1689,8 @@ class AthFile:
         deepest = max(branch.depth for branch in self.branches)
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
         self.plan = Plan(self.branches)
-        require(self.plan.height + 2 == self.header.full_level_count, "Full_Level_Count is not that of the hierarchy",
+        require(self.plan.height + 2 == self.header.full_level_count,
+                "Full_Level_Count is not that of the hierarchy",
                 "BAD_HEADER")
 
     def _check_motion_chunks(self) -> None:
@@ -1647,15 +1703,18 @@ class AthFile:
                 allowed |= {(CORRECTIONS, level, s)} if level == plan.height + 1 else set()
             allowed |= {(SHAPES, level, 0)} if plan.has_stems(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
-        require(wanted <= there <= wanted | allowed, "motion chunks are not those that the hierarchy asks for",
+        require(wanted <= there <= wanted | allowed,
+                "motion chunks are not those that the hierarchy asks for",
                 "BAD_CHUNK_TABLE")
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 36, "REST is too short")
-        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0, "Method, Rest_Type or Reserved is out of range")
+        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0,
+                "Method, Rest_Type or Reserved is out of range")
         self.origin = np.array([f64(chunk, 4 + 8 * k) for k in range(3)])
         step = f64(chunk, 28)
-        require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
+        require(np.isfinite(self.origin).all() and finite(step) and step > 0.0,
+                "Origin or Rest_Step is out of range")
         self.rest_type = np.dtype("<f8" if chunk[1] else "<f4")
         if chunk[0] == 0:
             rest = np.array(decode_rest(chunk[36:], self.branches, step))
@@ -1697,7 +1756,8 @@ class AthFile:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
         with np.errstate(all="ignore"):
             segments = [self._segment(s, level) for s in range(self.header.segment_count)]
-        return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0, 1))
+        return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0,
+            1))
 
     def _segment(self, s: int, level: int) -> np.ndarray:
         """(vertices, 3, frames) in file order."""
@@ -1753,14 +1813,17 @@ class AthFile:
         return array
 
     def _check_indices(self, array: np.ndarray | None, what: str) -> None:
-        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu", f"{what} has no rows of integers")
+        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu",
+                f"{what} has no rows of integers")
         require(array.size == 0 or (0 <= array.min() and array.max() < self.header.vertex_count),
                 f"{what} names a vertex that is not there")
 
     def _derived_edges(self, type_name: object) -> np.ndarray:
         """An edge from each vertex to the one before it on its stem, or to the attach vertex."""
-        require(isinstance(type_name, str) and type_name in DERIVED_TYPES, "EDGES has neither array nor derived edges")
-        require(np.iinfo(type_name).max >= self.header.vertex_count - 1, "the type of derived edges is too small")
+        require(isinstance(type_name, str) and type_name in DERIVED_TYPES,
+                "EDGES has neither array nor derived edges")
+        require(np.iinfo(type_name).max >= self.header.vertex_count - 1,
+                "the type of derived edges is too small")
         pairs = []
         for branch in self.branches:
             for v in range(branch.first, branch.first + branch.count):
@@ -1779,8 +1842,10 @@ class AthFile:
             require(len(arrays) < self.limits.attributes, "there are too many attributes", "LIMIT_EXCEEDED")
             head, array = parse_array(self.bytes_of(chunk), "ATTRIBUTE", self.limits)
             name = head.get("name")
-            require(isinstance(name, str) and name != "" and array is not None, "an attribute has no name or no array")
-            require(len(name.encode("utf-8")) <= self.limits.string_bytes, "the name of an attribute is too long",
+            require(isinstance(name, str) and name != "" and array is not None,
+                    "an attribute has no name or no array")
+            require(len(name.encode("utf-8")) <= self.limits.string_bytes,
+                    "the name of an attribute is too long",
                     "LIMIT_EXCEEDED")
             require(name not in arrays, "two attributes have the same name")
             arrays[name] = array
@@ -1789,18 +1854,18 @@ class AthFile:
         return arrays
 
     def static_bytes(self) -> bytes:
-        """All static data one after the other: Text of METADATA, then the elements of all arrays in file order."""
+        """Static data one after the other: Text of METADATA, then the elements of all arrays in file
+        order."""
         arrays = [self.faces(), self.edges(), *self.attributes().values()]
         text = self.metadata_text() if self.find(METADATA) else b""
         return text + b"".join(array.tobytes() for array in arrays if array is not None)
 
 
-# ---- command ---------------------------------------------------------------------------------------------------------
+# ---- command -----------------------------------------------------------------------------------------------
 
 
-def raw(data: bytes, what: str) -> bytes:
-    """What the command protocol of conformance.py asks for."""
-    file = AthFile(data, strict=what == "strict")
+def raw(file: AthFile, what: str) -> bytes:
+    """The answer to an item of conformance.py."""
     if what in ("strict", "open"):
         return b""
     if what == "static":
@@ -1817,7 +1882,8 @@ def show(options: argparse.Namespace, data: bytes) -> None:
     level = file.deepest if options.depth is None else options.depth
     positions = file.positions(level)
     frames, vertices, _ = positions.shape
-    print(f"{frames} frames of {vertices} vertices, {positions.dtype}, level {level} of {file.header.level_count - 1}")
+    print(f"{frames} frames of {vertices} vertices, {positions.dtype}, "
+          f"level {level} of {file.header.level_count - 1}")
     if options.checksum:
         print(f"{crc32c(positions.tobytes()):08x}")
     if options.out:
@@ -1825,20 +1891,22 @@ def show(options: argparse.Namespace, data: bytes) -> None:
 
 
 def main(words: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description="Decodes a level of an .ath file, by the letter of FORMAT.md.")
+    parser = argparse.ArgumentParser(description="Decodes a level of an .ath file as FORMAT.md says.")
     parser.add_argument("file")
     parser.add_argument("what", nargs="?", help=argparse.SUPPRESS)
     parser.add_argument("--depth", type=int, help="level; by default the deepest complete one")
     parser.add_argument("--strict", action="store_true", help="the file has to be as long as it says")
     parser.add_argument("--out", help="write the positions, (frames, vertices, 3), to this .npy file")
-    parser.add_argument("--checksum", action="store_true", help="print their CRC-32C, little-endian, source order")
+    parser.add_argument("--checksum", action="store_true",
+                        help="print their CRC-32C, little-endian, source order")
     parser.add_argument("--raw", action="store_true", help="answer as spec/conformance.py asks: FILE WHAT")
     options = parser.parse_args(words)
     try:
         with open(options.file, "rb") as source:
             data = source.read()
         if options.raw:
-            sys.stdout.buffer.write(raw(data, options.what or "open"))
+            what = options.what or "open"
+            sys.stdout.buffer.write(raw(AthFile(data, strict=what == "strict"), what))
         else:
             show(options, data)
     except (AthError, OSError, ValueError) as error:

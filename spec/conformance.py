@@ -1,0 +1,347 @@
+"""Holds a decoder of .ath files to the vectors of spec/vectors.
+
+    python -m spec.conformance DECODER-COMMAND...          any program
+    python -m spec.conformance --own c|wasm|reference      those of this repository
+
+A program is called as `DECODER-COMMAND... FILE ITEM` for every item of every vector. It has to write the
+answer, raw, to its standard output and exit with 0; or, where the file is to be refused, the error's name
+(FORMAT.md, "Errors") as the first word of its standard error, and exit with another status. The items:
+
+    strict      opens strictly; no answer
+    open        opens for streaming, as all that follow; no answer
+    0, 1, ...   positions of that level: frames x vertices x 3 numbers, little-endian, in source order,
+                binary64 where Wide is set, else binary32
+    rest        the rest pose: vertices x 3 numbers of Rest_Type, little-endian, in source order
+    time        the time of every frame, binary64, little-endian
+    static      Text of METADATA, then the elements of all arrays in file order, unshuffled, gaps included;
+                derived edges as if they were stored
+
+Where a level or a chunk has not arrived, asking for it is TRUNCATED. A decoder that leaves out static data
+or the strict mode is tested with --without. The exit status is 0 where nothing was wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from spec import reference_decoder as rd
+from spec.reference_decoder import crc32c
+
+FOLDER = Path(__file__).resolve().parent / "vectors"
+DECODER_MODULE = Path(__file__).resolve().parent.parent / "athcodec" / "viewer" / "ath_decoder.mjs"
+ERRORS = ("INVALID", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED", "BAD_CHECKSUM", "BAD_HEADER",
+          "BAD_CHUNK_TABLE",
+          "UNKNOWN_CHUNK", "BAD_CHUNK", "LIMIT_EXCEEDED", "TRAILING_BYTES")
+NO_ANSWER = ("strict", "open")
+SECONDS = 120
+LISTING = """\
+Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, then ITEM=RESULT for each item that
+conformance.py describes, then # and the reason.
+RESULT is ok, the name of an error, or the CRC-32C of the answer, in which every NaN is the quiet one
+(0x7fc00000 or
+0x7ff8000000000000). Lines and files are only ever added.
+"""
+
+
+class Refused(Exception):
+    """A decoder says that a file is not valid; the message is the error's name."""
+
+
+@dataclass(frozen=True)
+class Vector:
+    name: str  # such as valid/smallest.ath
+    checksum: str
+    results: dict[str, str]  # by item
+    reason: str
+
+    @property
+    def path(self) -> Path:
+        return FOLDER / self.name
+
+    @property
+    def valid(self) -> bool:
+        return self.name.startswith("valid/")
+
+
+# Answers jobs (vector, item) in their order: bytes, or what it refused the file for, or an OSError: a fault.
+Decoder = Callable[[list[tuple[Vector, str]]], Iterable[bytes | Exception]]
+
+
+# ---- the listing -------------------------------------------------------------------------------------------
+
+
+def vectors() -> list[Vector]:
+    """Those of expected.txt."""
+    lines = (FOLDER / "expected.txt").read_text("utf-8").splitlines()
+    return [parse_line(line) for line in lines if line and not line.startswith("#")]
+
+
+def parse_line(line: str) -> Vector:
+    facts, reason = line.split(" # ", 1)
+    name, checksum, *results = facts.split()
+    return Vector(name, checksum, dict(each.split("=") for each in results), reason)
+
+
+def format_line(name: str, data: bytes, results: dict[str, str], reason: str) -> str:
+    said = " ".join(f"{item}={result}" for item, result in results.items())
+    return f"{name} {crc32c(data):08x} {said} # {reason}"
+
+
+def checksum_of(data: bytes, item: str, answer: bytes) -> str:
+    """RESULT of an answer to an item of a file."""
+    if item in NO_ANSWER:
+        return "ok" if not answer else "bytes where none are asked for"
+    if item.isdecimal():
+        answer = with_quiet_nans(answer, "<f8" if data[47] & 1 else "<f4")
+    return f"{crc32c(answer):08x}"
+
+
+def with_quiet_nans(answer: bytes, kind: str) -> bytes:
+    """A NaN's sign and payload are not defined."""
+    if len(answer) % np.dtype(kind).itemsize:
+        return answer
+    numbers = np.frombuffer(answer, kind).copy()
+    numbers[np.isnan(numbers)] = np.nan
+    return numbers.tobytes()
+
+
+# ---- testing -----------------------------------------------------------------------------------------------
+
+
+def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
+    """One line for each item of which a decoder says something else than expected.txt."""
+    left_out = set(without)
+    jobs = [(vector, item) for vector in chosen for item in vector.results
+            if item not in left_out and not ("levels" in left_out and item.isdecimal())]
+    for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
+        expected, got = vector.results[item], said(vector.path.read_bytes(), item, answer)
+        if got != expected:
+            yield f"{vector.name}, {item}: got {got}; expected {expected}: {vector.reason}"
+
+
+def said(data: bytes, item: str, answer: bytes | Exception) -> str:
+    return checksum_of(data, item, answer) if isinstance(answer, bytes) else str(answer)
+
+
+def items(data: bytes) -> list[str]:
+    """What can be asked of a file: more of one that opens."""
+    try:
+        file = rd.AthFile(data)
+    except rd.AthError:
+        return list(NO_ANSWER)
+    return [*NO_ANSWER, *map(str, range(file.header.level_count)), "rest", "time", "static"]
+
+
+def result(ask: Callable[[bytes, str], bytes], data: bytes, item: str) -> str:
+    """RESULT of one item, by a function that raises Refused."""
+    try:
+        return checksum_of(data, item, ask(data, item))
+    except Refused as error:
+        return str(error)
+
+
+# ---- decoders ----------------------------------------------------------------------------------------------
+
+
+def command(words: list[str]) -> Decoder:
+    """A program, by the protocol above."""
+    def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
+        for vector, item in jobs:
+            yield ask_command(words, vector.path, item)
+    return decoder
+
+
+def ask_command(words: list[str], path: Path, item: str) -> bytes | Exception:
+    try:
+        done = subprocess.run([*words, str(path), item], capture_output=True, timeout=SECONDS)
+    except subprocess.TimeoutExpired:
+        return OSError(f"no answer within {SECONDS} s")
+    if done.returncode == 0:
+        return done.stdout
+    first = (done.stderr.decode(errors="replace").split() or [""])[0].strip(":")
+    if done.returncode < 0 or first not in ERRORS:
+        return OSError(f"exit status {done.returncode} and no error's name")
+    return Refused(first)
+
+
+def one_by_one(ask: Callable[[bytes, str], bytes]) -> Decoder:
+    """A function that takes a file's bytes and an item, and raises Refused."""
+    def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
+        for vector, item in jobs:
+            try:
+                yield ask(vector.path.read_bytes(), item)
+            except Refused as error:
+                yield error
+    return decoder
+
+
+@lru_cache(maxsize=1)
+def opened(data: bytes, strict: bool) -> rd.AthFile:
+    return rd.AthFile(data, strict=strict)
+
+
+def reference(data: bytes, item: str) -> bytes:
+    try:
+        return rd.raw(opened(data, item == "strict"), item)
+    except rd.AthError as error:
+        raise Refused(error.name) from None
+
+
+def package(data: bytes, item: str) -> bytes:
+    """The C core through Python, and the package's own reading of static data."""
+    import athcodec
+    from athcodec.errors import FormatError, LevelUnavailable
+
+    try:
+        with athcodec.open(BytesIO(data), strict=item == "strict") as decoder:
+            return ask_package(decoder, item)
+    except FormatError as error:
+        raise Refused(error.name) from None
+    except LevelUnavailable:  # of a level that the file stores, but that has not arrived
+        raise Refused("TRUNCATED") from None
+
+
+def ask_package(decoder, item: str) -> bytes:
+    if item in NO_ANSWER:
+        return b""
+    if item == "rest":
+        return decoder.rest.tobytes()
+    if item == "time":
+        return decoder.time.tobytes()
+    if item != "static":
+        return decoder.positions(depth=int(item)).tobytes()
+    arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
+    return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
+
+
+def metadata_text(decoder) -> bytes:
+    from athcodec import container
+
+    _ = decoder.metadata  # refuses what is no JSON object
+    chunk = decoder.container.find(container.METADATA)
+    if chunk is None:
+        return b""
+    content = decoder.container.payload(chunk)
+    return rd.parse_metadata(content, rd.Limits())
+
+
+NODE_SCRIPT = """
+import { readFileSync } from "node:fs";
+const jobs = JSON.parse(readFileSync(0, "utf8"));
+const { AthFile, AthError, ready } = await import(jobs.module);
+await ready;
+const items = {
+  open: () => new Uint8Array(0),
+  rest: (file) => file.rest("source", { out: new (file.info.restWide ? Float64Array : Float32Array)(
+    3 * file.info.vertexCount) }),
+  time: (file) => file.times(),
+};
+const positions = (file, level) => {
+  const numbers = file.info.wide ? Float64Array : Float32Array, size = 3 * file.info.vertexCount;
+  const all = new numbers(size * file.info.frameCount);
+  for (let s = 0; s < file.info.segmentCount; s++) {
+    const segment = file.prepare(s, level);
+    for (let t = file.segmentStart(s); t < file.segmentStart(s + 1); t++)
+      all.set(file.positions([segment], t, { out: new numbers(size) }), size * t);
+    segment.free();
+  }
+  return all;
+};
+const answer = ({ path, item }) => {
+  const file = AthFile.open(new Uint8Array(readFileSync(path)));
+  const array = items[item] ? items[item](file) : positions(file, Number(item));
+  const bytes = Buffer.from(array.buffer, array.byteOffset, array.byteLength).toString("base64");
+  file.dispose();
+  return { bytes };
+};
+const answers = jobs.jobs.map((job) => {
+  try {
+    return answer(job);
+  } catch (error) {
+    return error instanceof AthError ? { error: error.codeName } : { fault: String(error) };
+  }
+});
+console.log(JSON.stringify(answers));
+"""
+
+
+def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
+    """The decoder for web pages, in Node. It opens for streaming and hands static data over as stored."""
+    node = shutil.which("node")
+    if node is None:
+        raise OSError("node: got none on PATH; expected Node.js 18 or newer")
+    asked = {"module": DECODER_MODULE.as_uri(),
+             "jobs": [{"path": str(v.path), "item": item} for v, item in jobs]}
+    done = subprocess.run([node, "--input-type=module", "-e", NODE_SCRIPT], input=json.dumps(asked),
+                          capture_output=True,
+                          text=True, timeout=SECONDS)
+    if done.returncode != 0:
+        raise OSError(f"node: {done.stderr.strip()}")
+    return [node_answer(vector, answer) for (vector, _),
+            answer in zip(jobs, json.loads(done.stdout), strict=True)]
+
+
+def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
+    """What it says of the bytes so far, for a file of which there will be no more."""
+    if "bytes" in answer:
+        return base64.b64decode(answer["bytes"])
+    if "fault" in answer:
+        return OSError(answer["fault"])
+    if answer["error"] == "MISSING":
+        return Refused("TRUNCATED" if vector.path.stat().st_size else "NOT_AN_ATH_FILE")
+    return Refused(answer["error"])
+
+
+@dataclass(frozen=True)
+class Own:
+    decoder: Decoder
+    without: tuple[str, ...] = ()
+
+
+OWN = {"c": Own(one_by_one(package)), "wasm": Own(web_assembly, ("strict", "static")),
+       "reference": Own(one_by_one(reference))}
+
+
+# ---- command -----------------------------------------------------------------------------------------------
+
+
+def main(words: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m spec.conformance",
+        description="Holds a decoder of .ath files to the vectors of spec/vectors.",
+        epilog="How DECODER-COMMAND is called: see the beginning of spec/conformance.py.")
+    parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
+    parser.add_argument("--only", metavar="GLOB", default="*", help="files whose name in expected.txt fits")
+    parser.add_argument("--without", metavar="ITEM", action="append", default=[],
+                        help="leave an item out: strict, open, levels, rest, time or static; again for more")
+    parser.add_argument("command", nargs=argparse.REMAINDER, metavar="DECODER-COMMAND")
+    options = parser.parse_args(words)
+    if bool(options.own) == bool(options.command):
+        parser.error("expected a DECODER-COMMAND or --own")
+    decoder, without = command(options.command), tuple(options.without)
+    if options.own:
+        decoder, without = OWN[options.own].decoder, without + OWN[options.own].without
+    chosen = [vector for vector in vectors() if fnmatch(vector.name, options.only)]
+    failed = 0
+    for line in failures(decoder, chosen, without):
+        print(line)
+        failed += 1
+    print(f"{len(chosen)} vectors, {failed} wrong" + (f", without {', '.join(without)}" if without else ""))
+    return 1 if failed or not chosen else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

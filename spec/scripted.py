@@ -1,0 +1,450 @@
+"""Streams and files that say exactly what a script says, for vectors that no encoder would write.
+
+Every function of the reference decoder that reads a stream is also its writer here: it is run with a coder
+that encodes each decision as it is asked for, and takes what is decided from a script. So a stream can hold
+any numbers in the order of FORMAT.md, valid or not, and nothing of athcodec is needed. `Plant` makes whole
+files of such streams, `Draft` is a file in pieces that can be spoilt.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from spec import reference_decoder as rd
+from spec.reference_decoder import LOOSE, SHEET, WHOLE, crc32c  # noqa: F401 (flags, for scripts)
+
+# ---- scripts -----------------------------------------------------------------------------------------------
+
+
+class Script:
+    """Values in the order in which a stream asks for them; 0 (an empty row, a bit 0) when they are used
+    up."""
+
+    def __init__(self, *values):
+        self.values = deque(values)
+
+    def answer(self, asked: str, most: int):
+        return self.values.popleft() if self.values else 0
+
+
+class Chance(Script):
+    """Values made by chance: bits, small and now and then large numbers, rows of any length."""
+
+    def __init__(self, seed: int, empty: float = 0.3, large: int = 12):
+        super().__init__()
+        self.random, self.empty, self.large = np.random.default_rng(seed), empty, large
+
+    def answer(self, asked: str, most: int):
+        if asked == "count":
+            return 0 if self.random.random() < self.empty else int(self.random.integers(1, most + 1))
+        if asked == "bit":
+            return int(self.random.integers(2))
+        size = int(2 ** self.random.uniform(0, self.large if self.random.random() < 0.1 else 3)) - 1
+        return -size if asked == "signed" and self.random.random() < 0.5 else size
+
+
+def row(*frequencies: tuple[int, int, int]) -> list[int]:
+    """Script of a row: how many frequencies are coded, then x, y, z of each."""
+    return [len(frequencies), *(n for xyz in frequencies for n in xyz)]
+
+
+def magnitude_bits(magnitude: int, longest: int) -> list[int]:
+    """Decisions of a magnitude: its length in unary, and what follows the leading bit."""
+    length = magnitude.bit_length()
+    assert length <= longest, "no stream can hold this number"
+    return [1] * length + [0] * (length < longest) + [int(bit) for bit in f"{magnitude:b}"[1:]]
+
+
+class ScriptedCoder(rd.RangeDecoder):
+    """Keeps the interval that its decisions lead to, as an encoder does."""
+
+    def __init__(self, script: Script):
+        self.script, self.decisions = script, deque()
+        self.low, self.range, self.length = 0, rd.MASK, 8
+
+    def narrow(self, bound: int) -> int:
+        bit = int(self.decisions.popleft() if self.decisions else self.script.answer("bit", 1))
+        self.low, self.range = (self.low, bound) if bit else (self.low + bound, self.range - bound)
+        if self.range < 1 << 32:
+            self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
+        return bit
+
+    def finish(self) -> None:
+        assert not self.decisions and not self.script.values, "the script has more than the stream asks for"
+
+    def stream(self) -> bytes:
+        """A number of the interval, with as many zeros at its end as there can be; those are left out."""
+        last, zeros = self.low + self.range - 1, 0
+        while zeros < 8 * self.length and last >> zeros + 1 << zeros + 1 >= self.low:
+            zeros += 1
+        return (last >> zeros << zeros).to_bytes(self.length, "big").rstrip(b"\0")
+
+
+def scripted_unsigned(original: Callable):
+    def code(coder, model, expected):
+        coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), rd.LONGEST))
+        return original(coder, model, expected)
+    return code
+
+
+def scripted_signed(original_unsigned: Callable):
+    def code(coder, model, expected):
+        value = coder.script.answer("signed", 1 << 30)
+        coder.decisions.extend(magnitude_bits(abs(value), rd.LONGEST))
+        if original_unsigned(coder, model, expected):
+            coder.decisions.append(value < 0)
+            coder.raw_bit()
+        return value
+    return code
+
+
+def scripted_count(original: Callable):
+    def code(coder, model, history, above, rank):
+        count = coder.script.answer("count", rank)
+        coder.decisions.extend([0] + magnitude_bits(count, 10)[1:] if count else [1])
+        return original(coder, model, history, above, rank)
+    return code
+
+
+def scripted_exact(original: Callable):
+    def code(coder, model, n, expected, before):
+        """The script has the number, or (magnitude, negative) of its difference from the one expected."""
+        value = coder.script.answer("exact", 0)
+        if not isinstance(value, tuple):
+            likely = rd.single(expected) if n == 32 else expected
+            likely = likely if rd.finite(likely) else 0.0
+            difference = rd.ordered(rd.to_bits(value, n), n) - rd.ordered(rd.to_bits(likely, n), n)
+            value = abs(difference), difference < 0
+        coder.decisions.extend(magnitude_bits(value[0], n) + ([value[1]] if value[0] else []))
+        return original(coder, model, n, expected, before)
+    return code
+
+
+@contextmanager
+def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
+    """The reference decoder as a writer; what it has made is the coder in the list."""
+    made: list[ScriptedCoder] = []
+
+    def coder(_: bytes) -> ScriptedCoder:
+        made.append(ScriptedCoder(script))
+        return made[-1]
+
+    replaced = {"RangeDecoder": coder, "code_unsigned": scripted_unsigned(rd.code_unsigned),
+                "code_signed": scripted_signed(rd.code_unsigned),
+                "decode_count": scripted_count(rd.decode_count),
+                "code_exact": scripted_exact(rd.code_exact)}
+    kept = {name: getattr(rd, name) for name in replaced}
+    try:
+        for name, function in replaced.items():
+            setattr(rd, name, function)
+        yield made
+    finally:
+        for name, function in kept.items():
+            setattr(rd, name, function)
+
+
+def write(function: Callable, script: Script | list, *arguments) -> bytes:
+    """The stream that `function` of the reference decoder reads as the script.
+
+    It ends where the function refuses what the script says, whatever comes then."""
+    script = script if isinstance(script, Script) else Script(*script)
+    with scripted(script) as made, np.errstate(all="ignore"):
+        try:
+            function(b"", *arguments)
+        except rd.AthError:
+            pass
+    return made[0].stream()
+
+
+# ---- files in pieces ---------------------------------------------------------------------------------------
+
+HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
+HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
+                 "segment_count level_count full_level_count clip_count flags max_error reserved").split()
+ENTRY = struct.Struct("<HBBIII")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A chunk and what the table says of it; None: what is true."""
+
+    kind: int
+    content: bytes
+    level: int = rd.NO_LEVEL
+    segment: int = 0
+    clip: int = 0
+    length: int | None = None
+    checksum: int | None = None
+
+    @property
+    def key(self) -> tuple:
+        return rd.Chunk(self.kind, self.level, self.segment, 0, 0, 0).key
+
+    def packed(self) -> bytes:
+        length = len(self.content) if self.length is None else self.length
+        checksum = crc32c(self.content) if self.checksum is None else self.checksum
+        return ENTRY.pack(self.kind, self.clip, self.level, self.segment, length, checksum)
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A file whose counts, lengths and checksums are right unless `header` says otherwise."""
+
+    header: dict
+    entries: tuple[Entry, ...]
+    errors: bytes | None = None  # the error table
+
+    def file(self) -> bytes:
+        fields = dict(magic=rd.MAGIC, major=rd.VERSION[0], minor=rd.VERSION[1], checksum=None,
+                      file_length=None,
+                      chunk_count=len(self.entries), clip_count=1, flags=0, max_error=1.0,
+                      reserved=0) | self.header
+        table = b"".join(entry.packed() for entry in self.entries)
+        errors = self.errors
+        if errors is None:
+            errors = bytes(8 * fields["level_count"] * fields["segment_count"])
+        contents = b"".join(entry.content for entry in self.entries)
+        if fields["file_length"] is None:
+            fields["file_length"] = HEADER.size + len(table) + len(errors) + len(contents)
+        if fields["checksum"] is None:
+            blank = HEADER.pack(*((fields | {"checksum": 0})[name] for name in HEADER_FIELDS))
+            fields["checksum"] = crc32c(blank + table + errors)
+        return HEADER.pack(*(fields[name] for name in HEADER_FIELDS)) + table + errors + contents
+
+    def with_header(self, **fields) -> Draft:
+        return replace(self, header=self.header | fields)
+
+    def index(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> int:
+        return next(i for i,
+                    e in enumerate(self.entries) if (e.kind, e.level, e.segment) == (kind, level, segment))
+
+    def content(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> bytes:
+        return self.entries[self.index(kind, level, segment)].content
+
+    def change(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0, **fields) -> Draft:
+        """Another content, or another entry in the table, of one chunk."""
+        i = self.index(kind, level, segment)
+        return replace(self,
+                       entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1:]))
+
+    def without(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> Draft:
+        i = self.index(kind, level, segment)
+        return replace(self, entries=self.entries[:i] + self.entries[i + 1:])
+
+    def add(self, *entries: Entry, sort: bool = True) -> Draft:
+        together = [*self.entries, *entries]
+        return replace(self, entries=tuple(sorted(together, key=lambda e: e.key) if sort else together))
+
+    def upto(self, level: int) -> Draft:
+        """Less the levels behind one."""
+        header = self.header | {"level_count": level + 1}
+        return replace(self, header=header, entries=tuple(
+            e for e in self.entries if e.key[0] != 1 or e.level <= level))
+
+
+# ---- plants ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Stem:
+    """A branch: parent (-1: a root), vertices, place of its attach vertex on the parent's stem."""
+
+    parent: int
+    count: int
+    place: int = 0
+    flags: int = 0
+    lag: int = 1
+
+
+def hierarchy_script(stems: list[Stem], branch_source: list | None = None,
+                     vertex_source: list | None = None) -> list:
+    script, lag = [], 0
+    for b, stem in enumerate(stems):
+        up, ancestor = 0, b - 1
+        while ancestor != stem.parent:
+            up, ancestor = up + 1, stems[ancestor].parent
+        script += [up] if b > 0 else []
+        script += [stem.count - 1, stem.flags & 1, stem.flags >> 1 & 1, stem.flags >> 2 & 1, stem.lag - lag]
+        lag = stem.lag
+    last_place = [0] * len(stems)
+    for stem in stems:
+        if stem.parent >= 0:
+            script.append(stem.place - last_place[stem.parent])
+            last_place[stem.parent] = stem.place
+    return script + permutation_script(branch_source, stems, False) + permutation_script(vertex_source, stems,
+        True,
+                                                                                        branch_source)
+
+
+def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
+    """None: as expected."""
+    if source is None:
+        return [0]
+    runs = [(0, len(stems))]
+    if of_vertices:
+        order = branch_source or list(range(len(stems)))
+        starts, start = {}, 0
+        for b in sorted(range(len(stems)), key=lambda b: order[b]):
+            starts[b], start = start, start + stems[b].count
+        runs = [(starts[b], stem.count) for b, stem in enumerate(stems)]
+    script, numbers = [1], iter(source)
+    for expected, length in runs:
+        for _ in range(length):
+            value = next(numbers)
+            script.append(value - expected)
+            expected = value + 1
+    return script
+
+
+def rest_script(branches: list, points: list) -> list:
+    """Steps to whole-numbered positions, for stems whose Lag is not 0."""
+    script = []
+    for branch in branches:
+        for i in range(branch.count):
+            predicted = rd.predict_rest(branch, points, i)
+            script += [int(points[branch.first + i][k] - predicted[k]) for k in range(3)]
+    return script
+
+
+def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
+    """Whole-numbered positions of stems that wander at random."""
+    random, points, first = np.random.default_rng(seed), [], []
+    for stem in stems:
+        first.append(len(points))
+        at = np.zeros(3) if stem.parent < 0 else np.array(points[first[stem.parent] + stem.place])
+        for step in random.integers(-1, size, (stem.count, 3)):
+            at = at + step
+            points.append(at.astype(float).tolist())
+    return points
+
+
+def hierarchy_chunk(stream: bytes, epsilon: float = 0.5, xi: float = 0.25, eta: int = 3,
+                    lam: int = 1) -> bytes:
+    return struct.pack("<ffII", epsilon, xi, eta, lam) + stream
+
+
+def rest_chunk(stream: bytes, *, exact: int = 0, wide: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25,
+               reserved: int = 0) -> bytes:
+    return struct.pack("<BBH3dd", exact, wide, reserved, *origin, step) + stream
+
+
+def steady_time(first: float = 0.0, step: float = 0.25, method: int = 0) -> bytes:
+    return struct.pack("<Bdd", method, first, step)
+
+
+def uneven_time(*times: float | tuple) -> bytes:
+    return b"\2" + write(rd.decode_times, list(times), len(times))
+
+
+def stems_head(step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0,
+               basis: bytes = b"") -> bytes:
+    head = struct.pack("<fBBH", step, rotation, bits, rank)
+    return head + struct.pack("<I", len(basis)) + basis if bits else head
+
+
+def basis_stream(rows: list[list[int]], bits: int) -> bytes:
+    """A learned basis over time of these integers."""
+    script = []
+    for integers in rows:
+        before = slope = 0
+        for t, value in enumerate(integers):
+            script.append(value - before - slope)
+            slope, before = value - before if t > 0 else 0, value
+    return write(rd.decode_temporal, script, len(rows), len(rows[0]), bits)
+
+
+@dataclass
+class Plant:
+    """A file of scripts, by (kind, level, segment) or (kind, level). Streams that have none hold empty
+    rows."""
+
+    stems: list[Stem]
+    frames: int = 1
+    segments: int = 1
+    points: list | None = None  # whole numbers of Rest_Step; None: `grown`
+    rest: bytes | None = None  # REST
+    time: bytes | None = None  # TIME
+    branch_source: list | None = None
+    vertex_source: list | None = None
+    wide: bool = False
+    scripts: dict = field(default_factory=dict)
+    heads: dict = field(default_factory=dict)  # of STEMS
+    default_head: bytes = stems_head()
+    origin: tuple = (0.0, 0.0, 0.0)
+    step: float = 0.25
+
+    def draft(self) -> Draft:
+        vertices = sum(stem.count for stem in self.stems)
+        stream = write(rd.decode_hierarchy,
+                       hierarchy_script(self.stems, self.branch_source, self.vertex_source),
+                       len(self.stems), vertices)
+        branches, *_ = rd.decode_hierarchy(stream, len(self.stems), vertices)
+        self.plan = rd.Plan(branches)
+        rest = self._rest(branches)
+        self._set_rest(branches, rest)
+        entries = [Entry(rd.HIERARCHY, hierarchy_chunk(stream)), Entry(rd.REST, rest),
+                   Entry(rd.TIME, self.time or steady_time())]
+        self.shapes: dict = {}
+        for level in range(self.plan.height + 2):
+            if (rd.SHAPES, level, 0) in self.scripts:
+                entries.append(Entry(rd.SHAPES, self._shapes(level), level))
+        for s in range(self.segments):
+            entries += self._segment(s)
+        entries.sort(key=lambda entry: entry.key)
+        levels = self.plan.height + 2
+        return Draft(dict(vertex_count=vertices, branch_count=len(self.stems), frame_count=self.frames,
+                          segment_count=self.segments, level_count=levels, full_level_count=levels,
+                          flags=int(self.wide)), tuple(entries))
+
+    def file(self) -> bytes:
+        return self.draft().file()
+
+    def _rest(self, branches: list) -> bytes:
+        if self.rest is not None:
+            return self.rest
+        points = grown(self.stems) if self.points is None else self.points
+        script = rest_script(branches, points)
+        return rest_chunk(write(rd.decode_rest, script, branches, 1.0), origin=self.origin, step=self.step,
+                          wide=int(self.wide))
+
+    def _set_rest(self, branches: list, chunk: bytes) -> None:
+        origin = np.array(struct.unpack_from("<3d", chunk, 4))
+        with np.errstate(all="ignore"):
+            if chunk[0]:
+                self.plan.rest = np.array(rd.decode_exact_rest(chunk[36:], branches, bool(chunk[1]))) - origin
+            else:
+                self.plan.rest = np.array(rd.decode_rest(chunk[36:], branches, rd.f64(chunk, 28)))
+
+    def _shapes(self, level: int) -> bytes:
+        """By its script. What it holds counts for the streams of STEMS."""
+        motion = rd.Motion(1, rd.cosine_waves(1), shapes=self.shapes)
+        return write(rd.decode_shapes, self.scripts[rd.SHAPES, level, 0], self.plan, motion, level)
+
+    def _segment(self, s: int) -> list[Entry]:
+        frames = self.frames * (s + 1) // self.segments - self.frames * s // self.segments
+        motion = rd.Motion(frames, rd.cosine_waves(frames), shapes=self.shapes)
+        entries = []
+        for level in range(self.plan.height + 2):
+            if self.plan.has_stems(level):
+                head = self.heads.get((level, s), self.heads.get(level, self.default_head))
+                rd.read_stems_head(head, motion, level)
+                stream = self._write(rd.decode_stems, (rd.STEMS, level, s), self.plan, motion, level)
+                entries.append(Entry(rd.STEMS, head + stream, level, s))
+            if self.plan.has_affines(level, level):
+                stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), self.plan, motion, level)
+                entries.append(Entry(rd.AFFINES, stream, level, s))
+        place = (rd.CORRECTIONS, self.plan.height + 1, s)
+        if place in self.scripts or place[:2] in self.scripts:
+            stream = self._write(rd.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
+            entries.append(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
+        return entries
+
+    def _write(self, function: Callable, place: tuple, *arguments) -> bytes:
+        script = self.scripts.get(place, self.scripts.get(place[:2], []))
+        return write(function, script() if callable(script) else script, *arguments)

@@ -1,0 +1,168 @@
+"""The vectors of spec/vectors: whole, of every rule, and decoded as expected.txt says by the C core, the WebAssembly
+decoder and the reference decoder; and the program that tests the decoders of others."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
+
+from athcodec import container, errors  # noqa: E402
+from spec import conformance, make_vectors  # noqa: E402
+
+VECTORS = conformance.vectors()
+
+
+def run(*words, code: int = 0) -> str:
+    """What the program prints."""
+    done = subprocess.run([sys.executable, "-m", "spec.conformance", *map(str, words)], cwd=ROOT, text=True,
+                          capture_output=True, timeout=120)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout
+
+
+# ---- the files -----------------------------------------------------------------------------------------------
+
+
+def test_every_file_is_listed_once_and_has_not_changed():
+    """Vectors are added, never changed: a file that no longer fits its line is a mistake."""
+    files = {str(path.relative_to(conformance.FOLDER)) for path in conformance.FOLDER.rglob("*.ath")}
+    assert sorted(vector.name for vector in VECTORS) == sorted(files)
+    for vector in VECTORS:
+        assert f"{container.crc32c(vector.path.read_bytes()):08x}" == vector.checksum, vector.name
+
+
+def test_there_are_many_and_they_are_small():
+    sizes = [vector.path.stat().st_size for vector in VECTORS]
+    assert sum(vector.valid for vector in VECTORS) >= 40 and sum(not vector.valid for vector in VECTORS) >= 40
+    assert sum(sizes) < 1 << 20 and sorted(sizes)[len(sizes) * 9 // 10] < 2048
+
+
+def test_valid_files_are_wholly_valid_and_invalid_ones_are_not():
+    for vector in VECTORS:
+        wrong = [result for result in vector.results.values() if result in conformance.ERRORS]
+        assert bool(wrong) != vector.valid, vector.name
+        assert {"strict", "open"} <= set(vector.results) and len(vector.reason) > 5
+
+
+def test_every_error_has_a_vector():
+    """But INVALID, which nothing has to say."""
+    seen = {result for vector in VECTORS for result in vector.results.values()} & set(conformance.ERRORS)
+    names = {each.name for each in (errors.FormatError, *errors.FormatError.__subclasses__())}
+    assert set(conformance.ERRORS) == names and seen == names - {"INVALID"}
+
+
+def test_every_kind_of_chunk_is_in_one_valid_file():
+    """And chunks that are to be skipped."""
+    with container_of("valid/everything.ath") as file:
+        opened = container.Container(file, strict=True)
+        assert {chunk.kind for chunk in opened.chunks} == set(container.KIND_NAMES)
+        assert opened.header.chunk_count > len(opened.chunks) and opened.header.wide
+
+
+def container_of(name: str):
+    return (conformance.FOLDER / name).open("rb")
+
+
+def test_every_field_has_a_vector_that_breaks_its_range():
+    """By the field tables of FORMAT.md. What has no range of its own has no vector."""
+    text = (ROOT / "FORMAT.md").read_text("utf-8")
+    rows = re.findall(r"^\| [^|]+ \| [^|]+ \| ([A-Z]\w+) \| [^|]+ \| ([^|]+) \| ([A-Z_]+) \|$", text, re.M)
+    fields = {name for name, _, error in rows if error}
+    reasons = " ".join(vector.reason for vector in VECTORS if not vector.valid)
+    streams = {name for name in fields if name.endswith(("_Stream", "_Body"))} | {"Text", "Head"}
+    unnamed = {"Kind", "Length", "Checksum", "Clip", "Level", "Segment"}  # their vectors are the table-... ones
+    missing = {name for name in fields - streams - unnamed if name not in reasons}
+    assert missing == set()
+
+
+def test_scripts_still_make_the_very_same_files():
+    """How they were made stays true."""
+    for vector in make_vectors.VECTORS:
+        if vector.scripted:
+            assert vector.make() == (conformance.FOLDER / vector.path).read_bytes(), vector.path
+
+
+def test_what_is_there_is_left_alone(tmp_path):
+    folder = tmp_path / "vectors"
+    kept, listed = "valid/smallest.ath 00000000 strict=ok # an older one", folder / "expected.txt"
+    (folder / "valid").mkdir(parents=True)
+    (folder / "valid/smallest.ath").write_bytes(b"older")
+    others = "\n".join(f"{vector.path} 00000000 # there" for vector in make_vectors.VECTORS if vector.name not in
+                       ("smallest", "smallest-wide"))
+    listed.write_text(f"# head\n{kept}\n{others}\n")
+    assert make_vectors.make(folder=folder) == 1
+    assert (folder / "valid/smallest.ath").read_bytes() == b"older" and kept in listed.read_text()
+    assert (folder / "valid/smallest-wide.ath").exists() and "valid/smallest-wide.ath" in listed.read_text()
+
+
+# ---- the decoders of this repository ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", conformance.OWN)
+def test_own_decoders_say_what_is_expected(name):
+    own = conformance.OWN[name]
+    if name == "wasm" and conformance.shutil.which("node") is None:
+        pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
+    assert list(conformance.failures(own.decoder, VECTORS, own.without)) == []
+
+
+# ---- the decoders of others ------------------------------------------------------------------------------------
+
+REFERENCE = [sys.executable, str(ROOT / "spec" / "reference_decoder.py"), "--raw"]
+
+
+def decoder_that(tmp_path, body: str) -> list[str]:
+    """A program that asks the reference decoder, and then does something of its own with `data` or `error`."""
+    script = tmp_path / "decoder.py"
+    script.write_text(f"""
+import sys, subprocess, os
+done = subprocess.run({REFERENCE!r} + sys.argv[1:], capture_output=True)
+item, data, error = sys.argv[2], done.stdout, done.stderr
+{body}
+sys.stdout.buffer.write(data)
+sys.stderr.buffer.write(error)
+sys.exit(done.returncode)
+""")
+    return [sys.executable, str(script)]
+
+
+def test_a_program_that_decodes_well_passes(tmp_path):
+    assert "1 vectors, 0 wrong" in run("--only", "invalid/cut-in-attributes.ath", *REFERENCE)
+
+
+@pytest.mark.parametrize("body, only, complaint", [
+    ("data = bytes([data[0] ^ 1]) + data[1:] if item == '1' else data", "valid/all-at-origin.ath", "1: got "),
+    ("error = error.replace(b'BAD_CHUNK', b'BAD_HEADER')", "invalid/time-equal.ath",
+     "got BAD_HEADER; expected BAD_CHUNK"),
+    ("error = b''", "invalid/time-equal.ath", "exit status 1 and no error's name"),
+    ("done.returncode = 0", "invalid/time-equal.ath", "open: got ok; expected BAD_CHUNK"),
+    ("os.abort()", "valid/all-at-origin.ath", "exit status -6 and no error's name"),
+    ("data = b''", "valid/all-at-origin.ath", "0: got 00000000"),
+], ids=["other bits", "another error", "no error's name", "no error", "a crash", "nothing"])
+def test_a_program_that_does_not_is_told_what_is_wrong(body, only, complaint, tmp_path):
+    printed = run("--only", only, *decoder_that(tmp_path, body), code=1)
+    assert complaint in printed and only in printed and "0 wrong" not in printed
+
+
+def test_what_a_decoder_leaves_out_is_not_asked_for(tmp_path):
+    broken = decoder_that(tmp_path, "if item in ('static', 'strict'): os.abort()")
+    left_out = ["--without", "static", "--without", "strict", "--without", "levels"]
+    assert "0 wrong" in run("--only", "valid/all-at-origin.ath", *left_out, *broken)
+
+
+def test_a_nan_is_a_nan_whatever_its_bits():
+    data = (conformance.FOLDER / "valid/not-a-number.ath").read_bytes()
+    quiet, other = bytes.fromhex("0000c07f"), bytes.fromhex("0100a0ff")
+    assert conformance.checksum_of(data, "1", quiet) == conformance.checksum_of(data, "1", other)
+    assert conformance.checksum_of(data, "static", quiet) != conformance.checksum_of(data, "static", other)
+
+
+def test_no_vector_at_all_is_a_failure():
+    assert "0 vectors" in run("--only", "no such name", "--own", "reference", code=1)
