@@ -384,8 +384,8 @@ FUTURE = b"from the future"
 valid("unknown-optional",
       "optional kinds that are not known, in every place where they may stand, some twice",
       lambda: fork().add(
-          Entry(0x8000, FUTURE), Entry(0x8007, FUTURE), Entry(0x800F, b""), Entry(0x8014, FUTURE, 0, 1),
-          Entry(0x8014, FUTURE, 1, 1), Entry(0x801F, FUTURE, 1, 1), Entry(0x801F, b"", 2, 0),
+          Entry(0x8000, FUTURE), Entry(0x8007, FUTURE), Entry(0x800F, b""), Entry(0x8015, FUTURE, 0, 1),
+          Entry(0x8015, FUTURE, 1, 1), Entry(0x801F, FUTURE, 1, 1), Entry(0x801F, b"", 2, 0),
           Entry(0x8021, FUTURE),
           Entry(0x8021, FUTURE), Entry(0xFFFF, FUTURE), Entry(0xFFFF, b"")))
 valid("unknown-optional-damaged", "what is skipped is not read: its Checksum does not fit",
@@ -607,27 +607,30 @@ def encoded(name: str) -> bytes:
     stems = {"encoded-tree": [Stem(-1, 9), Stem(0, 6, 4), Stem(1, 5, 3), Stem(0, 5, 8), Stem(3, 3, 2)],
              "encoded-wide": [Stem(-1, 5), Stem(0, 4, 3)],
              "encoded-exact-rest": [Stem(-1, 4), Stem(0, 3, 1), Stem(-1, 2)],
-             "encoded-noise": [Stem(-1, 4), Stem(0, 3, 2)]}[name]
+             "encoded-noise": [Stem(-1, 4), Stem(0, 3, 2)],
+             "encoded-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
+             "encoded-lossless-wide": [Stem(-1, 3), Stem(0, 2, 1)]}[name]
     random = np.random.default_rng(7)
     rest = np.array(grown(stems, 7)) * 0.1
     lift = np.linalg.norm(rest - rest[0], axis=1)[:, None]
     swing = np.sin(np.linspace(0, 6, 40)[:, None, None] * [1.0, 2.0, 3.0] + 2 * lift) * lift**2 * 0.05
     noise = random.normal(size=(40, *rest.shape)) * (0.1 if name == "encoded-noise" else 1e-4)
-    clip = MotionClip(positions=(rest + swing + noise).astype(np.float64 if name == "encoded-wide"
-                                                              else np.float32),
+    clip = MotionClip(positions=(rest + swing + noise).astype(np.float64 if "wide" in name else np.float32),
                       rest=rest, time=np.arange(40) / 30,
                       vertex_branch=np.repeat(np.arange(len(stems)), [s.count for s in stems]),
                       branch_parent=np.array([s.parent for s in stems]), metadata={"unit": "m"})
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "clip.ath"
         athcodec.encode(clip, target, rel_error=2e-3, segment_frames=20,
-                        exact_rest=name == "encoded-exact-rest")
+                        exact_rest=name == "encoded-exact-rest", lossless="lossless" in name)
         return target.read_bytes()
 
 
 for each, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "binary64 positions"),
                   ("encoded-exact-rest", "a rest pose bit for bit"),
-                  ("encoded-noise", "vertices that follow no plant")):
+                  ("encoded-noise", "vertices that follow no plant"),
+                  ("encoded-lossless", "every bit of the source at the last level"),
+                  ("encoded-lossless-wide", "every bit of binary64 positions at the last level")):
     valid(each, f"what athcodec wrote: {why}", lambda each=each: encoded(each), scripted=False)
 
 
@@ -687,7 +690,8 @@ header("levels-0", "BAD_HEADER", "Level_Count 0", level_count=0)
 header("levels-more-than-full", "BAD_HEADER", "Level_Count above Full_Level_Count", level_count=3)
 header("full-levels-1", "BAD_HEADER", "Full_Level_Count 1", level_count=1, full_level_count=1)
 header("full-levels-33", "BAD_HEADER", "Full_Level_Count 33", full_level_count=33)
-header("full-levels-not-those", "BAD_HEADER", "Full_Level_Count 3, the hierarchy has 2", full_level_count=3)
+header("full-levels-not-those", "BAD_HEADER", "Full_Level_Count 4, the hierarchy has 2, or 3 with EXACT",
+       full_level_count=4)
 invalid("header-full-levels-less", "BAD_HEADER", "open", "Full_Level_Count 2, the hierarchy has 3",
         lambda: fork().upto(1).with_header(full_level_count=2))
 invalid("hierarchy-31-deep", "BAD_HEADER", "open",
@@ -762,7 +766,7 @@ def inserted(at: int, entry: Entry) -> Draft:
     return replace(draft, entries=(*draft.entries[:at], entry, *draft.entries[at:]))
 
 
-for kind, level, why in ((0x0000, 255, "kind 0"), (0x0007, 255, "in the prelude"), (0x0014, 0, "of motion"),
+for kind, level, why in ((0x0000, 255, "kind 0"), (0x0007, 255, "in the prelude"), (0x0015, 0, "of motion"),
                          (0x0021, 255, "behind the motion"), (0x7FFF, 255, "the last one")):
     table(f"unknown-{kind:04x}", "UNKNOWN_CHUNK", f"a required kind that is not known, {why}",
           lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)))
@@ -787,7 +791,7 @@ table("segment-beyond", "BAD_CHUNK_TABLE", "a motion chunk of a segment that is 
 table("unknown-with-level", "BAD_CHUNK_TABLE", "an unknown optional kind of the prelude with Level 0",
       lambda: fork().add(Entry(0x8009, b"", 0)))
 table("unknown-without-level", "BAD_CHUNK_TABLE", "an unknown optional motion kind with Level 255",
-      lambda: fork().add(Entry(0x8014, b"")))
+      lambda: fork().add(Entry(0x8015, b"")))
 table("unknown-segment", "BAD_CHUNK_TABLE", "an unknown optional kind behind the motion with Segment 1",
       lambda: fork().add(Entry(0x8021, b"", segment=1)))
 table("order-prelude", "BAD_CHUNK_TABLE", "REST before HIERARCHY", lambda: swapped(0, 1))
@@ -797,7 +801,7 @@ table("order-segments", "BAD_CHUNK_TABLE", "segment 1 before segment 0", lambda:
 table("order-kinds", "BAD_CHUNK_TABLE", "SHAPES before STEMS", lambda: swapped(5, 6))
 table("order-optional", "BAD_CHUNK_TABLE",
       "an unknown optional motion kind before the known ones of its level: bit 15 counts",
-      lambda: inserted(3, Entry(0x8014, b"", 0, 0)))
+      lambda: inserted(3, Entry(0x8015, b"", 0, 0)))
 table("order-attributes", "BAD_CHUNK_TABLE", "ATTRIBUTE before the motion",
       lambda: inserted(3, Entry(rd.ATTRIBUTE, element("|u1", b"a"))))
 table("order-behind", "BAD_CHUNK_TABLE", "METADATA behind the motion",
@@ -810,7 +814,7 @@ table("twice-stems", "BAD_CHUNK_TABLE", "STEMS of a level and segment twice",
 table("twice-unknown", "BAD_CHUNK_TABLE", "an unknown optional kind of the prelude twice",
       lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")))
 table("twice-unknown-motion", "BAD_CHUNK_TABLE", "an unknown optional motion kind twice",
-      lambda: fork().add(Entry(0x8014, b"", 0, 0), Entry(0x8014, b"", 0, 0)))
+      lambda: fork().add(Entry(0x8015, b"", 0, 0), Entry(0x8015, b"", 0, 0)))
 table("length-limit", "LIMIT_EXCEEDED", "a chunk of 2^28 + 1 bytes",
       lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)).with_header(file_length=1 << 30))
 table("length-limit-of-unknown", "UNKNOWN_CHUNK", "the Kind is checked before the Length",
@@ -1128,6 +1132,21 @@ invalid("shapes-too-many-at-last", "BAD_CHUNK", 1, "a level adds more shapes tha
         lambda: Plant(
     [Stem(-1, 3)],
     scripts={(rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rd.SHAPES, 1, 0): [4]}))
+
+
+def lossless(first: bytes = b"") -> Draft:
+    """A level behind the others, its streams empty."""
+    return fork().with_header(level_count=4, full_level_count=4).add(
+        Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
+
+
+table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT", lambda: lossless().without(rd.EXACT, 3, 1))
+table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"", 2, 0)))
+table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2", lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
+table("exact-with-corrections", "BAD_CHUNK_TABLE", "CORRECTIONS at level h + 2",
+      lambda: lossless().add(Entry(rd.CORRECTIONS, b"", 3, 0)))
+valid("exact-empty", "EXACT without bytes: differences of 32 bits, all of them ones", lossless)
+invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400))
 
 
 def corrections(step: float) -> Callable[[], bytes]:

@@ -98,11 +98,12 @@ SEGMENT_FRAMES, MOST_LEVELS, NO_LEVEL = 256, 32, 255
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
-STEMS, AFFINES, CORRECTIONS, SHAPES = 16, 17, 18, 19
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
 ATTRIBUTE = OPTIONAL | 32
 KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES",
          EDGES: "EDGES",
          STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
+         EXACT: "EXACT",
          ATTRIBUTE: "ATTRIBUTE"}
 
 
@@ -586,6 +587,18 @@ def decode_exact_rest(stream: bytes, branches: list[Branch], wide: bool) -> list
             rest.append(point)
     coder.finish()
     return rest
+
+
+def decode_exact(stream: bytes, positions: np.ndarray) -> np.ndarray:
+    """The source's own (vertices, 3, frames), from those of the level before."""
+    coder, model, before, exact = RangeDecoder(stream), ExactModel(), [0, 0, 0], positions.copy()
+    n = 8 * positions.itemsize
+    for v in range(positions.shape[0]):
+        for t in range(positions.shape[2]):
+            for k in range(3):
+                exact[v, k, t], before[k] = code_exact(coder, model, n, float(positions[v, k, t]), before[k])
+    coder.finish()
+    return exact
 
 
 def decode_times(stream: bytes, frame_count: int) -> list[float]:
@@ -1689,7 +1702,7 @@ class AthFile:
         deepest = max(branch.depth for branch in self.branches)
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
         self.plan = Plan(self.branches)
-        require(self.plan.height + 2 == self.header.full_level_count,
+        require(self.header.full_level_count - self.plan.height in (2, 3),
                 "Full_Level_Count is not that of the hierarchy",
                 "BAD_HEADER")
 
@@ -1700,6 +1713,7 @@ class AthFile:
             for s in range(self.header.segment_count):
                 wanted |= {(STEMS, level, s)} if plan.has_stems(level) else set()
                 wanted |= {(AFFINES, level, s)} if plan.has_affines(level, level) else set()
+                wanted |= {(EXACT, level, s)} if level == plan.height + 2 else set()
                 allowed |= {(CORRECTIONS, level, s)} if level == plan.height + 1 else set()
             allowed |= {(SHAPES, level, 0)} if plan.has_stems(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
@@ -1765,14 +1779,15 @@ class AthFile:
         motion = self._motion(s, stop - start, level)
         placed = Pose(self.plan, motion, level).placed
         positions = (placed + self.origin[:, None]).astype(self.position_type)
-        if self.find(CORRECTIONS, level, s):
-            chunk = self.content(CORRECTIONS, level, s)
+        last = self.plan.height + 1
+        if level >= last and self.find(CORRECTIONS, last, s):
+            chunk = self.content(CORRECTIONS, last, s)
             require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0,
                     "Correction_Step is not above 0")
             q = decode_corrections(chunk[4:], self.header.vertex_count, motion.frames)
             corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
             positions = np.where(q != 0, corrected, positions)
-        return positions
+        return decode_exact(self.content(EXACT, level, s), positions) if level > last else positions
 
     def _motion(self, s: int, frames: int, level: int) -> Motion:
         """All integers that playing a segment at a level takes."""

@@ -116,6 +116,12 @@ def test_uneven_times_and_static_data_have_the_same_bits(forked_clip, tmp_path):
 # ---- what no encoder writes ----
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lossless_files_have_the_same_bits(dtype, tmp_path):
+    clip = plant(seed=9, branches=5, frames=20, dtype=dtype)
+    assert_same_bits(encoded(clip, tmp_path, rel_error=1e-3, lossless=True, segment_frames=16))
+
+
 @pytest.mark.parametrize("seed, wide, exact", [(1, False, None), (4, True, np.float64)])
 def test_every_feature_has_the_same_bits(seed, wide, exact):
     assert_same_bits(HandMade(seed, wide, exact).file())
