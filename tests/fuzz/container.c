@@ -35,9 +35,9 @@ static void open_it(const uint8_t *bytes, size_t size, const ath_limits *limits)
         const ath_chunk *chunk = ath_chunks(opened.file) + i;
         REQUIRE(chunk->offset == end, "chunks follow each other without gaps");
         end += chunk->length;
-        const uint8_t *chunk_end = chunk->bytes + chunk->length;
         if (chunk->bytes && chunk->length)
-            REQUIRE(chunk->bytes >= bytes && chunk_end <= bytes + size, "chunks are bytes of the file");
+            REQUIRE(chunk->bytes >= bytes && chunk->bytes + chunk->length <= bytes + size,
+                    "chunks are bytes of the file");
     }
     REQUIRE(end == info.file_length, "chunks end where the file does");
     fuzz_close(&opened);

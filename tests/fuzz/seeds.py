@@ -22,6 +22,8 @@ from files import Parts, basis_chunk, roots, still_file
 from plants import awkward, bush, clip_of, plant, tube
 
 CORPUS = Path(__file__).resolve().parent.parent / "corpus"
+VECTORS = CORPUS.parent.parent / "spec" / "vectors" / "valid"
+MANY_FEATURES = ("everything", "exact-empty", "shapes*", "encoded-*")  # of the vectors; the others try one rule each
 LARGEST = 64 << 10
 OPTIONS = 16
 """Bytes behind a file that tell a target how to use it (harness.h)."""
@@ -59,6 +61,11 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
     "bush": (lambda: bush(25, frames=5), {"rel_error": 1e-2}),
     "still": (lambda: awkward(9, branches=4, motion="static"), {"rel_error": 1e-2}),
     "point": (_point, {"max_error": 0.01}),
+    "shapes": (lambda: plant(seed=11, branches=5, longest=9, frames=32, rough=0.0),
+               {"rel_error": 1e-5, "segment_frames": 16, "effort": "default"}),
+    "lossless": (lambda: plant(seed=12, branches=4, longest=4, frames=18), {"rel_error": 1e-2, "lossless": True}),
+    "wide_lossless": (lambda: plant(seed=13, branches=3, longest=3, frames=5, dtype=np.float64),
+                      {"rel_error": 1e-2, "lossless": True}),
     "frames_256": (lambda: plant(seed=10, branches=2, longest=3, frames=257), {"rel_error": 1e-1}),
 }
 
@@ -85,6 +92,7 @@ def valid_files() -> dict[str, bytes]:
             files[seed] = _bytes_of(make(), folder, **options)
         with read_hdf5(sample_path()) as clip:
             files["sample"] = _bytes_of(clip, folder, rel_error=1e-2)
+        files |= {path.stem: path.read_bytes() for name in MANY_FEATURES for path in VECTORS.glob(name + ".ath")}
         files["cut_to_a_level"] = _truncated(files["full"], folder, 1)
     parts = Parts.of(files["full"])
     unknown = ct.Chunk(0x8009, ct.NO_LEVEL, 0, 0, 0), b"from the future"
