@@ -1775,6 +1775,8 @@ class AthFile:
 
     def _segment(self, s: int, level: int) -> np.ndarray:
         """(vertices, 3, frames) in file order."""
+        for chunk in self._needed(s, level):
+            require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
         start, stop = self.header.segment(s)
         motion = self._motion(s, stop - start, level)
         placed = Pose(self.plan, motion, level).placed
@@ -1788,6 +1790,14 @@ class AthFile:
             corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
             positions = np.where(q != 0, corrected, positions)
         return decode_exact(self.content(EXACT, level, s), positions) if level > last else positions
+
+    def _needed(self, s: int, level: int) -> list[Chunk]:
+        """Chunks that playing a segment at a level takes."""
+        places = [(CORRECTIONS, level, s)]
+        for d in range(level + 1):
+            places += [(SHAPES, d, 0), (STEMS, d, s)]
+            places += [(AFFINES, d, s)] if self.plan.has_affines(d, level) else []
+        return [self._places[place] for place in places if place in self._places]
 
     def _motion(self, s: int, frames: int, level: int) -> Motion:
         """All integers that playing a segment at a level takes."""

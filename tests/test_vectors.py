@@ -157,6 +157,13 @@ def test_what_a_decoder_leaves_out_is_not_asked_for(tmp_path):
     assert "0 wrong" in run("--only", "valid/all-at-origin.ath", *left_out, *broken)
 
 
+def test_limits_of_a_decoder_s_own_can_be_left_out(tmp_path):
+    unlimited = decoder_that(tmp_path, "if b'LIMIT_EXCEEDED' in error: error, done.returncode = b'', 0")
+    chosen = ["--only", "invalid/header-vertices-limit.ath"]
+    assert "got ok; expected LIMIT_EXCEEDED" in run(*chosen, *unlimited, code=1)
+    assert "0 wrong" in run("--without", "limits", *chosen, *unlimited)
+
+
 def test_a_nan_is_a_nan_whatever_its_bits():
     data = (conformance.FOLDER / "valid/not-a-number.ath").read_bytes()
     quiet, other = bytes.fromhex("0000c07f"), bytes.fromhex("0100a0ff")
