@@ -17,8 +17,8 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
                 derived edges as if they were stored
 
 Where a level or a chunk has not arrived, asking for it is TRUNCATED. A decoder that leaves out static data or
-the strict mode, or has other limits than FORMAT.md, is tested with --without. The exit status is 0 where nothing
-was wrong.
+the strict mode, or has other limits than FORMAT.md, is tested with --without. The exit status is 0 where
+nothing was wrong.
 """
 
 from __future__ import annotations
@@ -49,11 +49,10 @@ ERRORS = ("INVALID", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED", "BAD
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
 LISTING = """\
-Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, then ITEM=RESULT for each item that
-conformance.py describes, then # and the reason.
-RESULT is ok, the name of an error, or the CRC-32C of the answer, in which every NaN is the quiet one
-(0x7fc00000 or
-0x7ff8000000000000). Lines and files are only ever added.
+Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, ITEM=RESULT for each item that
+conformance.py describes, then # and the reason. RESULT is ok, the name of an error, or the CRC-32C of the
+answer, in which every NaN is the quiet one (0x7fc00000 or 0x7ff8000000000000). Lines and files are only ever
+added.
 """
 
 
@@ -328,7 +327,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
     parser.add_argument("--only", metavar="GLOB", default="*", help="files whose name in expected.txt fits")
     parser.add_argument("--without", metavar="ITEM", action="append", default=[],
-                        help="leave out what a decoder does not do: strict, open, levels, rest, time, static or "
+                        help="leave out what a decoder does not do: strict, open, levels, rest, time, static, "
                              "limits; again for more")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="DECODER-COMMAND")
     options = parser.parse_args(words)

@@ -336,8 +336,8 @@ def size_starts(c: int) -> list[int]:
 
 
 class NumberModel:
-    """Contexts of integers: of the bit length, by the class of the magnitude expected, and of the bits below the
-    leading one, by the length."""
+    """Contexts of integers: of the bit length, by the class of the magnitude expected, and of the bits below
+    the leading one, by the length."""
 
     def __init__(self):
         self.size = Contexts(size_starts)

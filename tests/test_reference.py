@@ -206,7 +206,8 @@ def test_it_needs_numpy_and_zstandard_alone():
     """Else it would not be a second decoder."""
     text = SOURCE.read_text(encoding="utf-8")
     imported = set(re.findall(r"^ *(?:import (\w+)|from (\w+) import)", text, re.M))
-    assert {name for pair in imported for name in pair if name} - sys.stdlib_module_names == {"numpy", "zstandard"}
+    names = {name for pair in imported for name in pair if name}
+    assert names - sys.stdlib_module_names == {"numpy", "zstandard"}
 
 
 def test_its_limits_are_those_of_the_package():

@@ -1,5 +1,5 @@
-"""The vectors of spec/vectors: whole, of every rule, and decoded as expected.txt says by the C core, the WebAssembly
-decoder and the reference decoder; and the program that tests the decoders of others."""
+"""The vectors of spec/vectors: whole, of every rule, and decoded as expected.txt says by the C core, the
+WebAssembly decoder and the reference decoder; and the program that tests the decoders of others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def run(*words, code: int = 0) -> str:
     return done.stdout
 
 
-# ---- the files -----------------------------------------------------------------------------------------------
+# ---- the files ---------------------------------------------------------------------------------------------
 
 
 def test_every_file_is_listed_once_and_has_not_changed():
@@ -77,7 +77,7 @@ def test_every_field_has_a_vector_that_breaks_its_range():
     fields = {name for name, _, error in rows if error}
     reasons = " ".join(vector.reason for vector in VECTORS if not vector.valid)
     streams = {name for name in fields if name.endswith(("_Stream", "_Body"))} | {"Text", "Head"}
-    unnamed = {"Kind", "Length", "Checksum", "Clip", "Level", "Segment"}  # their vectors are the table-... ones
+    unnamed = {"Kind", "Length", "Checksum", "Clip", "Level", "Segment"}  # theirs are the table-... vectors
     missing = {name for name in fields - streams - unnamed if name not in reasons}
     assert missing == set()
 
@@ -94,15 +94,15 @@ def test_what_is_there_is_left_alone(tmp_path):
     kept, listed = "valid/smallest.ath 00000000 strict=ok # an older one", folder / "expected.txt"
     (folder / "valid").mkdir(parents=True)
     (folder / "valid/smallest.ath").write_bytes(b"older")
-    others = "\n".join(f"{vector.path} 00000000 # there" for vector in make_vectors.VECTORS if vector.name not in
-                       ("smallest", "smallest-wide"))
+    others = "\n".join(f"{vector.path} 00000000 # there" for vector in make_vectors.VECTORS
+                       if vector.name not in ("smallest", "smallest-wide"))
     listed.write_text(f"# head\n{kept}\n{others}\n")
     assert make_vectors.make(folder=folder) == 1
     assert (folder / "valid/smallest.ath").read_bytes() == b"older" and kept in listed.read_text()
     assert (folder / "valid/smallest-wide.ath").exists() and "valid/smallest-wide.ath" in listed.read_text()
 
 
-# ---- the decoders of this repository ---------------------------------------------------------------------------
+# ---- the decoders of this repository -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", conformance.OWN)
@@ -113,13 +113,13 @@ def test_own_decoders_say_what_is_expected(name):
     assert list(conformance.failures(own.decoder, VECTORS, own.without)) == []
 
 
-# ---- the decoders of others ------------------------------------------------------------------------------------
+# ---- the decoders of others --------------------------------------------------------------------------------
 
 REFERENCE = [sys.executable, str(ROOT / "spec" / "reference_decoder.py"), "--raw"]
 
 
 def decoder_that(tmp_path, body: str) -> list[str]:
-    """A program that asks the reference decoder, and then does something of its own with `data` or `error`."""
+    """A program that asks the reference decoder, then does something of its own with `data` or `error`."""
     script = tmp_path / "decoder.py"
     script.write_text(f"""
 import sys, subprocess, os
