@@ -588,8 +588,8 @@ def everything() -> Draft:
         | {(rd.SHAPES, 1, 0): [2, *row((1, 2, -3), (0, 0, 9)), *row((5, 0, 0)), 1, *row((3, 1, 4)), 0, 0,
                                9, *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0)))],
            (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))]})
-    return plant.draft().add(
-        Entry(rd.METADATA, b"\1" + WIND_FRAME), Entry(rd.FACES, numbers(FACES_3)),
+    return plant.draft().with_header(level_count=6, full_level_count=6).add(
+        Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1), Entry(rd.METADATA, b"\1" + WIND_FRAME), Entry(rd.FACES, numbers(FACES_3)),
         Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
         Entry(0x8009, FUTURE), Entry(0x8015, FUTURE, 1, 1),
         Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
