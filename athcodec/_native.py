@@ -114,6 +114,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
+    "ath_mode_weights": (None, [c_int32, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
     "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), c_void_p, c_void_p, c_void_p,
                                     c_int32]),

@@ -25,6 +25,9 @@ from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
 
 
+FINER = 32  # times smaller than the step is that at which one learns
+
+
 def threads() -> int:
     """Segments that are worked on at once."""
     return min(4, os.cpu_count() or 1)
@@ -58,14 +61,21 @@ class Source:
         high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
         return float(np.linalg.norm(high - low))
 
-    def exact(self, segment: int) -> np.ndarray:
-        """(N, 3, T) positions of a segment, the very numbers of the clip."""
-        block = self.clip.block(*self.segments[segment])
+    def block(self, segment: int) -> np.ndarray:
+        """(T, N, 3) positions of a segment as the clip has them."""
+        return self.clip.block(*self.segments[segment])
+
+    def exact(self, block: np.ndarray) -> np.ndarray:
+        """(N, 3, T) of a block in file order, its very numbers."""
         return np.ascontiguousarray(block[:, self.hierarchy.vertex_source].transpose(1, 2, 0))
 
+    def relative(self, block: np.ndarray) -> np.ndarray:
+        """(N, 3, T) float64 of a block in file order, less the origin."""
+        return gather(block, self.hierarchy.vertex_source, self.origin)
+
     def positions(self, segment: int) -> np.ndarray:
-        """(N, 3, T) float64 positions of a segment."""
-        return gather(self.clip.block(*self.segments[segment]), self.hierarchy.vertex_source, self.origin)
+        """(N, 3, T) float64 positions of a segment, less the origin."""
+        return self.relative(self.block(segment))
 
 
 @dataclass(frozen=True)
@@ -178,9 +188,6 @@ def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
     tracks = segment.tracks[segment.plan.base_level == level]
     rows = np.concatenate([coefficients.reshape(-1, segment.frames), tracks.reshape(-1, segment.frames)])
     return rows[np.any(rows, axis=1)] @ segment.cosines
-
-
-FINER = 32
 
 
 def analyse_finely(shape: Shape, settings: Settings, positions: np.ndarray) -> SegmentMotion:

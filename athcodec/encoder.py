@@ -79,8 +79,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     bound that fits. segment_frames: longest segment, 16 to 256. tam: acceptance thresholds of the ATH (default: one map
     per frame stays within the bound). exact_rest: keep the rest pose bit for bit. lossless: one more level gives the
     positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. attributes: "none"
-    drops faces, edges and named
-    arrays. Raises ClipError, BoundError, ValueError, OSError.
+    drops faces, edges and named arrays. Raises ClipError, BoundError, ValueError, OSError.
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
     report = progress or (lambda stage, fraction: None)
@@ -190,9 +189,8 @@ class _Job:
         shape = Shape(self.source, ath, settings)
         shapes = search.shapes(shape.plan, settings)
         self._add_prelude(store, shape, ath)
-        if shapes is not None:
-            for level in shapes.levels(shape.plan).tolist():
-                store.add(ct.SHAPES, entropy.encode_shapes(shape.plan, shapes, level), level)
+        for level, stream in entropy.encode_shapes(shape.plan, shapes).items():
+            store.add(ct.SHAPES, stream, level)
         errors = self._add_motion(store, shape, settings, shapes)
         self._add_static(store)
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
@@ -238,8 +236,9 @@ class _Job:
             for index in range(count):
                 if len(pending) == threads():
                     self._collect(store, errors, index - len(pending), pending.popleft())
-                exact = self.source.exact(index) if self.lossless else None
-                pending.append(pool.submit(code_segment, shape, settings, self.source.positions(index), shapes, exact))
+                block = self.source.block(index)
+                exact = self.source.exact(block) if self.lossless else None
+                pending.append(pool.submit(code_segment, shape, settings, self.source.relative(block), shapes, exact))
             while pending:
                 self._collect(store, errors, count - len(pending), pending.popleft())
         return errors

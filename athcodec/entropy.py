@@ -48,12 +48,14 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
                          address(steps, np.int32, steps.size))
 
 
-def encode_shapes(plan: Plan, shapes: Shapes, level: int) -> bytes:
-    """Learned shapes of one level."""
-    return encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.shape,
-                         address(shapes.counts, np.int32, len(plan.pieces)),
-                         address(shapes.first, np.int64, len(plan.pieces)),
-                         address(shapes.integers, np.int32, shapes.integers.size), level)
+def encode_shapes(plan: Plan, shapes: Shapes | None) -> dict[int, bytes]:
+    """Learned shapes by level; nothing where there are none."""
+    if shapes is None:
+        return {}
+    arrays = (address(shapes.counts, np.int32, len(plan.pieces)), address(shapes.first, np.int64, len(plan.pieces)),
+              address(shapes.integers, np.int32, shapes.integers.size))
+    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.shape, *arrays, level)
+            for level in shapes.levels(plan).tolist()}
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:

@@ -97,10 +97,7 @@ class Search:
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
         levels = np.zeros(self.levels)
-        shape_bytes = 0
-        if shapes is not None:
-            shape_bytes = sum(len(entropy.encode_shapes(shape.plan, shapes, level))
-                              for level in shapes.levels(shape.plan).tolist())
+        shape_bytes = sum(map(len, entropy.encode_shapes(shape.plan, shapes).values()))
         for level, data in coded.stems.items():
             levels[level] = len(data)
         corrections = len(coded.correction_chunk)
@@ -187,7 +184,7 @@ class Search:
             if self.source.exact_rest:
                 break
             settings = self._walk(settings, "rest_step", rest_factor, qz.REST_CAP * settings.bound)
-            if settings == before:
+            if (settings.step, settings.rest_step) == (before.step, before.rest_step):
                 break
         return settings
 

@@ -76,11 +76,17 @@ def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
     return (slice(at, at + count) for at in range(0, len(pieces), count))
 
 
+def _mode_weights(flags: int) -> np.ndarray:
+    weights = np.empty(SHAPE_MODES)
+    lib.ath_mode_weights(flags, address(weights, np.float64, SHAPE_MODES))
+    return weights
+
+
 def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
     """Tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
     slots = plan.pieces["first"][pieces][:, None] + np.arange(size)
     steps = np.array([stream.step for stream in segment.streams])
-    weight = np.where(plan.pieces["flags"][pieces, None] & SHEET, 1.0, qz.MODE_STEPS[:size])
+    weight = np.where(plan.pieces["flags"][pieces, None] & SHEET, _mode_weights(SHEET), _mode_weights(0))[:, :size]
     scale = steps[plan.pieces["level"][pieces]][:, None] * weight
     rows = segment.coefficients[slots] * scale[:, :, None, None]
     return rows.reshape(len(pieces), 3 * size, segment.frames)

@@ -203,6 +203,5 @@ class _Again:
         if one_level:
             pieces["level"] = shape.plan.level_count - 1
         shapes = self._search.shapes(shape.plan, settings)
-        of_shapes = 0 if shapes is None else sum(
-            len(encode_shapes(shape.plan, shapes, level)) for level in shapes.levels(shape.plan).tolist())
+        of_shapes = sum(map(len, encode_shapes(shape.plan, shapes).values()))
         return of_shapes + sum(code_stems(shape, settings, positions, shapes).bytes for positions in self._positions)

@@ -680,8 +680,8 @@ class HandMade:
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)
         self.shapes = self._some_shapes()
-        for level in self.shapes.levels(self.plan).tolist():
-            self._add(container.SHAPES, entropy.encode_shapes(self.plan, self.shapes, level), level, 0)
+        for level, stream in entropy.encode_shapes(self.plan, self.shapes).items():
+            self._add(container.SHAPES, stream, level, 0)
 
     def _rows(self, *shape: int) -> np.ndarray:
         """Integers of all sizes, mostly small, with zeros at the high frequencies and whole rows of zeros."""

@@ -234,6 +234,11 @@ void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_int
         analyse_piece(shape, motion, integers, p, &scratch, source, dead_zone);
 }
 
+void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
+{
+    for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(flags, m);
+}
+
 /* Means over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of
  * e * w_r, track 3 the mean of e, `centre` the mean of w. */
 static void node_moments(const ath_shape *shape, const ath_node *node, int32_t T, const ath_scratch *scratch,

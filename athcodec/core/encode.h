@@ -62,6 +62,9 @@ ATH_ENCODER_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion 
 ATH_ENCODER_API void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t level,
                       const double origin[3], int wide, void *positions);
 
+/* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
+ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
+
 /* Largest distance and sum of squared distances between positions and source (plus origin). */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
                        const double origin[3], double *max_error, double *sum_squares);

@@ -118,14 +118,18 @@ ATH_INLINE int ath_is_shape_row(const ath_piece *piece, const ath_piece_rows *ro
     return rows->shape_count > 0 && r < ath_shape_modes(piece);
 }
 
-/* Modes of a cantilever are quantised finer the more of the motion they carry: what the first ones get wrong, the
- * pieces that hang on this one would have to code again. */
-ATH_INLINE double ath_row_step(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r)
+/* Steps of modes over that of their stream. Modes of a cantilever are quantised finer the more of the motion they carry:
+ * what the first ones get wrong, the pieces that hang on this one would have to code again. */
+ATH_INLINE double ath_mode_weight(int32_t flags, int32_t m)
 {
     static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
+    return flags & ATH_SHEET ? 1.0 : m < 4 ? weight[m] : 1.125;
+}
+
+ATH_INLINE double ath_row_step(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r)
+{
     double step = ath_mode_stream(motion, piece, r)->step;
-    if (ath_is_shape_row(piece, rows, r)) return 0.875 * step;
-    return piece->flags & ATH_SHEET ? step : step * (r < 4 ? weight[r] : 1.125);
+    return step * (ath_is_shape_row(piece, rows, r) ? 0.875 : ath_mode_weight(piece->flags, r));
 }
 
 ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)
