@@ -35,6 +35,7 @@ from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
+from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
@@ -88,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _encode(args: argparse.Namespace) -> int:
     _check_output(args.output, args.input)
-    with athcodec.read_hdf5(args.input, args.rest) as clip, _naming(args.input), _progress() as report:
+    with _read(args, args.input) as clip, _naming(args.input), _progress() as report:
         unit = clip.metadata.get("unit")
         athcodec.encode(
             clip,
@@ -112,7 +113,8 @@ def _decode(args: argparse.Namespace) -> int:
         depth = decoder.deepest if args.depth is None else args.depth
         frames = _frames(args.frames, decoder.frame_count)
         with _progress() as report:
-            _write_hdf5(decoder, args.output, depth, frames, args.gzip, report)
+            athcodec.write(Excerpt(decoder, depth, frames), args.output, args.format, progress=report, gzip=args.gzip,
+                           animation=args.animation)
         if decoder.missing:
             _say("warning", f"{args.input}: decoded to level {depth}; {_what_is_missing(decoder)}")
         print(f"{args.output}: {len(frames):,} frames, {decoder.vertex_count:,} vertices, level {depth}")
@@ -132,7 +134,7 @@ def _verify(args: argparse.Namespace) -> int:
             decoder.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             if args.against:
-                result["depths"] = _measure_against(decoder, args.against)
+                result["depths"] = _measure_against(decoder, args)
                 _refuse_broken_promises(result)
         result["ok"] = True
     except AthError as error:
@@ -155,6 +157,29 @@ def _truncate(args: argparse.Namespace) -> int:
     return 0
 
 
+def _formats(args: argparse.Namespace) -> int:
+    from athcodec import exporters, sources
+
+    table = {each.name: each for each in (*sources.FORMATS, *exporters.FORMATS)}
+    read, written = ({each.name for each in module.FORMATS} for module in (sources, exporters))
+    rows = [{"format": name, "title": each.title, "suffixes": list(each.suffixes), "read": name in read,
+             "written": name in written, "extra": each.extra, "installed": each.is_installed}
+            for name, each in table.items()]
+    if args.json:
+        _print_json({"formats": rows})
+        return 0
+    cells = [[row["format"], row["title"], " ".join(row["suffixes"]),
+              " ".join(verb for verb in ("read", "written") if row[verb]), _needs(row)] for row in rows]
+    _print_table(["format", "what", "suffixes", "", "needs"], cells)
+    return 0
+
+
+def _needs(row: dict[str, Any]) -> str:
+    if not row["extra"]:
+        return ""
+    return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
+
+
 def _demo(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)
@@ -172,6 +197,12 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 # ---- what they do with clips and decoders ----
+
+
+def _read(args: argparse.Namespace, path: str) -> MotionClip:
+    """The clip in `path`, read as the options of _source_arguments say."""
+    return athcodec.read(path, args.source_format, rest=getattr(args, "rest", "auto"), fps=args.fps, mesh=args.mesh,
+                         field=args.field, only=args.only or (), unit=args.unit, up_axis=args.up_axis)
 
 
 @contextmanager
@@ -220,41 +251,9 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
     return range(start, stop)
 
 
-def _write_hdf5(
-    decoder: Decoder,
-    path: str | Path,
-    depth: int,
-    frames: range,
-    gzip: bool = False,
-    report: Report | None = None,
-) -> None:
-    """Decode segment by segment, so that a clip larger than memory works."""
-    from athcodec.exporters import Hdf5Writer  # only here: see __init__.py
-
-    writer = Hdf5Writer(
-        path,
-        time=decoder.time[frames.start : frames.stop],
-        vertex_branch=decoder.vertex_branch,
-        branch_parent=decoder.branch_parent,
-        rest=decoder.rest,
-        dtype=decoder.dtype,
-        stem_index=decoder.stem_index,
-        edges=decoder.edges,
-        faces=decoder.faces,
-        attributes=decoder.attributes,
-        metadata=decoder.metadata,
-        gzip=gzip,
-    )
-    with writer:
-        for start, block in decoder.blocks(depth, frames=slice(frames.start, frames.stop)):
-            writer.add(block)
-            if report:
-                report("decode", (start + len(block) - frames.start) / len(frames))
-
-
-def _measure_against(decoder: Decoder, path: str) -> list[dict[str, Any]]:
-    """One entry per level: what it promises, and how far off the clip in `path` it is."""
-    with athcodec.read_hdf5(path) as clip, _naming(path), clip.watched(), _progress() as report:
+def _measure_against(decoder: Decoder, args: argparse.Namespace) -> list[dict[str, Any]]:
+    """One entry per level: what it promises, and how far off the clip in args.against it is."""
+    with _read(args, args.against) as clip, _naming(args.against), clip.watched(), _progress() as report:
         got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
@@ -294,7 +293,7 @@ def _refuse_broken_promises(result: dict[str, Any]) -> None:
 
 def _decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth: int) -> ErrorMeter:
     decoded = encoded.with_name(f"{encoded.stem}_level_{depth}.h5")
-    _write_hdf5(decoder, decoded, depth, range(decoder.frame_count))
+    athcodec.write(Excerpt(decoder, depth), decoded)
     with athcodec.read_hdf5(decoded) as again:
         return compare_clips(clip, again)
 
@@ -532,11 +531,11 @@ def _parser() -> argparse.ArgumentParser:
         return sub
 
     _encode_arguments(verb(
-        "encode", _encode, "compress the motion of an HDF5 file into an .ath file",
+        "encode", _encode, "compress a motion into an .ath file",
         f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}.",
     ))
     _decode_arguments(verb(
-        "decode", _decode, "write the motion of an .ath file to an HDF5 file",
+        "decode", _decode, "write the motion of an .ath file in another format",
         "A file that was cut off is decoded to its deepest complete level, with a warning.",
     ))
     _info_arguments(verb("info", _info, "show what an .ath file holds, level by level"))
@@ -545,13 +544,16 @@ def _parser() -> argparse.ArgumentParser:
         "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
     ))
     _truncate_arguments(verb("truncate", _truncate, "leave out the levels beyond a depth, without decoding"))
+    formats = verb("formats", _formats, "list the formats that are read and written, and what each needs")
+    formats.add_argument("--json", action="store_true", help="print as JSON")
     _demo_arguments(verb("demo", _demo, "encode the included sample, decode and measure every depth"))
     return parser
 
 
 def _encode_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN.h5", help="positions, time, rest, vertex_branch, branch_parent")
+    verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
+    _source_arguments(verb)
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
         "--max-error", metavar="LENGTH", type=_argument(_positive_length),
@@ -596,9 +598,25 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
+def _source_arguments(verb: argparse.ArgumentParser) -> None:
+    source = verb.add_argument_group("reading the source")
+    source.add_argument("--source-format", metavar="NAME",
+                        help="of `athcodec formats` (default: known by the file's content and suffix)")
+    source.add_argument("--fps", metavar="RATE", type=_argument(_rate),
+                        help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves are "
+                        "sampled, or that of a source that does not say its own")
+    source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
+    source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
+    source.add_argument("--only", metavar="PATTERN", action="append",
+                        help="read the prims, objects or meshes of these names only; may be repeated")
+    source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
+    source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
+
+
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ)
-    verb.add_argument("output", metavar="OUT.h5", help=WRITTEN)
+    verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
+    verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
     _stats_argument(verb)
     verb.add_argument(
         "--depth", metavar="LEVEL", type=_argument(_whole),
@@ -608,7 +626,9 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--frames", metavar="A:B", type=_argument(_frame_bounds), default=(None, None),
         help="frames A to B - 1, counted from 0; A: to the end, :B from the start (default: all)",
     )
-    verb.add_argument("--gzip", action="store_true", help="compress the HDF5 file: smaller, slower, no loss")
+    verb.add_argument("--gzip", action="store_true", help="compress where the format can: smaller, slower, no loss")
+    verb.add_argument("--animation", choices=("auto", "joints", "morphs"), default="auto",
+                      help="how glTF moves (default auto: joints where they keep within the file's error)")
     verb.add_argument(
         "--allow-partial", action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",
@@ -628,7 +648,8 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
-    verb.add_argument("--against", metavar="SOURCE.h5", help="the source: measure the error of every depth")
+    verb.add_argument("--against", metavar="SOURCE", help="the source: measure the error of every depth")
+    _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -691,6 +712,14 @@ def _tam(text: str) -> tuple[Length, int, Length, int]:
         raise ValueError(f"got {text!r}, expected four values: EPS,ETA,XI,LAMBDA")
     epsilon, eta, xi, lam = parts
     return parse_length(epsilon), _whole(eta), parse_length(xi), _whole(lam)
+
+
+def _rate(text: str) -> float:
+    parts = [_number(part, float) for part in text.split("/")]
+    value = parts[0] / parts[1] if len(parts) == 2 and parts[1] else parts[0] if len(parts) == 1 else 0.0
+    if not 0 < value < math.inf:
+        raise ValueError(f"got {text!r}, expected a number above 0 or a fraction such as 24000/1001")
+    return value
 
 
 def _whole(text: str) -> int:

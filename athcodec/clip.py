@@ -7,7 +7,7 @@ larger than memory works. It knows no file format and derives no hierarchy (see 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,14 +24,25 @@ RESERVED_NAMES = frozenset(
 )
 
 
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Joints in a tree: joint_parent (J,) int32, -1 for a root, each behind its parent; vertex_joint (N,) int32, the
+    joint with the largest weight on each vertex, -1 for none; names (J,)."""
+
+    joint_parent: np.ndarray
+    vertex_joint: np.ndarray
+    names: Sequence[str] = ()
+
+
 @dataclass(eq=False, repr=False)
 class MotionClip:
-    """One moving plant: T frames of N vertices on B branches.
+    """One moving plant: T frames of N vertices, on B branches where they are known.
 
     positions      (T, N, 3) float32 or float64, in `metadata["unit"]`: an array, or anything that has shape
                    and dtype and is sliced by frames (an h5py.Dataset, a numpy.memmap). Never read whole.
     time           (T,) seconds, strictly increasing; becomes float64. The steps may differ.
-    vertex_branch  (N,) integers, the branch of each vertex; becomes int32.
+    vertex_branch  (N,) integers, the branch of each vertex; becomes int32. None, and branch_parent too: not known,
+                   see discovery.py.
     branch_parent  (B,) integers, -1 for a root (several are allowed); becomes int32.
     rest           (N, 3) float32 or float64; becomes float64, `rest_dtype` keeps what was given. None: made
                    from the motion as `rest_pose` says.
@@ -39,11 +50,16 @@ class MotionClip:
                    rest is None.
     stem_index     (N,) integers, the place of each vertex on its stem, 0 at the base. None where the vertices
                    of every branch already run from base to tip in the order of their numbers.
-    edges, faces   (E, 2) and (F, k) vertex numbers of any integer dtype, or None.
+    edges, faces   (E, 2) and (F, k) vertex numbers of any integer dtype, or None. Polygons of different sizes are the
+                   attributes face_vertex_counts (F,) and face_vertex_indices (C,) in place of faces; see `polygons`.
     attributes     further named static arrays (radius, colours ...) of any shape; numbers, booleans,
-                   bytes or records of them.
-    metadata       "unit", "up_axis" and whatever else describes the clip: str, int, float, bool or lists of
-                   them.
+                   bytes or records of them. They have a row per vertex, branch, face or corner of a face, or none of
+                   that: metadata["domains"] says which, {"uv": "corner"}, where the number of rows does not.
+    metadata       "unit", "up_axis" and whatever else describes the clip: str, int, float, bool, lists and dicts of
+                   them. "fps" and "start_frame": the rate and the number of the first frame in the tool that made it,
+                   whose frames are then start_frame + time * fps. "part_names": the objects that the vertices belong
+                   to, one after the other, their numbers of vertices in the attribute part_vertex_counts.
+    skin           the joints that moved the vertices, where a source has them; not stored, only for discovery.py.
     resource       something with close(), closed with the clip: the open file behind lazily read positions.
     unchanged      a function that tells whether what the positions are read from is as it was when the clip was made.
 
@@ -53,8 +69,8 @@ class MotionClip:
 
     positions: Any
     time: np.ndarray
-    vertex_branch: np.ndarray
-    branch_parent: np.ndarray
+    vertex_branch: np.ndarray | None = None
+    branch_parent: np.ndarray | None = None
     rest: np.ndarray | None = None
     edges: np.ndarray | None = None
     faces: np.ndarray | None = None
@@ -64,6 +80,7 @@ class MotionClip:
     stem_index: np.ndarray | None = None
     resource: Any = None
     unchanged: Callable[[], bool] | None = None
+    skin: Skin | None = None
     rest_dtype: np.dtype = field(init=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
 
@@ -73,10 +90,8 @@ class MotionClip:
         self.check()
 
     def __repr__(self) -> str:
-        return (
-            f"MotionClip({self.frame_count} frames, {self.vertex_count} vertices, "
-            f"{self.branch_count} branches, {self.dtype})"
-        )
+        branches = f"{self.branch_count} branches" if self.has_branches else "branches unknown"
+        return f"MotionClip({self.frame_count} frames, {self.vertex_count} vertices, {branches}, {self.dtype})"
 
     def __enter__(self) -> MotionClip:
         return self
@@ -95,11 +110,20 @@ class MotionClip:
 
     @property
     def vertex_count(self) -> int:
-        return len(self.vertex_branch)
+        return int(self.positions.shape[1])
 
     @property
     def branch_count(self) -> int:
-        return len(self.branch_parent)
+        return 0 if self.branch_parent is None else len(self.branch_parent)
+
+    @property
+    def has_branches(self) -> bool:
+        return self.branch_parent is not None
+
+    @property
+    def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Faces of any sizes: corners per face (F,), and the vertex of each corner (C,), face after face; or None."""
+        return polygons(self.faces, self.attributes)
 
     @property
     def dtype(self) -> np.dtype:
@@ -120,13 +144,11 @@ class MotionClip:
         """
         frame_count, vertex_count = self._check_positions()
         self.time = check_time(self.time, frame_count)
-        self.vertex_branch, self.branch_parent = check_branches(
-            self.vertex_branch, self.branch_parent, vertex_count
-        )
-        self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
+        self._check_branches(vertex_count)
         self.edges = check_indices("edges", self.edges, vertex_count, width=2)
         self.faces = check_indices("faces", self.faces, vertex_count)
         self.attributes = check_attributes(self.attributes)
+        check_polygons(self.polygons, vertex_count)
         self.metadata = dict(self.metadata or {})
         self._check_rest()
 
@@ -172,6 +194,16 @@ class MotionClip:
         length = min(length, max_frames or length)
         chunk_frames = (getattr(self.positions, "chunks", None) or (1,))[0]
         return length - length % chunk_frames if chunk_frames <= length else length
+
+    def _check_branches(self, vertex_count: int) -> None:
+        if self.vertex_branch is None and self.branch_parent is None:
+            if self.stem_index is not None:
+                raise ClipError("stem_index: got places on branches that are not known, expected none")
+            return
+        if self.vertex_branch is None or self.branch_parent is None:
+            raise ClipError("branches: got one of vertex_branch and branch_parent, expected both or neither")
+        self.vertex_branch, self.branch_parent = check_branches(self.vertex_branch, self.branch_parent, vertex_count)
+        self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
 
     def _check_positions(self) -> tuple[int, int]:
         shape, dtype = tuple(self.positions.shape or ()), self.positions.dtype
@@ -272,6 +304,24 @@ def check_indices(name: str, indices: Any, stop: int, width: int | None = None) 
         row, column = bad[0]
         raise ClipError(f"{name}: row {row} names vertex {indices[row, column]}, expected 0 to {stop - 1}")
     return indices
+
+
+def polygons(faces: np.ndarray | None, attributes: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
+    """(counts (F,), indices (C,)) of `faces` or of the attributes that stand for it; None where there are neither."""
+    if faces is not None:
+        return np.full(len(faces), faces.shape[1], np.int64), np.asarray(faces).reshape(-1)
+    counts, indices = (attributes.get(f"face_vertex_{name}") for name in ("counts", "indices"))
+    return None if counts is None or indices is None else (counts, indices)
+
+
+def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: int) -> None:
+    """ClipError unless counts and indices of polygons fit each other and name vertices that exist."""
+    if faces is None:
+        return
+    counts, indices = (_integers(f"face_vertex_{name}", array) for name, array in zip(("counts", "indices"), faces))
+    if (counts < 0).any() or counts.sum() != len(indices):
+        raise ClipError(f"face_vertex_counts: got {int(counts.sum())} corners, expected {len(indices)}, one per index")
+    check_indices("face_vertex_indices", indices[:, None], vertex_count)
 
 
 def check_branches(

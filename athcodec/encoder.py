@@ -24,6 +24,7 @@ from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.decoder import Decoder
+from athcodec.discovery import find_branches, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -79,12 +80,15 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     bound that fits. segment_frames: longest segment, 16 to 256. tam: acceptance thresholds of the ATH (default: one map
     per frame stays within the bound). exact_rest: keep the rest pose bit for bit. lossless: one more level gives the
     positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. attributes: "none"
-    drops faces, edges and named arrays. Raises ClipError, BoundError, ValueError, OSError.
+    drops faces, edges and named arrays. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError, ValueError, OSError.
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
     report = progress or (lambda stage, fraction: None)
     check_target(path)  # before any work
     clip.check()
+    if not clip.has_branches:
+        report("branches", 0.0)
+        clip = with_branches(clip, find_branches(clip))
     hierarchy = hierarchy_of(clip)
     _check_limits(clip, hierarchy)
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))

@@ -19,6 +19,10 @@ class BoundError(AthError, ValueError):
     """An error bound or target size cannot be kept."""
 
 
+class MissingExtra(AthError, ImportError):
+    """A file format needs a package that is not installed; the message names the command that installs it."""
+
+
 class FormatError(AthError):
     """An .ath file cannot be decoded; `code` is its number in FORMAT.md."""
 

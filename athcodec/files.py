@@ -12,6 +12,7 @@ import io
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -123,6 +124,38 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         raise
 
 
+@contextmanager
+def new_files(path: str | os.PathLike[str]) -> Iterator[str]:
+    """A folder for files that belong together. When the block ends they move beside `path`, the one of that name last,
+    in place of older ones; nothing is left behind when it raises. Raises OSError."""
+    path = check_target(path)
+    remove_leftovers(path)
+    directory, name = os.path.split(path)
+    folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+    os.mkdir(folder)
+    lock = _locked_folder(folder)
+    try:
+        yield folder
+        made = sorted(os.listdir(folder), key=lambda each: (each == name, each))
+        if name not in made:
+            raise FileNotFoundError(f"{path}: the writer has made no such file")
+        for each in made:
+            os.replace(os.path.join(folder, each), os.path.join(directory, each))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def _locked_folder(folder: str) -> int:
+    if fcntl is None:
+        return -1
+    descriptor = os.open(folder, os.O_RDONLY | PLAIN_OPEN)
+    with suppress(OSError):  # a file system without locks
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
+
+
 def remove_leftovers(path: str) -> None:
     """Removes what writers that have died, and only those, left of files on their way to `path`."""
     directory, name = os.path.split(path)
@@ -157,12 +190,16 @@ def _locked_new_file(path: str) -> tuple[str, int]:
 def _remove_if_dead(name: str) -> None:
     with suppress(OSError):  # held by its writer, gone by now, or not ours
         if fcntl is None:
-            os.unlink(name)
+            shutil.rmtree(name) if os.path.isdir(name) else os.unlink(name)
             return
-        descriptor = os.open(name, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | PLAIN_OPEN)
+        is_folder = stat.S_ISDIR(os.lstat(name).st_mode)
+        access = os.O_RDONLY if is_folder else os.O_RDWR
+        descriptor = os.open(name, access | os.O_NOFOLLOW | os.O_NONBLOCK | PLAIN_OPEN)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            if is_folder:
+                shutil.rmtree(name)
+            elif stat.S_ISREG(os.fstat(descriptor).st_mode):
                 os.unlink(name)
         finally:
             os.close(descriptor)

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 import athcodec
-from athcodec.exporters import Hdf5Writer
+from athcodec.exporters.hdf5 import Hdf5Writer
 
 
 def encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:

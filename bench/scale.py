@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.exporters import Hdf5Writer
+from athcodec.exporters.hdf5 import Hdf5Writer
 from bench.clips import add_rel_error
 from bench.decode import compile_program
 from bench.suite import cases

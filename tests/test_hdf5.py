@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from athcodec import clip as clip_module
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.exporters import Hdf5Writer, write_hdf5
+from athcodec.exporters import write_hdf5
+from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.hierarchy import hierarchy_of
 from athcodec.sources import read_hdf5
 

@@ -1,7 +1,99 @@
-"""Writers: one module per file format, mirroring sources/. Nothing here knows .ath files."""
+"""Writers: one module per file format, mirroring sources/. Nothing here knows how .ath files are coded.
+
+`write` imports the module of the wanted format and no other. A module has one function,
+`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or an Excerpt of an .ath file.
+"""
 
 from __future__ import annotations
 
-from athcodec.exporters.hdf5 import Hdf5Writer, write_hdf5
+import importlib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
-__all__ = ["Hdf5Writer", "write_hdf5"]
+from athcodec.errors import ClipError
+from athcodec.files import check_target
+from athcodec.sources import Format
+
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class WriteOptions:
+    """What a user may say about a file to write. A writer ignores what has no meaning for its format.
+
+    gzip    compress without loss where the format can
+    animation  how glTF moves: "joints", "morphs", or "auto", the one that keeps the error, the smaller of both
+    half    textures in half precision in place of float
+    """
+
+    gzip: bool = False
+    animation: str = "auto"
+    half: bool = True
+
+    def __post_init__(self) -> None:
+        if self.animation not in ("auto", "joints", "morphs"):
+            raise ValueError(f'animation: got {self.animation!r}, expected "auto", "joints" or "morphs"')
+
+
+FORMATS = (
+    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.exporters.hdf5"),
+    Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz"),
+    Format("usd", "USD: time-sampled points", (".usd", ".usdc", ".usda", ".usdz"), "athcodec.exporters.usd", "usd",
+           ("pxr",)),
+    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf", "gltf", ("pygltflib",)),
+    Format("alembic", "Alembic, through Blender", (".abc",), "athcodec.exporters.alembic"),
+    Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
+    Format("mdd", "MDD point cache", (".mdd",), "athcodec.exporters.mdd"),
+    Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply"), "athcodec.exporters.sequence"),
+    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.exporters.xdmf", "mesh", ("meshio",)),
+    Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu"), "athcodec.exporters.vtk", "mesh", ("meshio",)),
+    Format("vat", "vertex animation textures: node matrices", (".vat",), "athcodec.exporters.vat", "vat",
+           ("OpenEXR",)),
+    Format("openvat", "vertex animation textures: positions, as OpenVAT has them", (".openvat",),
+           "athcodec.exporters.vat", "vat", ("OpenEXR",)),
+)
+
+
+def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None,
+          **options: object) -> None:
+    """Write a MotionClip or an Excerpt to `path`, which appears only when it is whole.
+
+    format    the name of one of FORMATS; None: known by the suffix
+    options   see WriteOptions
+    progress  called with "export" and the fraction that is done
+
+    Raises ClipError where the format cannot hold the clip or is not known, MissingExtra where a package is missing,
+    OSError where nothing can be written there, ValueError for options that do not exist.
+    """
+    wanted = WriteOptions(**options)
+    kind = find_format(path) if format is None else format_named(format)
+    kind.check()
+    check_target(path)
+    report = progress or (lambda stage, fraction: None)
+    importlib.import_module(kind.module).write_clip(motion, path, wanted, lambda done: report("export", done))
+
+
+def format_named(name: str) -> Format:
+    for each in FORMATS:
+        if each.name == name:
+            return each
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in FORMATS)}")
+
+
+def find_format(path: str | PathLike[str]) -> Format:
+    """The format that a suffix stands for. Raises ClipError."""
+    suffix = Path(path).suffix.lower()
+    for each in FORMATS:
+        if suffix in each.suffixes:
+            return each
+    raise ClipError(f"{os.fspath(path)}: got the suffix {suffix!r}, expected one of "
+                    f"{' '.join(suffix for each in FORMATS for suffix in each.suffixes)}")
+
+
+def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:
+    """Write `clip` in athcodec's HDF5 schema to `path`; see exporters/hdf5.py, and `write` for the rest."""
+    write(clip, path, "hdf5", gzip=gzip)

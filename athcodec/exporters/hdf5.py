@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from os import PathLike
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.errors import ClipError
+from athcodec.exporters import WriteOptions
 from athcodec.files import Part
 from athcodec.hierarchy import branch_orders
 
@@ -30,7 +31,7 @@ class Hdf5Writer:
 
     path           the file to write; an existing file is replaced when the new one is complete
     time           (T,) seconds: says how many frames must be added
-    vertex_branch  (N,) and branch_parent (B,), as in MotionClip
+    vertex_branch  (N,) and branch_parent (B,), as in MotionClip, or None both
     rest           (N, 3), written in its own dtype
     dtype          of the positions, float32 or float64
     stem_index, edges, faces, attributes, metadata: as in MotionClip, or None
@@ -45,8 +46,8 @@ class Hdf5Writer:
         path: str | PathLike[str],
         *,
         time: np.ndarray,
-        vertex_branch: np.ndarray,
-        branch_parent: np.ndarray,
+        vertex_branch: np.ndarray | None,
+        branch_parent: np.ndarray | None,
         rest: np.ndarray,
         dtype: Any = np.float32,
         stem_index: np.ndarray | None = None,
@@ -61,14 +62,17 @@ class Hdf5Writer:
         check_float_dtype("rest", rest.dtype)
         if rest.ndim != 2 or rest.shape[1] != 3:
             raise ClipError(f"rest: got shape {rest.shape}, expected (vertices, 3)")
-        vertex_branch, branch_parent = check_branches(vertex_branch, branch_parent, len(rest))
+        branch_order = None
+        if branch_parent is not None:
+            vertex_branch, branch_parent = check_branches(vertex_branch, branch_parent, len(rest))
+            branch_order = branch_orders(branch_parent)
         time = check_time(time, len(time))
         arrays = {
             "time": time,
             "rest": rest,
             "vertex_branch": vertex_branch,
             "branch_parent": branch_parent,
-            "branch_order": branch_orders(branch_parent),
+            "branch_order": branch_order,
             "stem_index": stem_index,
             "edges": edges,
             "faces": faces,
@@ -160,27 +164,26 @@ class Hdf5Writer:
         return {"compression": "gzip", "shuffle": True} if self._gzip else {}
 
 
-def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:
+def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
-    `clip` is a MotionClip or anything with time, vertex_branch, branch_parent, rest, dtype and blocks() like
-    it; stem_index, edges, faces, attributes, metadata and rest_dtype are written where it has them.
+    `clip` is a MotionClip, an Excerpt, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
+    like them; stem_index, edges, faces, attributes, metadata and rest_dtype are written where it has them.
     """
-    optional = ("stem_index", "edges", "faces", "attributes", "metadata")
+    optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes", "metadata")
     rest = np.asarray(clip.rest)
     writer = Hdf5Writer(
         path,
         time=clip.time,
-        vertex_branch=clip.vertex_branch,
-        branch_parent=clip.branch_parent,
         rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
         dtype=clip.dtype,
-        gzip=gzip,
+        gzip=options.gzip,
         **{name: getattr(clip, name, None) for name in optional},
     )
     with writer:
-        for _, frames in clip.blocks():
+        for start, frames in clip.blocks():
             writer.add(frames)
+            report((start + len(frames)) / len(clip.time))
 
 
 class _Sink:

@@ -5,7 +5,7 @@
 | positions     | (T, N, 3) float32 or 64    | ClipError                                             |
 | time          | (T,) seconds               | from the attribute fps, else 30 frames per second     |
 | rest          | (N, 3) float32 or 64       | the first frame or the mean pose                      |
-| vertex_branch | (N,) integers              | both derived from edges; ClipError without edges      |
+| vertex_branch | (N,) integers              | both derived from edges; none without edges           |
 | branch_parent | (B,) integers, -1 = root   |                                                       |
 | stem_index    | (N,) integers, 0 = base    | the vertices of a branch run from base to tip         |
 | branch_order  | (B,) integers              | not needed; kept only where it is not the depth       |
@@ -18,6 +18,7 @@ and groups are not read, links are not followed.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Collection, Sequence
 from os import PathLike, fspath
@@ -29,34 +30,23 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES, MotionClip, frame_rate
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.sources import ReadOptions
 
 CHUNK_CACHE_BYTES = 64 << 20
 MAX_ATTRIBUTE_BYTES = 1 << 30
 
 
-def read_hdf5(
-    path: str | PathLike[str],
-    rest: str = "auto",
-    *,
-    root: int | Sequence[int] | None = None,
-    skip: Collection[str] = (),
-) -> MotionClip:
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the HDF5 file `path`; close it, or use it in a `with` statement.
 
-    rest  "auto": the file's rest pose, the first frame where it has none. "first", "mean": the first frame or
-          the mean of all frames (one pass over the file), whatever the file holds.
-    root  the vertex, or one per connected part, at which branches derived from edges begin; else the lowest
-          vertex along the file's attribute up_axis ("y" where it has none).
-    skip  names of datasets to leave out of the static arrays.
+    The file's rest pose is used where options.rest is "auto"; branches derived from edges begin at options.root, or at
+    the lowest vertex along the file's attribute up_axis ("y" where it has none).
 
-    Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be
-    opened.
+    Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be opened.
     """
-    if rest not in ("auto", "first", "mean"):
-        raise ValueError(f'rest: got {rest!r}, expected "auto", "first" or "mean"')
     file = _open(path)
     try:
-        return _read(file, rest, root, skip)
+        return _read(file, options)
     except ClipError as error:
         file.close()
         raise ClipError(f"{fspath(path)}: {error}") from error
@@ -88,25 +78,27 @@ def _watch(file: h5py.File) -> Callable[[], bool]:
     return lambda: stamp() == before
 
 
-def _read(file: h5py.File, rest: str, root: int | Sequence[int] | None, skip: Collection[str]) -> MotionClip:
+def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     unchanged = _watch(file)
     positions = _dataset(file, "positions")
     if positions is None:
         raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
     metadata = {name: _to_python(value) for name, value in file.attrs.items()}
-    attributes = _static_arrays(file, skip)
+    if isinstance(metadata.get("domains"), str):
+        metadata["domains"] = _parsed("domains", metadata["domains"])
+    attributes = _static_arrays(file, options.skip)
     clip = MotionClip(
         positions=positions,
         time=_time(file, positions, metadata),
-        rest=_array(file, "rest") if rest == "auto" else None,
-        rest_pose="mean" if rest == "mean" else "first",
+        rest=_array(file, "rest") if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
         edges=_array(file, "edges"),
         faces=_array(file, "faces"),
         attributes=attributes,
         metadata=metadata,
         resource=file,
         unchanged=unchanged,
-        **_branches(file, positions, metadata, root),
+        **_branches(file, positions, metadata, options.root),
     )
     _drop_derivable_order(clip)
     return clip
@@ -173,9 +165,7 @@ def _branches(
         )
     edges = _array(file, "edges")
     if edges is None:
-        raise ClipError(
-            "branches: got neither branches nor edges, expected vertex_branch and branch_parent, or edges"
-        )
+        return {}
     rest = _pose_for_roots(file, positions)
     up_axis = metadata.get("up_axis", "y")
     vertex_branch, branch_parent, stem_index = branches_from_edges(edges, len(rest), rest, root, up_axis)
@@ -195,6 +185,13 @@ def _drop_derivable_order(clip: MotionClip) -> None:
         return
     if np.array_equal(order, branch_orders(clip.branch_parent)):
         del clip.attributes["branch_order"]
+
+
+def _parsed(name: str, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise ClipError(f"{name}: got {text[:40]!r}, expected JSON: {error}") from None
 
 
 def _to_python(value: Any) -> Any:

@@ -1,0 +1,35 @@
+"""Positions that are made when they are asked for: what a reader gives a MotionClip in place of an array.
+
+It knows no file format. Readers have a function that makes a run of frames; clips, and whatever changes units or
+axes, slice the result as they would an array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+
+class Frames:
+    """(T, N, 3) positions of which only the frames that are sliced exist.
+
+    read(start, stop) gives frames start to stop - 1 as (stop - start, N, 3) in `dtype`; 0 <= start < stop <= T. It may
+    raise ClipError, and is called by one thread at a time, mostly forward, often twice over the whole clip.
+    """
+
+    def __init__(self, read: Callable[[int, int], np.ndarray], frame_count: int, vertex_count: int,
+                 dtype: object = np.float32):
+        self._read = read
+        self.shape, self.dtype = (frame_count, vertex_count, 3), np.dtype(dtype)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, frames: slice) -> np.ndarray:
+        start, stop, step = frames.indices(self.shape[0])
+        if step != 1:
+            raise ValueError(f"frames: got a step of {step}, expected 1")
+        if start >= stop:
+            return np.empty((0, *self.shape[1:]), self.dtype)
+        return self._read(start, stop)
