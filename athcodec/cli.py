@@ -23,6 +23,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -30,6 +31,7 @@ from rich.table import Table
 from rich.text import Text
 
 import athcodec
+from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
@@ -37,6 +39,7 @@ from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
+from athcodec.hierarchy import branch_orders
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
@@ -92,11 +95,11 @@ def _encode(args: argparse.Namespace) -> int:
     with _read(args, args.input) as clip, _naming(args.input), _progress() as report:
         unit = clip.metadata.get("unit")
         athcodec.encode(
-            clip,
+            _with_branches(clip, args.hierarchy),
             args.output,
             segment_frames=args.segment_frames,
             tam=_thresholds(args.tam, unit),
-            exact_rest=args.exact_rest, lossless=args.lossless,
+            exact_rest=args.exact_rest, lossless=args.lossless, weights=args.weights,
             attributes=args.attributes,
             effort=args.effort,
             progress=report,
@@ -104,6 +107,32 @@ def _encode(args: argparse.Namespace) -> int:
         )
     with _open(args.output, strict=True) as decoder:
         _print_file(args.output, decoder, args.json)
+    return 0
+
+
+def _hierarchy(args: argparse.Namespace) -> int:
+    if args.save:
+        _check_output(args.save, args.input)
+    with _read(args, args.input) as clip, _naming(args.input), _progress() as report:
+        if report:
+            report("branches", 0.0)
+        found = athcodec.find_branches(clip, args.method, args.root)
+    if args.save:
+        discovery.save(found, args.save)
+    sizes = np.bincount(found.vertex_branch)
+    orders = branch_orders(found.branch_parent)
+    if args.json:
+        _print_json({"file": args.input, "method": found.method, "vertices": len(found.vertex_branch),
+                     "branches": len(sizes), "roots": int((found.branch_parent < 0).sum()),
+                     "branches_per_order": np.bincount(orders).tolist(),
+                     "vertices_per_order": np.bincount(orders, sizes).astype(int).tolist(), "saved": args.save})
+        return 0
+    print(f"{args.input}: {found}")
+    rows = [[f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
+            for order in range(orders.max() + 1)]
+    _print_table(["order", "branches", "vertices"], rows)
+    if args.save:
+        print(f"{args.save}: edit it, and use it with athcodec encode --hierarchy")
     return 0
 
 
@@ -226,6 +255,18 @@ def _naming(path: str | Path) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from error
 
 
+def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
+    """The clip on the branches that --hierarchy asks for: a method's, or a file's; its own without it."""
+    if hierarchy is None and clip.has_branches:
+        return clip
+    if hierarchy is None or hierarchy == "auto" or hierarchy in discovery.METHODS:
+        found = athcodec.find_branches(clip, hierarchy or "auto")
+        _say("hierarchy", str(found))
+    else:
+        found = discovery.load(hierarchy)
+    return discovery.with_branches(clip, found)
+
+
 def _bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
     """The one keyword of encode() that says how far off the clip may be, or how large the file."""
     if args.max_error is not None:
@@ -257,14 +298,19 @@ def _measure_against(decoder: Decoder, args: argparse.Namespace) -> list[dict[st
         got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
-        meters = [ErrorMeter(clip.rest) for _ in decoder.depths]
+        weights = decoder.error_weights
+        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.depths]
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
             for depth, meter in enumerate(meters):
                 meter.add(reference, decoder.positions(slice(start, stop), depth))
             if report:
                 report("measure", stop / clip.frame_count)
-    return [_measured(level, meter) for level, meter in zip(decoder.depths, meters, strict=True)]
+    levels = [_measured(level, meter) for level, meter in zip(decoder.depths, meters, strict=True)]
+    if weights is not None:
+        promised = decoder.max_error_bound / float(weights.max())
+        levels[-1]["kept"] &= meters[-1].max_weighted_error <= promised * (1 + ROUNDING)
+    return levels
 
 
 def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
@@ -544,6 +590,10 @@ def _parser() -> argparse.ArgumentParser:
         "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
     ))
     _truncate_arguments(verb("truncate", _truncate, "leave out the levels beyond a depth, without decoding"))
+    _hierarchy_arguments(verb(
+        "hierarchy", _hierarchy, "find the branches of a source that names none",
+        "Encoding does so by itself; here the result is shown, and saved to be edited.",
+    ))
     formats = verb("formats", _formats, "list the formats that are read and written, and what each needs")
     formats.add_argument("--json", action="store_true", help="print as JSON")
     _demo_arguments(verb("demo", _demo, "encode the included sample, decode and measure every depth"))
@@ -579,9 +629,15 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI "
         "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
+    verb.add_argument(
+        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or an MTG file, or "
+        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
+    )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument("--lossless", action="store_true",
                       help="one more level gives positions and rest pose bit for bit; the bound is for the one before")
+    verb.add_argument("--weights", metavar="NAME", help="attribute with a factor on the bound for each vertex: 4 where it "
+                      "may be four times as far off")
     verb.add_argument(
         "--attributes", choices=("all", "none"), default="all",
         help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",
@@ -603,8 +659,8 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument("--source-format", metavar="NAME",
                         help="of `athcodec formats` (default: known by the file's content and suffix)")
     source.add_argument("--fps", metavar="RATE", type=_argument(_rate),
-                        help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves are "
-                        "sampled, or that of a source that does not say its own")
+                        help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves "
+                        "are sampled, or that of a source that does not say its own")
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
     source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
     source.add_argument("--only", metavar="PATTERN", action="append",
@@ -637,6 +693,18 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _stats_argument(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--stats", action="store_true", help="say on stderr how many requests and bytes it took")
+
+
+def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
+    verb.add_argument("--method", choices=("auto", *discovery.METHODS), default="auto",
+                      help="by attributes named like branch ids, the joints of a skin, an edge graph, the pieces of a "
+                      "mesh, or motion (default auto: the first of them that applies)")
+    verb.add_argument("--root", metavar="VERTEX", type=_argument(_whole),
+                      help="a vertex of the trunk (default: of a large branch that moves least)")
+    verb.add_argument("--save", metavar="FILE.json", help="write the branches there, for encode --hierarchy")
+    _source_arguments(verb)
+    verb.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:

@@ -24,7 +24,6 @@ from athcodec.hierarchy import Hierarchy
 from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
 
-
 FINER = 32  # times smaller than the step is that at which one learns
 
 
@@ -42,6 +41,7 @@ class Source:
     seen: Survey
     segment_frames: int
     exact_rest: bool
+    weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     rest: np.ndarray = field(init=False)  # (N, 3) float64
     origin: np.ndarray = field(init=False)  # (3,) float64
     wide: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
@@ -60,6 +60,28 @@ class Source:
         low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)
         high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
         return float(np.linalg.norm(high - low))
+
+    def limit(self, bound: float) -> float | np.ndarray:
+        """What decoded positions are held to: one for all vertices, or one each, (N,) in file order."""
+        if self.weights is None:
+            return qz.error_limit(bound, self.seen.diagonal)
+        return np.array([qz.error_limit(each, self.seen.diagonal) for each in bound * self.weights])
+
+    def smallest_bound(self, bound: float) -> float:
+        """Of any vertex."""
+        return bound if self.weights is None else bound * float(self.weights.min())
+
+    def largest_bound(self, bound: float) -> float:
+        """Of any vertex."""
+        return bound if self.weights is None else bound * float(self.weights.max())
+
+    def level_weights(self, levels: int, part: float) -> np.ndarray:
+        """(levels,) of the vertices of each level and those below it the weight that such a part of them falls short
+        of; a level without vertices has that of the one above."""
+        level = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
+        below = [self.weights[level >= each] for each in range(levels)]
+        quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
+        return np.maximum.accumulate(quantiles)
 
     def block(self, segment: int) -> np.ndarray:
         """(T, N, 3) positions of a segment as the clip has them."""
@@ -83,8 +105,10 @@ class Settings:
     """What a trial varies; steps in scene units."""
 
     bound: float
-    limit: float
+    largest_bound: float  # of any vertex
+    limit: float | np.ndarray  # what the positions of each vertex, (N,), are held to
     step: float
+    level_steps: np.ndarray  # (levels,) factors on it
     rest_step: float
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
@@ -93,6 +117,10 @@ class Settings:
     learned: tuple[bool, ...]  # per level: whether the time basis is
     shaped: np.ndarray | None  # (P,) bool: pieces that have learned shapes; None: none has
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
+
+    def step_of(self, level: int) -> float:
+        """Of the stems of a level."""
+        return qz.single(self.step * self.level_steps[level])
 
 
 class Shape:
@@ -168,7 +196,7 @@ def _thin_branches(source: Source) -> np.ndarray:
 def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> list[LevelStream]:
     streams = []
     for level in range(levels):
-        stream = LevelStream(settings.step, float(settings.omega[level]))
+        stream = LevelStream(settings.step_of(level), float(settings.omega[level]))
         if level in bases:
             stream.temporal = temporal_basis(bases[level], qz.TEMPORAL_BITS)
         streams.append(stream)
@@ -242,7 +270,7 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
     stems = {}
     for level in range(plan.level_count):
         if plan.has_stems(level):
-            head = ct.StemsHead(settings.step, settings.omega[level])
+            head = ct.StemsHead(settings.step_of(level), settings.omega[level])
             if level in bases:
                 head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
                 head.basis = entropy.encode_temporal(bases[level], head.bits)
@@ -250,7 +278,7 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
     decoded = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
     factor = 1.0
     while True:
-        step = qz.single(qz.CORRECTION_STEP * settings.limit * factor)
+        step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
         corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step)
         if corrections is not None:
             return Coded(segment, stems, corrections, decoded, step)
@@ -283,6 +311,6 @@ def code_segment(shape: Shape, settings: Settings, positions: np.ndarray, shapes
         decoded = coded.decoded if level == last else segment.pose(level, shape.origin, shape.dtype)
         largest, squares = position_error(decoded, positions, shape.origin)
         errors[level] = largest, math.sqrt(squares / (positions.shape[0] * positions.shape[2]))
-    if errors[last, 0] > settings.bound:
-        raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.bound}")
+    if errors[last, 0] > settings.largest_bound:
+        raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.largest_bound}")
     return chunks, errors

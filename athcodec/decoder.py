@@ -422,6 +422,17 @@ class Decoder:
                                     f"{self.limits.memory_bytes}")
         return result
 
+    @property
+    def error_weights(self) -> np.ndarray | None:
+        """(N,) factors on the bound that the file was encoded with, if any: vertex v is within
+        max_error_bound * error_weights[v] / error_weights.max() at the deepest level of the full file."""
+        name = self.metadata.get("error_weights")
+        array = self.attributes.get(name) if isinstance(name, str) else None
+        if array is None or array.size != self.vertex_count or array.dtype.kind not in "biuf":
+            return None
+        weights = array.reshape(-1).astype(np.float64)
+        return weights if np.isfinite(weights).all() and weights.min() > 0 else None
+
     # ---- motion ----
 
     def _check_depth(self, depth: int | None) -> int:

@@ -8,6 +8,7 @@ coding.py.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import tempfile
 from collections import deque
@@ -24,7 +25,7 @@ from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.decoder import Decoder
-from athcodec.discovery import find_branches, with_branches
+from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -35,7 +36,9 @@ from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, Plan
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
 SPOOL_BYTES = 64 << 20
+TRIAL_FRAMES = 64  # that candidates for branches are tried on
 STATIC_METADATA = ("unit", "up_axis")
+WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
 
 
 @dataclass(frozen=True)
@@ -71,16 +74,19 @@ class Summary:
 
 def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error: float | None = None,
            target_size: int | None = None, segment_frames: int | None = None, tam: Thresholds | None = None,
-           exact_rest: bool = False, lossless: bool = False, attributes: str = "all", effort: str = "default",
-           progress: Progress | None = None) -> Summary:
+           exact_rest: bool = False, lossless: bool = False, weights: str | np.ndarray | None = None,
+           attributes: str = "all", effort: str = "default", progress: Progress | None = None) -> Summary:
     """Compresses a clip into an .ath file at `path`, which appears only when it is whole.
 
     max_error: bound in scene units on the distance of every vertex in every frame; or rel_error: the same as a fraction
     of the bounding box's diagonal over all frames (default 1e-4, lossless 4e-7); or target_size: bytes, the smallest
     bound that fits. segment_frames: longest segment, 16 to 256. tam: acceptance thresholds of the ATH (default: one map
     per frame stays within the bound). exact_rest: keep the rest pose bit for bit. lossless: one more level gives the
-    positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. attributes: "none"
-    drops faces, edges and named arrays. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError, ValueError, OSError.
+    positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. weights: a factor
+    on the bound for each vertex, (N,) above 0, or the name of the attribute that holds them: vertex v is within
+    weights[v] times the bound, the largest of which the file promises for all. attributes: "none" drops faces, edges
+    and named arrays. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError,
+    ValueError, OSError.
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
     report = progress or (lambda stage, fraction: None)
@@ -88,11 +94,14 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     clip.check()
     if not clip.has_branches:
         report("branches", 0.0)
-        clip = with_branches(clip, find_branches(clip))
+        clip = with_branches(clip, _best_branches(clip, rel_error or DEFAULT_REL_ERROR))
+    if weights is not None:
+        clip, weights = _weighted(clip, weights)
     hierarchy = hierarchy_of(clip)
     _check_limits(clip, hierarchy)
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
-    source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless)
+    source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
+                    None if weights is None else weights[hierarchy.vertex_source])
     job = _Job(source, tam, attributes == "all", effort, report, lossless)
     if target_size is not None:
         bound = _bound_for_size(job, target_size)
@@ -132,6 +141,43 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
                                ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth)):
         if value > limit:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
+
+
+def _best_branches(clip: MotionClip, fraction: float) -> Found:
+    """Of the branches that may be right those that make the smallest file of a few frames."""
+    found = candidates(clip)
+    if len(found) == 1:
+        return found[0]
+    start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
+    stop = min(clip.frame_count, start + TRIAL_FRAMES)
+    some = MotionClip(clip.block(start, stop), clip.time[start:stop], rest=clip.rest.astype(clip.rest_dtype))
+    return min(found, key=lambda each: _trial_size(with_branches(some, each), fraction))
+
+
+def _trial_size(clip: MotionClip, fraction: float) -> float:
+    hierarchy = hierarchy_of(clip)
+    source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=False)
+    job = _Job(source, None, False, "default", lambda stage, done: None, False)
+    return _file_size(job, _relative_bound(fraction, job))
+
+
+def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
+    """The clip, which says where its weights are, and these as (N,) float64. Raises ClipError."""
+    name = weights if isinstance(weights, str) else WEIGHTS
+    attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
+    if name not in attributes:
+        raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
+    array = attributes[name]
+    if array.size != clip.vertex_count or array.dtype.kind not in "biuf":
+        raise ClipError(f"weights: got {array.dtype} of shape {array.shape} in {name!r}, expected a number for each of "
+                        f"{clip.vertex_count} vertices")
+    values = array.reshape(-1).astype(np.float64)
+    bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
+    if bad.size:
+        raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
+    metadata = clip.metadata | {WEIGHTS: name}
+    rest = clip.rest.astype(clip.rest_dtype)
+    return dataclasses.replace(clip, attributes=attributes, metadata=metadata, rest=rest), values
 
 
 def time_chunk(time: np.ndarray) -> bytes:
@@ -186,7 +232,8 @@ class _Job:
         return self.tam or Thresholds(bound, 0, bound, 0)
 
     def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
-        qz.check_bound(bound, self.seen.low, self.seen.high, self.clip.dtype, self.source.reach)
+        qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
+                       self.source.reach)
         ath = self.seen.ath(self.thresholds(bound))
         search = Search(self.source, ath, bound, self.effort, self.report)
         settings = search.best()
@@ -198,7 +245,8 @@ class _Job:
         errors = self._add_motion(store, shape, settings, shapes)
         self._add_static(store)
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
-                           len(self.source.segments), len(errors), len(errors), 0.0 if self.lossless else bound,
+                           len(self.source.segments), len(errors), len(errors),
+                           0.0 if self.lossless else self.source.largest_bound(bound),
                            self.clip.dtype == np.float64)
         return _Result(store, header, errors, ath, shape.plan, settings)
 
@@ -311,5 +359,5 @@ def _summary(path: Path, job: _Job, result: _Result, chunks: list[ct.Chunk], dec
                "sheets": int(settings.sheet.sum()),
                "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
-    return Summary(path, result.header.file_length, raw, bound, bound / diagonal if diagonal > 0 else 0.0,
-                   decoder.table1(), depths, sizes, choices)
+    return Summary(path, result.header.file_length, raw, settings.largest_bound,
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices)

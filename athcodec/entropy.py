@@ -84,20 +84,22 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
                          address(source, positions.dtype, positions.size))
 
 
-def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float,
-                     step: float) -> np.ndarray | None:
-    """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place.
+def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray,
+                     limit: float | np.ndarray, step: float) -> np.ndarray | None:
+    """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
     Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.
     """
     vertices, _, frames = positions.shape
+    limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     capacity = 1024
     while True:
         rows = np.empty((capacity, 5), np.int32)
         count = lib.ath_find_corrections(vertices, frames, positions.dtype == np.float64,
                                          address(positions, positions.dtype, positions.size),
                                          address(source, np.float64, positions.size),
-                                         address(origin, np.float64, 3), limit, step, rows.ctypes.data, capacity)
+                                         address(origin, np.float64, 3), address(limits, np.float64, vertices),
+                                         step, rows.ctypes.data, capacity)
         if count < 0:
             return None
         if count <= capacity:

@@ -21,16 +21,18 @@ class ErrorMeter:
     """Adds up the difference between reference and decoded positions, block by block.
 
     `rest` (N, 3) is the rest pose that motion_normalised_error needs; without it that one is not available.
+    `weights` (N,) divide the errors of vertices in max_weighted_error; None: all 1.
     Lengths are in the unit of the positions; frames are counted in the order in which they are added. A
     decoded NaN counts as infinitely far off.
     """
 
-    def __init__(self, rest: np.ndarray | None = None) -> None:
-        self.max_error = 0.0
+    def __init__(self, rest: np.ndarray | None = None, weights: np.ndarray | None = None) -> None:
+        self.max_error = self.max_weighted_error = 0.0
         self.worst_frame = 0
         self.worst_vertex = 0
         self.frame_count = 0
         self._rest = None if rest is None else np.asarray(rest, np.float64)
+        self._weights = None if weights is None else np.asarray(weights, np.float64)
         self._points = 0
         self._error_square = self._spread_square = self._motion_square = 0.0
         self._low = np.full(3, inf)
@@ -57,6 +59,10 @@ class ErrorMeter:
             self.max_error = sqrt(square[frame, vertex])
             self.worst_frame = self.frame_count + int(frame)
             self.worst_vertex = int(vertex)
+        weighted = sqrt(square[frame, vertex])
+        if self._weights is not None:
+            weighted = float(np.sqrt(square.max(axis=0) / self._weights**2).max())
+        self.max_weighted_error = max(self.max_weighted_error, weighted)
         self._error_square += float(square.sum())
         self._spread_square += float(((reference - reference.mean(axis=1, keepdims=True)) ** 2).sum())
         if self._rest is not None:

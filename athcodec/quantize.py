@@ -26,6 +26,8 @@ CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most s
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 TEMPORAL_BITS = 14
 
+WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
+
 
 def error_limit(bound: float, diagonal: float) -> float:
     """What decoded positions are held to: the bound less a margin for how others measure."""

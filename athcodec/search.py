@@ -40,9 +40,10 @@ class Search:
         self._components: dict[tuple, Components] = {}
         self.sample = source.positions(len(source.segments) // 2)
         self.start = Settings(
-            bound=bound, limit=qz.error_limit(bound, source.seen.diagonal), step=qz.single(step),
-            rest_step=qz.single(rest_step), sheet=source.wide, loose=loose_branches(source, self.sample),
-            lags=lags(source, rest_step), omega=(0,) * self.levels, learned=(False,) * self.levels, shaped=None,
+            bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
+            level_steps=np.ones(self.levels), rest_step=qz.single(rest_step), sheet=source.wide,
+            loose=loose_branches(source, self.sample), lags=lags(source, rest_step),
+            omega=(0,) * self.levels, learned=(False,) * self.levels, shaped=None,
             node_steps=np.full(self.levels, step))
 
     def _level_errors(self, bound: float) -> np.ndarray:
@@ -72,6 +73,8 @@ class Search:
                  self._with_steps]
         if self.effort == "fast":
             steps = [self._with_rotations]
+        if self.source.weights is not None:
+            steps.insert(0, self._with_level_steps)
         elif self.effort == "best":
             steps += [self._with_rotations, self._with_learned, self._with_finer_steps]
         settings = self.start
@@ -83,8 +86,8 @@ class Search:
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, bytes per level in the sample) at these settings."""
-        varied = (settings.step, settings.rest_step, settings.omega, settings.learned, settings.sheet.tobytes(),
-                  settings.shaped is not None and settings.shaped.tobytes())
+        varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.omega, settings.learned,
+                  settings.sheet.tobytes(), settings.shaped is not None and settings.shaped.tobytes())
         if varied not in self._known:
             self._known[varied] = self._try(settings)
         return self._known[varied]
@@ -152,6 +155,15 @@ class Search:
         omegas = {settings.omega, (2,) * self.levels} if not any(settings.omega) else {settings.omega}
         candidates = [replace(settings, sheet=sheet, omega=omega) for sheet in sheets for omega in sorted(omegas)]
         return replace(self._cheapest(candidates), omega=settings.omega)
+
+    def _with_level_steps(self, settings: Settings) -> Settings:
+        """Coarser steps for levels whose vertices, and those that hang on them, may be further off."""
+        candidates = []
+        for part in qz.WEIGHT_PARTS:
+            least = self.source.level_weights(self.levels, part)
+            for power in (0.5, 1.0):
+                candidates.append(replace(settings, level_steps=least**power))
+        return self._cheapest([settings, *candidates])
 
     def _with_rotations(self, settings: Settings) -> Settings:
         factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS

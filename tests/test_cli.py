@@ -282,7 +282,7 @@ FAILURES = {
     "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
     "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
     "nothing to truncate": ("truncate nowhere.ath OUT --depth 0", "nowhere.ath: No such file"),
-    "no HDF5": ("encode FILE OUT", "FILE: .*expected an HDF5 file"),
+    "no HDF5": ("encode FILE OUT", "FILE: .*got an unknown format, expected one of .h5.*"),
     "no .ath": ("info SOURCE", "SOURCE: .*expected"),
     "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
     "a folder": ("decode FILE .", "got a directory, expected a file name"),

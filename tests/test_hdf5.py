@@ -176,7 +176,6 @@ def test_texts_become_bytes_of_fixed_length(forked, tmp_path):
 
 BRANCHES = ["vertex_branch", "branch_parent"]
 REFUSED = {
-    "no branches, no edges": (["edges", *BRANCHES], {}, "expected vertex_branch and branch_parent, or edges"),
     "labels without parents": (["branch_parent"], {}, "got one of vertex_branch and branch_parent"),
     "no positions": (["positions"], {}, "positions: got no such dataset"),
     "float16 positions": ([], {"positions": np.zeros((5, 6, 3), "f2")}, "float16"),

@@ -69,11 +69,11 @@ ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MO
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
                        const double origin[3], double *max_error, double *sum_squares);
 
-/* Finds the corrections that bring every vertex within `limit`, applies them to `positions` and fills rows of
+/* Finds the corrections that bring every vertex within its own limit, applies them to `positions` and fills rows of
  * (vertex, frame, x, y, z). Returns their number; when it is above `capacity` nothing was applied; -1: the step cannot
  * express them. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions,
-                                     const double *source, const double origin[3], double limit, double step,
+                                     const double *source, const double origin[3], const double *limits, double step,
                                      int32_t *corrections, int64_t capacity);
 
 /* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */

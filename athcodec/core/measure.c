@@ -142,13 +142,14 @@ static int choose_correction(int wide, const double here[3], const double want[3
 }
 
 int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions, const double *source,
-                             const double origin[3], double limit, double step, int32_t *corrections, int64_t capacity)
+                             const double origin[3], const double *limits, double step, int32_t *corrections,
+                             int64_t capacity)
 {
     size_t T = (size_t)frames;
     int64_t count = 0;
     for (int32_t v = 0; v < vertex_count; v++)
         for (int32_t t = 0; t < frames; t++) {
-            double here[3], want[3], square = 0.0;
+            double here[3], want[3], square = 0.0, limit = limits[v];
             for (size_t k = 0; k < 3; k++) {
                 size_t at = ((size_t)v * 3 + k) * T + (size_t)t;
                 here[k] = position_at(wide, positions, at);

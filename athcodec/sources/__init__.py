@@ -84,8 +84,8 @@ FORMATS = (
     Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.sources.hdf5",
            magic=(b"\x89HDF\r\n\x1a\n",)),
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.sources.npz"),
-    Format("usd", "USD: meshes, curves and points, UsdSkel", (".usd", ".usdc", ".usda", ".usdz"), "athcodec.sources.usd",
-           "usd", ("pxr",), (b"PXR-USDC", b"#usda")),
+    Format("usd", "USD: meshes, curves and points, UsdSkel", (".usd", ".usdc", ".usda", ".usdz"),
+           "athcodec.sources.usd", "usd", ("pxr",), (b"PXR-USDC", b"#usda")),
     Format("gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf", "gltf",
            ("pygltflib",), (b"glTF",)),
     Format("alembic", "Alembic, through Blender", (".abc",), "athcodec.sources.alembic", magic=(b"Ogawa", )),
@@ -152,7 +152,8 @@ def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
     unit = unit_symbol(unit)
     before = unit_symbol(clip.metadata.get("unit") or unit)
     if before != unit and not (before in METRES and unit in METRES):
-        raise ClipError(f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to {unit!r}")
+        raise ClipError(f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to "
+                        f"{unit!r}")
     factor = 1.0 if before == unit else METRES[before] / METRES[unit]
     return _mapped(clip, np.eye(3) * factor, unit=unit)
 

@@ -1,0 +1,60 @@
+"""What it costs to find a clip's branches: the file with those that were found against the one with the true ones.
+
+The clips are measured as they are and without their branches, edges and names; of a render mesh that leaves faces and
+motion. The true branches are those that the clip was made from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec import discovery
+from bench.clips import add_rel_error
+from bench.data import path_of
+from bench.tables import table
+
+NOTE = """
+Bytes: whole files without static arrays, with the true branches and with those found; more: how much larger that is, in
+per cent. Right: of the branches found, per cent that are true ones on their true parents. Seconds: to find them.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("clips", nargs="*", default=["leaves_67k_200f"], metavar="CLIP",
+                        help="a name of `data`, or an HDF5 file")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    rows = [measure(path_of(name), args.rel_error) for name in args.clips]
+    return {"tables": [table(f"Branches found, bound {args.rel_error:g}", rows, NOTE)], "broken": []}
+
+
+def measure(path: Path, rel_error: float) -> dict[str, Any]:
+    with athcodec.read_hdf5(path) as clip, tempfile.TemporaryDirectory() as folder:
+        bare = dataclasses.replace(clip, vertex_branch=None, branch_parent=None, stem_index=None,
+                                   edges=clip.edges if clip.faces is None else None,
+                                   rest=clip.rest.astype(clip.rest_dtype))
+        began = time.perf_counter()
+        found = athcodec.find_branches(bare)
+        seconds = time.perf_counter() - began
+        true, ours = (athcodec.encode(each, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
+                      for each in (clip, discovery.with_branches(bare, found)))
+        return {"clip": path.stem, "vertices": clip.vertex_count, "branches": clip.branch_count,
+                "found": len(found.branch_parent), "by": found.method, "right": right_percent(found, clip),
+                "seconds": seconds, "true bytes": true, "found bytes": ours, "more": 100 * (ours / true - 1)}
+
+
+def right_percent(found: discovery.Found, clip: athcodec.MotionClip) -> float:
+    """Of the branches found, those that hang on the branch that their first vertex's true one hangs on."""
+    whose = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
+    parent = np.where(found.branch_parent < 0, -1, whose[found.branch_parent])
+    return 100 * float((parent == clip.branch_parent[whose]).mean())

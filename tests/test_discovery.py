@@ -1,0 +1,234 @@
+"""Branches for clips that name none: those of a dressed tree come back, whatever the file has lost, and every mesh is
+compressed; what was found can be kept, edited and used again."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import MotionClip, discovery
+from athcodec.cli import main
+from athcodec.clip import Skin
+from athcodec.errors import ClipError
+from athcodec.hierarchy import branch_orders
+from bench.trees.mesh import dress
+from bench.trees.wind import Wind
+
+FRAMES = 24
+
+
+@pytest.fixture(scope="module")
+def dressed() -> MotionClip:
+    """Bark tubes and 300 leaf cards on the sample tree, with the branches that they were made from."""
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        return dress(sample, Wind(11.0, 8.0, seed=1), FRAMES, leaves=300, seed=3)
+
+
+def bare(clip: MotionClip, **changes) -> MotionClip:
+    """The clip without its branches."""
+    rest = changes.pop("rest", clip.rest).astype(clip.rest_dtype)
+    return dataclasses.replace(clip, vertex_branch=None, branch_parent=None, stem_index=None, rest=rest, **changes)
+
+
+def right_parents(found: discovery.Found, clip: MotionClip) -> float:
+    """Share of the branches found that are branches of the clip, on the right parent."""
+    whose = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
+    parent = np.where(found.branch_parent < 0, -1, whose[found.branch_parent])
+    return float((parent == clip.branch_parent[whose]).mean())
+
+
+def renumbered(clip: MotionClip, order: np.ndarray) -> MotionClip:
+    """The clip with vertex order[i] as vertex i."""
+    place = np.argsort(order)
+    return dataclasses.replace(clip, positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
+                               vertex_branch=clip.vertex_branch[order], stem_index=None,
+                               rest=clip.rest[order].astype(clip.rest_dtype))
+
+
+def test_tubes_and_leaves_are_found_again(dressed):
+    found = athcodec.find_branches(bare(dressed))
+    assert found.method == "components"
+    assert len(found.branch_parent) == dressed.branch_count
+    assert right_parents(found, dressed) > 0.98
+
+
+def test_whatever_the_order_of_the_vertices(dressed):
+    mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
+    found = athcodec.find_branches(bare(mixed))
+    assert right_parents(found, mixed) > 0.98
+    trunk = found.vertex_branch == np.flatnonzero(found.branch_parent < 0)[0]
+    height, place = mixed.rest[trunk, 1], found.stem_index[trunk]
+    assert np.corrcoef(height, place)[0, 1] > 0.9, "the trunk does not run from base to tip"
+
+
+def test_a_mesh_that_was_split_along_its_seams_hangs_together(dressed):
+    corners = dressed.faces.reshape(-1)
+    split = MotionClip(dressed.block(0, FRAMES)[:, corners], dressed.time, rest=dressed.rest[corners],
+                       faces=np.arange(len(corners)).reshape(-1, 4))
+    found = athcodec.find_branches(split, "components")
+    assert len(found.branch_parent) == dressed.branch_count
+
+
+def test_the_hierarchy_found_costs_no_more_than_the_true_one(dressed, tmp_path):
+    known = athcodec.encode(dressed, tmp_path / "a.ath", rel_error=1e-4)
+    found = athcodec.encode(bare(dressed), tmp_path / "b.ath", rel_error=1e-4)
+    assert found.bytes < 1.05 * known.bytes
+
+
+@pytest.mark.parametrize("domain", ["vertex", "face"])
+def test_attributes_named_like_branch_ids_are_used(dressed, domain):
+    labels = 10 * dressed.vertex_branch + 5  # any numbers
+    if domain == "face":
+        labels = labels[dressed.faces[:, 0]]
+    found = athcodec.find_branches(bare(dressed, attributes={"primvars:Branch_ID": labels}))
+    assert found.method == "attributes"
+    assert right_parents(found, dressed) > 0.98
+
+
+def test_labels_with_parents_are_taken_as_they_are(dressed):
+    attributes = {"branch": dressed.vertex_branch, "branch_parent_of": np.zeros(3), "parent": dressed.branch_parent}
+    found = athcodec.find_branches(bare(dressed, attributes=attributes))
+    assert np.array_equal(found.branch_parent, dressed.branch_parent)
+    assert np.array_equal(found.vertex_branch, dressed.vertex_branch)
+
+
+def test_a_skin_gives_its_joints(dressed):
+    joints = np.append(dressed.branch_parent, 0).astype(np.int32)  # one more joint, which moves nothing
+    found = athcodec.find_branches(bare(dressed, skin=Skin(joints, dressed.vertex_branch)))
+    assert found.method == "skeleton"
+    assert np.array_equal(found.branch_parent, dressed.branch_parent)
+
+
+def test_centre_lines_give_their_stems():
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        found = athcodec.find_branches(bare(sample))
+        assert found.method == "edges"
+        assert branch_orders(found.branch_parent).max() == branch_orders(sample.branch_parent).max()
+
+
+def walker(frames: int = 40) -> MotionClip:
+    """One closed mesh, a body on four legs, whose legs swing: no pieces, no edges, no names."""
+    rings, around = 60, 24
+    angle = 2 * np.pi * np.arange(around) / around
+    along = np.linspace(-1, 1, rings)
+    across = 0.3 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    body = np.column_stack([np.repeat(along, around), np.tile(across, (rings, 1))])
+    legs = np.abs(np.abs(body[:, 0]) - 0.75) < 0.12
+    drop = legs & (body[:, 1] < -0.1)
+    body[drop, 1] *= 4
+    ring = np.arange(rings - 1)[:, None] * around
+    side, following = np.arange(around), (np.arange(around) + 1) % around
+    quads = [ring + side, ring + following, ring + around + following, ring + around + side]
+    faces = np.stack(quads, axis=2).reshape(-1, 4)
+    time = np.arange(frames) / 30
+    positions = np.repeat(body[None], frames, axis=0)
+    for front in (-1, 1):
+        for left in (-1, 1):
+            leg = drop & (np.sign(body[:, 0]) == front) & (np.sign(body[:, 2]) == left)
+            swing = 0.4 * np.sin(2 * np.pi * 1.7 * time + front + 2 * left)
+            lever = body[leg, 1] + 0.1
+            positions[:, leg, 0] += -np.sin(swing)[:, None] * lever
+            positions[:, leg, 1] += (np.cos(swing)[:, None] - 1) * lever
+    positions[:, :, 1] += 0.05 * np.sin(2 * np.pi * 3.4 * time)[:, None]
+    positions[:, :, 2] += 0.1 * np.sin(3 * body[:, 0] + 4 * time[:, None])
+    return MotionClip(positions.astype(np.float32), time, faces=faces)
+
+
+def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
+    clip = walker()
+    found = athcodec.find_branches(clip)
+    assert found.method == "motion"
+    assert 1 < len(found.branch_parent) < clip.vertex_count / 10
+    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
+    assert result.bytes < clip.frame_count * clip.vertex_count * 12 / 50
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        apart = np.linalg.norm(decoder.positions(dtype=np.float64) - clip.block(0, clip.frame_count), axis=2)
+        assert apart.max() <= result.max_error_bound
+
+
+@pytest.mark.slow
+def test_a_walking_mesh_is_smaller_than_by_pca(tmp_path):
+    from bench.codecs import Source
+    from bench.codecs.coder import RangeCoder
+    from bench.codecs.pca import GlobalPca
+
+    clip = walker(80)
+    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-4, attributes="none", effort="best")
+    source = Source(clip)
+    assert result.bytes < len(GlobalPca(RangeCoder()).encode(source, 1e-4 * source.diagonal))
+
+
+@pytest.mark.parametrize("vertices", [1, 2, 5, 40])
+def test_points_without_any_mesh_are_compressed_too(tmp_path, vertices):
+    rng = np.random.default_rng(vertices)
+    clip = MotionClip(rng.normal(size=(6, vertices, 3)).astype(np.float32), np.arange(6.0))
+    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        apart = np.linalg.norm(decoder.positions(dtype=np.float64) - clip.block(0, 6), axis=2)
+        assert apart.max() <= result.max_error_bound
+
+
+def test_far_pieces_are_plants_of_their_own(dressed):
+    two = MotionClip(np.concatenate([dressed.block(0, FRAMES), dressed.block(0, FRAMES) + 500], axis=1), dressed.time,
+                     faces=np.concatenate([dressed.faces, dressed.faces + dressed.vertex_count]))
+    found = athcodec.find_branches(two)
+    assert len(found.branch_parent) == 2 * dressed.branch_count
+    assert (found.branch_parent < 0).sum() == 2
+
+
+def test_the_trunk_can_be_named(dressed):
+    vertex = int(np.flatnonzero(dressed.vertex_branch == 5)[0])
+    found = athcodec.find_branches(bare(dressed), root=vertex)
+    assert found.branch_parent[found.vertex_branch[vertex]] == -1
+
+
+def test_what_was_found_is_kept_edited_and_used(dressed, tmp_path, capsys):
+    source, kept, coded = (str(tmp_path / name) for name in ("a.h5", "a.json", "a.ath"))
+    athcodec.write_hdf5(source, bare(dressed))
+    assert main(["hierarchy", source, "--save", kept]) == 0
+    assert f"{dressed.branch_count:,} branches by components" in capsys.readouterr().out
+    content = json.loads(Path(kept).read_text())
+    content["branches"][-1]["parent"] = 0
+    Path(kept).write_text(json.dumps(content))
+    assert main(["encode", source, coded, "--hierarchy", kept, "--effort", "fast"]) == 0
+    with athcodec.open(coded) as decoder:
+        assert decoder.branch_parent[-1] == 0
+        found = athcodec.find_branches(bare(dressed))
+        assert np.array_equal(decoder.vertex_branch, found.vertex_branch)
+        assert np.array_equal(decoder.branch_parent[:-1], found.branch_parent[:-1])
+
+
+def test_a_saved_hierarchy_comes_back_unchanged(dressed, tmp_path):
+    mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
+    found = athcodec.find_branches(bare(mixed))
+    discovery.save(found, tmp_path / "a.json")
+    again = discovery.load(tmp_path / "a.json")
+    for name in ("vertex_branch", "branch_parent", "stem_index"):
+        assert np.array_equal(getattr(found, name), getattr(again, name)), name
+
+
+def one_branch(vertex_count: int, parent: int, vertices: str) -> str:
+    return json.dumps({"vertex_count": vertex_count, "branches": [{"branch": 0, "parent": parent, "vertices": vertices}]})
+
+
+@pytest.mark.parametrize("text, message", [
+    ("", "got no branches"), ("[]", "got no branches"), ('{"vertex_count": 3, "branches": [{}]}', "got no branches"),
+    (one_branch(3, -1, "0-1"), "expected each of 3 vertices"), (one_branch(2, 0, "0-1"), "its own parent"),
+    (one_branch(2, -1, "0-x"), "got no branches"), (one_branch(2, -1, "0-99999999999999"), "got no branches"),
+])
+def test_a_file_without_usable_branches_is_refused(tmp_path, text, message):
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(ClipError, match=message):
+        discovery.load(tmp_path / "a.json")
+
+
+def test_a_method_that_has_nothing_to_go_by_says_so(dressed):
+    with pytest.raises(ClipError, match="expected joints with weights"):
+        athcodec.find_branches(bare(dressed), "skeleton")
+    with pytest.raises(ValueError, match="method: got 'luck'"):
+        athcodec.find_branches(bare(dressed), "luck")
