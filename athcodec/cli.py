@@ -102,6 +102,7 @@ def _encode(args: argparse.Namespace) -> int:
             exact_rest=args.exact_rest, lossless=args.lossless, weights=args.weights,
             attributes=args.attributes,
             effort=args.effort,
+            jobs=args.jobs,
             progress=report,
             **_bound(args, unit),
         )
@@ -646,6 +647,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "--effort", choices=EFFORTS, default="default",
         help="how long to look for a smaller file (default: default)",
     )
+    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4); "
+                      "the file is the same whatever their number")
     verb.add_argument(
         "--rest", choices=("auto", "first", "mean"), default="auto",
         help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all "
@@ -780,6 +783,13 @@ def _tam(text: str) -> tuple[Length, int, Length, int]:
         raise ValueError(f"got {text!r}, expected four values: EPS,ETA,XI,LAMBDA")
     epsilon, eta, xi, lam = parts
     return parse_length(epsilon), _whole(eta), parse_length(xi), _whole(lam)
+
+
+def _jobs(text: str) -> int:
+    value = _number(text, int)
+    if value < 1:
+        raise ValueError(f"got {text!r}, expected a whole number, 1 or more")
+    return value
 
 
 def _rate(text: str) -> float:

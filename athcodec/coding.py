@@ -27,9 +27,9 @@ from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, positio
 FINER = 32  # times smaller than the step is that at which one learns
 
 
-def threads() -> int:
-    """Segments that are worked on at once."""
-    return min(4, os.cpu_count() or 1)
+def threads(jobs: int | None) -> int:
+    """Segments, or candidates, that are worked on at once: `jobs`, or as many as there are cores, at most 4."""
+    return jobs or min(4, os.cpu_count() or 1)
 
 
 @dataclass

@@ -75,7 +75,7 @@ class Summary:
 def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error: float | None = None,
            target_size: int | None = None, segment_frames: int | None = None, tam: Thresholds | None = None,
            exact_rest: bool = False, lossless: bool = False, weights: str | np.ndarray | None = None,
-           attributes: str = "all", effort: str = "default", progress: Progress | None = None) -> Summary:
+           attributes: str = "all", effort: str = "default", jobs: int | None = None, progress: Progress | None = None) -> Summary:
     """Compresses a clip into an .ath file at `path`, which appears only when it is whole.
 
     max_error: bound in scene units on the distance of every vertex in every frame; or rel_error: the same as a fraction
@@ -85,10 +85,11 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. weights: a factor
     on the bound for each vertex, (N,) above 0, or the name of the attribute that holds them: vertex v is within
     weights[v] times the bound, the largest of which the file promises for all. attributes: "none" drops faces, edges
-    and named arrays. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError,
+    and named arrays. jobs: threads (default: one per core, at most 4); the file is the same whatever their number,
+    memory grows with it. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError,
     ValueError, OSError.
     """
-    _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort)
+    _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
     report = progress or (lambda stage, fraction: None)
     check_target(path)  # before any work
     clip.check()
@@ -102,7 +103,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
     source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
                     None if weights is None else weights[hierarchy.vertex_source])
-    job = _Job(source, tam, attributes == "all", effort, report, lossless)
+    job = _Job(source, tam, attributes == "all", effort, report, lossless, jobs)
     if target_size is not None:
         bound = _bound_for_size(job, target_size)
     else:
@@ -116,7 +117,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     return summary
 
 
-def _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort) -> None:
+def _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs) -> None:
     given = [name for name, value in (("max_error", max_error), ("rel_error", rel_error), ("target_size", target_size))
              if value is not None]
     if len(given) > 1:
@@ -128,6 +129,8 @@ def _check_options(max_error, rel_error, target_size, segment_frames, attributes
         raise ValueError(f"segment_frames: got {segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
     if attributes not in ("all", "none"):
         raise ValueError(f"attributes: got {attributes!r}; expected 'all' or 'none'")
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs: got {jobs}; expected at least 1")
     if effort not in EFFORTS:
         raise ValueError(f"effort: got {effort!r}; expected one of {', '.join(EFFORTS)}")
 
@@ -219,6 +222,7 @@ class _Job:
     effort: str
     report: Progress
     lossless: bool
+    jobs: int | None = None
 
     @property
     def clip(self) -> MotionClip:
@@ -235,7 +239,7 @@ class _Job:
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
                        self.source.reach)
         ath = self.seen.ath(self.thresholds(bound))
-        search = Search(self.source, ath, bound, self.effort, self.report)
+        search = Search(self.source, ath, bound, self.effort, self.report, self.jobs)
         settings = search.best()
         shape = Shape(self.source, ath, settings)
         shapes = search.shapes(shape.plan, settings)
@@ -283,10 +287,10 @@ class _Job:
         """Codes all segments, a few at a time; returns (levels, segments, 2) errors."""
         count = len(self.source.segments)
         errors = np.zeros((shape.plan.level_count + self.lossless, count, 2))
-        with ThreadPoolExecutor(threads()) as pool:
+        with ThreadPoolExecutor(threads(self.jobs)) as pool:
             pending: deque[Future] = deque()
             for index in range(count):
-                if len(pending) == threads():
+                if len(pending) == threads(self.jobs):
                     self._collect(store, errors, index - len(pending), pending.popleft())
                 block = self.source.block(index)
                 exact = self.source.exact(block) if self.lossless else None

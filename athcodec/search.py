@@ -31,8 +31,9 @@ Progress = Callable[[str, float], None]
 class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes."""
 
-    def __init__(self, source: Source, ath: Ath, bound: float, effort: str, report: Progress):
-        self.source, self.ath, self.effort, self.report = source, ath, effort, report
+    def __init__(self, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
+                 jobs: int | None = None):
+        self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
         step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
         self.levels = ath.height + 2
@@ -144,7 +145,7 @@ class Search:
         return counts / counts.sum()
 
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
-        with ThreadPoolExecutor(threads()) as pool:
+        with ThreadPoolExecutor(threads(self.jobs)) as pool:
             return list(pool.map(self.cost, candidates))
 
     def _with_basis(self, settings: Settings) -> Settings:

@@ -243,10 +243,9 @@ def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
     assert first == second
 
 
-def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path, monkeypatch):
-    many = encoded(bushy_clip, tmp_path, segment_frames=16, effort="default")
-    monkeypatch.setattr("athcodec.encoder.threads", lambda: 1)
-    assert encoded(bushy_clip, tmp_path, segment_frames=16, effort="default") == many
+def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path):
+    one, two, five = (encoded(bushy_clip, tmp_path, segment_frames=16, effort="default", jobs=jobs) for jobs in (1, 2, 5))
+    assert one == two == five
 
 
 def test_encoding_leaves_the_clip_as_it_was(bushy_clip, tmp_path):
@@ -321,7 +320,8 @@ def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
 def peak_memory(clip: MotionClip, folder) -> int:
     tracemalloc.start()
     try:
-        athcodec.encode(clip, folder / "s.ath", segment_frames=32, effort="fast")
+        athcodec.encode(clip, folder / "s.ath", segment_frames=32, effort="fast",
+                        jobs=1)  # how far threads run ahead differs from run to run
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -330,12 +330,17 @@ def peak_memory(clip: MotionClip, folder) -> int:
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     monkeypatch.setattr("athcodec.encoder.SPOOL_BYTES", 1 << 16)
-    monkeypatch.setattr("athcodec.encoder.threads", lambda: 1)  # how far threads run ahead differs from run to run
     peak_memory(endless_clip(64), tmp_path)   # what is made once, such as imports, is not counted
     short, long = (peak_memory(endless_clip(frames), tmp_path) for frames in (320, 1600))
     raw = 1600 * 200 * 12
     assert long < 1.2 * short + 200_000, "but for a few numbers per frame and segment"
     assert long - short < raw / 4
+
+
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_no_threads_at_all_are_refused(tmp_path, jobs):
+    with pytest.raises(ValueError, match="jobs: got"):
+        athcodec.encode(endless_clip(2), tmp_path / "s.ath", jobs=jobs)
 
 
 def test_long_clips_decode_in_time_proportional_to_their_length(tmp_path):
