@@ -631,14 +631,14 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument(
-        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or an MTG file, or "
-        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
+        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or an MTG file, "
+        f"or found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument("--lossless", action="store_true",
                       help="one more level gives positions and rest pose bit for bit; the bound is for the one before")
-    verb.add_argument("--weights", metavar="NAME", help="attribute with a factor on the bound for each vertex: 4 where it "
-                      "may be four times as far off")
+    verb.add_argument("--weights", metavar="NAME", help="attribute with a factor on the bound for each vertex: 4 where "
+                      "it may be four times as far off")
     verb.add_argument(
         "--attributes", choices=("all", "none"), default="all",
         help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",

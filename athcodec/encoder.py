@@ -75,7 +75,8 @@ class Summary:
 def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error: float | None = None,
            target_size: int | None = None, segment_frames: int | None = None, tam: Thresholds | None = None,
            exact_rest: bool = False, lossless: bool = False, weights: str | np.ndarray | None = None,
-           attributes: str = "all", effort: str = "default", jobs: int | None = None, progress: Progress | None = None) -> Summary:
+           attributes: str = "all", effort: str = "default", jobs: int | None = None,
+           progress: Progress | None = None) -> Summary:
     """Compresses a clip into an .ath file at `path`, which appears only when it is whole.
 
     max_error: bound in scene units on the distance of every vertex in every frame; or rel_error: the same as a fraction

@@ -244,7 +244,8 @@ def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
 
 
 def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path):
-    one, two, five = (encoded(bushy_clip, tmp_path, segment_frames=16, effort="default", jobs=jobs) for jobs in (1, 2, 5))
+    one, two, five = (encoded(bushy_clip, tmp_path, segment_frames=16, effort="default", jobs=jobs)
+                      for jobs in (1, 2, 5))
     assert one == two == five
 
 
