@@ -1,0 +1,781 @@
+"""Reads USD stages: meshes, curves and points whose points, transforms or skeletons move.
+
+Every visible prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or
+"render" is read, also inside instances, into world space: time samples (interpolated as USD does), transforms, and of
+UsdSkel the skinning and the blend shapes. The frames are the whole time codes of the stage's range where it has one,
+else the time codes that have samples; options.fps sets another rate. Static primvars become attributes.
+
+Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
+what a layer needs and cannot be found is one warning each. Point instancers, patches, tetrahedra, materials and
+velocities are not read. A stage is opened by its structure; positions are read frame by frame.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
+
+from athcodec.clip import RESERVED_NAMES, MotionClip, Skin
+from athcodec.errors import ClipError
+from athcodec.sources import ReadOptions
+from athcodec.sources.crate import check_crates
+from athcodec.sources.frames import Frames
+from athcodec.units import METRES
+
+MAX_FRAMES = 1 << 24
+MAX_METADATA_BYTES = 1 << 24
+PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+NAMES = {"st": "uv", "displayColor": "colors"}
+OWN = "athcodec"  # the namespace of what exporters/usd.py writes besides
+DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """Open the clip in the USD file `path`; close it, or use it in a `with` statement.
+
+    options.only are patterns of prim names or paths, options.fps the rate at which the stage is sampled in place of its
+    own. The rest pose is a static primvar `rest` where every prim has one. Raises ClipError, OSError.
+    """
+    path = fspath(path)
+    try:
+        check_crates(path)
+        with quietly():
+            return _clip(_Stage(path), options)
+    except ClipError as error:
+        raise ClipError(f"{path}: {error}") from None
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Keeps what USD has to say off stderr; its errors become ClipError, one line each."""
+    with Tf.DiagnosticTrap() as trap:
+        try:
+            yield
+        except Tf.ErrorException as error:
+            raise ClipError(f"stage: {_one_line(error)}") from None
+        finally:
+            trap.Clear()
+
+
+def _one_line(error: Exception) -> str:
+    """What the first of USD's errors says, without its place in USD's source."""
+    try:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    except UnicodeDecodeError:  # it quotes bytes of the file
+        return "cannot be parsed"
+    text = (lines or [type(error).__name__])[0].split(" : '", 1)
+    return text[-1].rstrip("'")
+
+
+class _Stage:
+    """An open stage, and whether the files that it is made of have stayed as they were."""
+
+    def __init__(self, path: str):
+        known = Sdf.Layer.Find(path)
+        if known:
+            known.Reload()  # USD keeps layers for as long as anybody has them open
+        self.stage = Usd.Stage.Open(path)
+        if not self.stage:
+            raise ClipError("stage: cannot be opened")
+        for error in self.stage.GetCompositionErrors():
+            warnings.warn(f"{path}: {' '.join(str(error).split())}", stacklevel=4)
+        self._files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
+        self._stamps = self._now()
+
+    def _now(self) -> list[tuple[int, int] | None]:
+        def stamp(name: str) -> tuple[int, int] | None:
+            try:
+                found = os.stat(name)
+            except OSError:
+                return None
+            return found.st_size, found.st_mtime_ns
+
+        return [stamp(name) for name in self._files]
+
+    def unchanged(self) -> bool:
+        return self._now() == self._stamps
+
+    def close(self) -> None:
+        self.stage = None
+
+
+@dataclass
+class _Static:
+    """A named array of one part and what its rows stand for: vertex, corner, face or constant."""
+
+    domain: str
+    values: np.ndarray
+
+
+@dataclass
+class _Part:
+    """One prim: its place among the vertices, how its points are found, and what does not move."""
+
+    prim: Usd.Prim
+    kind: str
+    points: Usd.AttributeQuery
+    first: int = 0
+    count: int = 0
+    face_counts: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    face_indices: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    curve_counts: np.ndarray | None = None
+    details: dict[str, str] = field(default_factory=dict)
+    statics: dict[str, _Static] = field(default_factory=dict)
+    skeleton: _Skeleton | None = None
+    moves: bool = False
+    still: np.ndarray | None = None  # the positions where nothing moves
+
+    @property
+    def name(self) -> str:
+        return self.prim.GetName()
+
+    @property
+    def path(self) -> str:
+        return str(self.prim.GetPath())
+
+    def rows(self, domain: str) -> int:
+        sizes = {"vertex": self.count, "corner": len(self.face_indices), "face": len(self.face_counts), "constant": 1}
+        return sizes[domain]
+
+
+def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
+    stage = source.stage
+    layer = _own_metadata(stage)
+    parts = _find_parts(stage, options.only)
+    skins = _bind_skeletons(stage, parts)
+    codes, rate = _time_codes(stage, parts, options.fps, layer.pop("irregular", False))
+    parts = _visible(parts, codes)
+    _measure(parts, codes)
+    metadata = layer | _metadata(stage, parts, codes, rate)
+    frames = _Reader(source, parts, codes)
+    attributes, domains = _attributes(parts, options.skip)
+    _own_attributes(stage, attributes, domains, options.skip)
+    if domains:
+        metadata["domains"] = domains
+    fields = _fields(attributes, domains)
+    faces = _faces(parts, attributes)
+    rest = fields.pop("rest", None)
+    edges = fields.pop("edges", None)
+    clip = MotionClip(
+        positions=Frames(frames.read, len(codes), sum(part.count for part in parts)),
+        time=(codes - codes[0]) / stage.GetTimeCodesPerSecond(),
+        rest=rest if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        edges=_edges(parts) if edges is None else edges,
+        faces=faces,
+        attributes=attributes,
+        metadata=metadata,
+        resource=source,
+        unchanged=source.unchanged,
+        skin=_skin(parts, skins),
+        **fields,
+    )
+    return clip
+
+
+# ---- prims ----
+
+
+def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Part]:
+    parts = []
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()
+            continue
+        kind = _kind(prim)
+        if kind is None or not _wanted(prim, only) or UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
+            continue
+        points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
+        if points.HasAuthoredValue():
+            parts.append(_Part(prim, kind, points))
+    if not parts:
+        what = f" named like {', '.join(only)}" if only else ""
+        raise ClipError(f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or "
+                        "Points")
+    return parts
+
+
+def _kind(prim: Usd.Prim) -> str | None:
+    for schema, kind in ((UsdGeom.Mesh, "mesh"), (UsdGeom.Curves, "curves"), (UsdGeom.Points, "points")):
+        if prim.IsA(schema):
+            return kind
+    return None
+
+
+def _wanted(prim: Usd.Prim, only: Sequence[str]) -> bool:
+    names = (prim.GetName(), str(prim.GetPath()))
+    return not only or any(fnmatchcase(name, pattern) for pattern in only for name in names)
+
+
+def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    while prim and not prim.IsPseudoRoot():
+        yield prim
+        prim = prim.GetParent()
+
+
+def _visible(parts: list[_Part], codes: np.ndarray) -> list[_Part]:
+    """Those that are seen at some time from the first frame to the last."""
+    def seen(prim: Usd.Prim) -> bool:
+        times = {float(codes[0])}
+        for each in _lineage(prim):
+            attribute = UsdGeom.Imageable(each).GetVisibilityAttr() if each.IsA(UsdGeom.Imageable) else None
+            times.update(t for t in (attribute.GetTimeSamples() if attribute else ()) if codes[0] <= t <= codes[-1])
+        image = UsdGeom.Imageable(prim)
+        return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
+
+    left = [part for part in parts if seen(part.prim)]
+    if not left:
+        raise ClipError(f"prims: got {len(parts)} that are invisible, expected a visible one")
+    return left
+
+
+def _measure(parts: list[_Part], codes: np.ndarray) -> None:
+    """Fills in what the parts are at the first frame."""
+    first, cache = 0, UsdGeom.XformCache(codes[0])
+    for part in parts:
+        points = _points(part, codes, 0)
+        part.first, part.count = first, len(points)
+        first += part.count
+        part.moves = any(each.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(each).TransformMightBeTimeVarying()
+                         for each in _lineage(part.prim))
+        _topology(part, codes)
+        _statics(part, codes, np.array(cache.GetLocalToWorldTransform(part.prim)))
+    if first == 0:
+        raise ClipError("points: got none, expected at least one")
+
+
+def _topology(part: _Part, codes: np.ndarray) -> None:
+    if part.kind == "mesh":
+        mesh = UsdGeom.Mesh(part.prim)
+        part.face_counts = _fixed(part, mesh.GetFaceVertexCountsAttr(), codes)
+        part.face_indices = _fixed(part, mesh.GetFaceVertexIndicesAttr(), codes)
+        if (part.face_counts < 0).any() or part.face_counts.sum(dtype=np.int64) != len(part.face_indices):
+            raise ClipError(f"{part.path}: got faces of {part.face_counts.sum(dtype=np.int64)} corners, expected "
+                            f"{len(part.face_indices)}, one per index")
+        _check_range(part, part.face_indices)
+        _note(part, "orientation", mesh.GetOrientationAttr(), "rightHanded")
+    elif part.kind == "curves":
+        part.curve_counts = _fixed(part, UsdGeom.Curves(part.prim).GetCurveVertexCountsAttr(), codes)
+        if (part.curve_counts < 0).any() or part.curve_counts.sum(dtype=np.int64) != part.count:
+            raise ClipError(f"{part.path}: got curves of {part.curve_counts.sum(dtype=np.int64)} points, expected "
+                            f"{part.count}")
+        if part.prim.IsA(UsdGeom.BasisCurves):
+            curves = UsdGeom.BasisCurves(part.prim)
+            _note(part, "type", curves.GetTypeAttr(), "linear")
+            _note(part, "wrap", curves.GetWrapAttr(), "nonperiodic")
+            if "type" in part.details:
+                _note(part, "basis", curves.GetBasisAttr(), "")
+
+
+def _note(part: _Part, name: str, attribute: Usd.Attribute, usual: str) -> None:
+    value = attribute.Get()
+    if value and value != usual:
+        part.details[name] = str(value)
+
+
+def _check_range(part: _Part, indices: np.ndarray) -> None:
+    bad = np.flatnonzero((indices < 0) | (indices >= part.count))
+    if bad.size:
+        raise ClipError(f"{part.path}: corner {bad[0]} is vertex {indices[bad[0]]}, expected 0 to {part.count - 1}")
+
+
+def _fixed(part: _Part, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
+    """Integers that stay the same in every frame; ClipError where they change."""
+    query = Usd.AttributeQuery(attribute)
+    first = _array(query.Get(codes[0]), np.int32)
+    if query.GetNumTimeSamples() > 1 and query.ValueMightBeTimeVarying():
+        for sample in query.GetTimeSamplesInInterval(_interval(codes)):
+            if not np.array_equal(_array(query.Get(sample), np.int32), first):
+                frame = int(np.searchsorted(codes, sample - 1e-9))
+                raise ClipError(f"{part.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
+                                f"(time code {sample:g}), expected the same vertices and faces in all")
+    return first
+
+
+def _interval(codes: np.ndarray) -> Gf.Interval:
+    return Gf.Interval(float(codes[0]), float(codes[-1]))
+
+
+def _array(value: Any, dtype: Any) -> np.ndarray:
+    return np.empty(0, dtype) if value is None else np.array(value, dtype)
+
+
+# ---- time ----
+
+
+def _time_codes(stage: Usd.Stage, parts: list[_Part], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
+    """Time codes to read, and frames per second."""
+    own = stage.GetTimeCodesPerSecond()
+    if not 0 < own < math.inf:
+        raise ClipError(f"timeCodesPerSecond: got {own}, expected a positive number")
+    start, end, samples = stage.GetStartTimeCode(), stage.GetEndTimeCode(), None
+    if not stage.HasAuthoredTimeCodeRange() or not start <= end or irregular:
+        samples = _sampled(parts)
+        if not fps:
+            return (np.array(samples) if samples else np.zeros(1)), own
+        start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
+    if not (math.isfinite(start) and math.isfinite(end)):
+        raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
+    step = own / fps if fps else 1.0
+    count = math.floor((end - start) / step + 1e-6) + 1
+    if count > MAX_FRAMES:
+        raise ClipError(f"time codes: got {start:g} to {end:g}, expected at most {MAX_FRAMES} frames")
+    return start + np.arange(count) * step, fps or own
+
+
+def _sampled(parts: list[_Part]) -> list[float]:
+    found: set[float] = set()
+    for part in parts:
+        found.update(part.points.GetTimeSamples())
+        prims = [part.prim] if part.skeleton is None else [part.prim, part.skeleton.query.GetPrim()]
+        for prim in (each for one in prims for each in _lineage(one)):
+            if prim.IsA(UsdGeom.Xformable):
+                found.update(UsdGeom.Xformable(prim).GetTimeSamples())
+        if part.skeleton is not None and part.skeleton.animation:
+            found.update(part.skeleton.animation.GetJointTransformTimeSamples())
+            found.update(part.skeleton.animation.GetBlendShapeWeightTimeSamples())
+    return sorted(time for time in found if math.isfinite(time))
+
+
+def _metadata(stage: Usd.Stage, parts: list[_Part], codes: np.ndarray, rate: float) -> dict[str, Any]:
+    start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
+    metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+        metres = UsdGeom.GetStageMetersPerUnit(stage)
+        symbols = [symbol for symbol, value in METRES.items() if math.isclose(value, metres, rel_tol=1e-6)]
+        metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
+        metadata["up_axis"] = str(UsdGeom.GetStageUpAxis(stage)).lower()
+    names = [part.name for part in parts]
+    unique = len(set(names)) == len(names)
+    metadata["part_names"] = names if unique else [part.path for part in parts]
+    metadata["part_kinds"] = [part.kind for part in parts]
+    if any(part.details for part in parts):
+        metadata["part_usd"] = [part.details for part in parts]
+    return metadata
+
+
+def _own_metadata(stage: Usd.Stage) -> dict[str, Any]:
+    """What exporters/usd.py has kept of a clip's metadata, of any other file nothing."""
+    text = stage.GetRootLayer().customLayerData.get(OWN)
+    if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
+        return {}
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    known = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
+    return {name: value for name, value in found.items() if name not in known} if isinstance(found, dict) else {}
+
+
+# ---- what does not move ----
+
+
+def _statics(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
+    for primvar in UsdGeom.PrimvarsAPI(part.prim).FindPrimvarsWithInheritance():
+        if primvar.HasValue() and not primvar.ValueMightBeTimeVarying():
+            values = primvar.ComputeFlattened(codes[0])
+            name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
+            _keep(part, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar.GetElementSize(),
+                  primvar.GetAttr())
+    _rename_first_uv(part)
+    normals = UsdGeom.PointBased(part.prim).GetNormalsAttr()
+    if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in part.statics:
+        _keep(part, "normals", normals.Get(codes[0]), UsdGeom.PointBased(part.prim).GetNormalsInterpolation())
+    _turn_normals(part, matrix)
+    if part.kind != "mesh":
+        _widths(part, codes, matrix)
+    rest = part.statics.get("rest")
+    if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
+        part.statics["rest"] = _Static(rest.domain, _moved(rest.values, matrix))
+
+
+def _rename_first_uv(part: _Part) -> None:
+    """Where no primvar is called st, the first texture coordinates are what a renderer takes."""
+    if "uv" in part.statics:
+        return
+    for primvar in UsdGeom.PrimvarsAPI(part.prim).GetPrimvars():
+        name = primvar.GetPrimvarName()
+        if primvar.GetTypeName().role == Sdf.ValueRoleNames.TextureCoordinate and name in part.statics:
+            part.statics = {("uv" if key == name else key): each for key, each in part.statics.items()}
+            return
+
+
+def _turn_normals(part: _Part, matrix: np.ndarray) -> None:
+    """Into world space; away where what they belong to turns."""
+    normals = part.statics.get("normals")
+    if normals is None or normals.values.shape[1:] != (3,):
+        return
+    if part.moves or part.skeleton is not None:
+        del part.statics["normals"]
+        return
+    if np.array_equal(matrix[:3, :3], np.eye(3)) or not np.linalg.det(matrix[:3, :3]):
+        return
+    turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
+    part.statics["normals"] = _Static(normals.domain, turned.astype(normals.values.dtype))
+
+
+def _widths(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
+    schema = (UsdGeom.Curves if part.kind == "curves" else UsdGeom.Points)(part.prim)
+    widths = schema.GetWidthsAttr()
+    if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in part.statics:
+        _keep(part, "radius", widths.Get(codes[0]), schema.GetWidthsInterpolation())
+        if "radius" in part.statics:
+            scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+            radius = part.statics["radius"]
+            part.statics["radius"] = _Static(radius.domain, (radius.values * scale).astype(radius.values.dtype))
+
+
+def _keep(part: _Part, name: str, values: Any, interpolation: str, element_size: int = 1,
+          attribute: Usd.Attribute | None = None) -> None:
+    """Notes a static array where its rows fit the prim; strings and references to files are none."""
+    values = _numbers(values)
+    domain = DOMAINS.get(interpolation)
+    if values is None or domain is None or name in part.statics:
+        return
+    if element_size > 1 and len(values) % element_size == 0:
+        values = values.reshape(-1, element_size, *values.shape[1:])
+        values = values[..., 0] if values.shape[2:] == (1,) else values
+    values = _as_written(values, attribute)
+    if domain == "constant" and len(values) != 1:
+        return
+    if domain == "face" and part.kind == "curves" and len(values) == len(part.curve_counts):
+        domain, values = "vertex", np.repeat(values, part.curve_counts, axis=0)
+    elif domain == "face" and part.kind == "points":
+        domain = "constant"
+    if len(values) == part.rows(domain):
+        part.statics[name] = _Static(domain, values)
+
+
+def _numbers(values: Any) -> np.ndarray | None:
+    if values is None:
+        return None
+    try:
+        array = np.array(values)
+    except (TypeError, ValueError):
+        return None
+    if array.dtype.kind not in "biuf" or not isinstance(values, (bool, int, float)) and array.ndim == 0:
+        return None
+    return array.reshape(-1) if array.ndim == 0 else array if _is_array(values) else array[None]
+
+
+def _is_array(values: Any) -> bool:
+    return type(values).__module__.startswith("pxr.Vt")
+
+
+def _as_written(values: np.ndarray, attribute: Usd.Attribute | None) -> np.ndarray:
+    """In the dtype that an array had before exporters/usd.py chose one that USD has."""
+    said = _said(attribute, "dtype") if attribute else None
+    return values.astype(said) if said in WRITTEN_DTYPES else values
+
+
+def _said(attribute: Usd.Attribute, key: str) -> str | None:
+    found = attribute.GetCustomDataByKey(f"{OWN}:{key}")
+    return found if isinstance(found, str) else None
+
+
+WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8", ">u8", ">f2", ">f4", ">f8", "<f2")
+
+
+def _attributes(parts: list[_Part], skip: Any) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Static arrays of all parts, one after the other, and what their rows stand for where that is no vertex."""
+    attributes, domains = {}, {}
+    for name in dict.fromkeys(name for part in parts for name in part.statics):
+        if name in skip:
+            continue
+        joined = _joined(name, parts)
+        if joined is not None:
+            attributes[name] = joined.values
+            if joined.domain != "vertex":
+                domains[name] = joined.domain
+    attributes["part_vertex_counts"] = np.array([part.count for part in parts], np.int32)
+    domains["part_vertex_counts"] = "constant"
+    if any(part.curve_counts is not None for part in parts):
+        attributes["curve_vertex_counts"] = np.concatenate([part.curve_counts for part in parts
+                                                            if part.curve_counts is not None])
+        domains["curve_vertex_counts"] = "constant"
+    return attributes, domains
+
+
+def _joined(name: str, parts: list[_Part]) -> _Static | None:
+    """A part that lacks the array has zeros; None where the parts' arrays do not go together."""
+    found = [part.statics[name] for part in parts if name in part.statics]
+    shapes = {each.values.shape[1:] for each in found}
+    if len(shapes) != 1:
+        return None
+    domain = _common_domain(found, len(parts))
+    dtypes = {each.values.dtype for each in found}
+    dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
+    if domain == "constant":
+        return _Static(domain, found[0].values.astype(dtype, copy=False))
+    rows = [_spread(part, part.statics.get(name), domain, next(iter(shapes))) for part in parts]
+    return _Static(domain, np.concatenate(rows).astype(dtype, copy=False))
+
+
+def _common_domain(found: list[_Static], part_count: int) -> str:
+    domains = {each.domain for each in found}
+    if domains == {"constant"}:
+        same = all(np.array_equal(each.values, found[0].values) for each in found)
+        return "constant" if same and len(found) == part_count else "vertex"
+    domains.discard("constant")
+    return domains.pop() if len(domains) == 1 else "corner"
+
+
+def _spread(part: _Part, static: _Static | None, domain: str, shape: tuple[int, ...]) -> np.ndarray:
+    if static is None:
+        return np.zeros((part.rows(domain), *shape), np.uint8)
+    if static.domain == domain:
+        return static.values
+    if static.domain == "constant":
+        return np.repeat(static.values, part.rows(domain), axis=0)
+    if static.domain == "vertex":
+        return static.values[part.face_indices]
+    return np.repeat(static.values, part.face_counts, axis=0)
+
+
+def _faces(parts: list[_Part], attributes: dict[str, np.ndarray]) -> np.ndarray | None:
+    """(F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
+    counts = np.concatenate([part.face_counts for part in parts])
+    if not len(counts):
+        return None
+    indices = np.concatenate([part.face_indices + np.int32(part.first) for part in parts])
+    if counts.min() == counts.max() > 0:
+        return indices.reshape(-1, counts[0])
+    attributes |= {"face_vertex_counts": counts, "face_vertex_indices": indices}
+    return None
+
+
+def _edges(parts: list[_Part]) -> np.ndarray | None:
+    """Those between the neighbours on each curve; closed where it is periodic."""
+    edges = []
+    for part in parts:
+        if part.curve_counts is None or not part.count:
+            continue
+        counts = part.curve_counts[part.curve_counts > 0].astype(np.int64)
+        ends = np.cumsum(counts)
+        vertices = np.arange(part.count)
+        following = vertices + 1
+        keep = np.ones(part.count, bool)
+        if part.details.get("wrap") == "periodic":
+            following[ends - 1] = ends - counts
+            keep[ends - 1] = counts > 2
+        else:
+            keep[ends - 1] = False
+        edges.append(np.stack([vertices, following], axis=1)[keep] + part.first)
+    return np.concatenate(edges).astype(np.int32) if edges else None
+
+
+# ---- what exporters/usd.py has written of a clip that USD has no place for ----
+
+
+def _own_attributes(stage: Usd.Stage, attributes: dict[str, np.ndarray], domains: dict[str, str], skip: Any) -> None:
+    root = stage.GetDefaultPrim()
+    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
+    for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
+        if not isinstance(attribute, Usd.Attribute):
+            continue
+        name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1:]
+        values, domain = _own_array(attribute), _said(attribute, "domain")
+        if values is None or name in skip or name in attributes or domain == "vertex" and len(values) != vertices:
+            continue
+        attributes[name] = values
+        if domain and domain != "vertex":
+            domains[name] = domain
+
+
+def _own_array(attribute: Usd.Attribute) -> np.ndarray | None:
+    values, dtype, shape = attribute.Get(), _said(attribute, "dtype"), _said(attribute, "shape")
+    if not isinstance(values, Vt.UCharArray) or dtype is None or shape is None:
+        return None
+    try:
+        kind = np.dtype([tuple(each) for each in json.loads(dtype)] if dtype.startswith("[") else dtype)
+        return None if kind.hasobject else np.frombuffer(np.array(values).tobytes(), kind).reshape(json.loads(shape))
+    except (ValueError, TypeError, RecursionError):
+        return None
+
+
+def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
+    """Takes what a MotionClip has members for out of the attributes; others of these names are renamed."""
+    fields = {}
+    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
+    rest, edges = attributes.get("rest"), attributes.get("edges")
+    if rest is not None and rest.shape == (vertices, 3) and rest.dtype.kind == "f" and "rest" not in domains:
+        fields["rest"] = attributes.pop("rest")
+    if edges is not None and edges.ndim == 2 and edges.shape[1] == 2 and edges.dtype.kind in "iu":
+        fields["edges"] = attributes.pop("edges")
+    if "vertex_branch" in attributes and "branch_parent" in attributes:
+        for name in ("vertex_branch", "branch_parent", "stem_index"):
+            if name in attributes:
+                fields[name] = attributes.pop(name)
+    for name in [name for name in attributes if name in RESERVED_NAMES]:
+        attributes[f"{name}_primvar"] = attributes.pop(name)
+        if name in domains:
+            domains[f"{name}_primvar"] = domains.pop(name)
+    for name in fields:
+        domains.pop(name, None)
+    return fields
+
+
+# ---- skeletons ----
+
+
+class _Skeleton:
+    """A skeleton and one mesh that it moves."""
+
+    def __init__(self, query: UsdSkel.SkeletonQuery, target: UsdSkel.SkinningQuery):
+        self.query, self.target = query, target
+        self.animation = query.GetAnimQuery()
+        self.skins = target.HasJointInfluences()
+        self._shapes = self._mapper = None
+        if target.HasBlendShapes() and self.animation:
+            self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(target.GetPrim()))
+            self._mapper = target.GetBlendShapeMapper()
+            self._indices = self._shapes.ComputeBlendShapePointIndices()
+            self._offsets = self._shapes.ComputeSubShapePointOffsets()
+
+    def deform(self, points: Vt.Vec3fArray, code: float) -> Vt.Vec3fArray:
+        """Points in the skeleton's space where joints move them, else in the mesh's own."""
+        points = Vt.Vec3fArray(points)
+        if self._shapes is not None:
+            self._blend(points, code)
+        if self.skins:
+            joints = self.query.ComputeSkinningTransforms(code)
+            if not joints or not self.target.ComputeSkinnedPoints(joints, points, code):
+                raise ClipError(f"{self.target.GetPrim().GetPath()}: its skeleton cannot be evaluated at {code:g}")
+        return points
+
+    def _blend(self, points: Vt.Vec3fArray, code: float) -> None:
+        weights = self.animation.ComputeBlendShapeWeights(code)
+        if weights is None:
+            return
+        if self._mapper is not None:
+            weights = self._mapper.Remap(weights, elementSize=1)
+        found = self._shapes.ComputeSubShapeWeights(weights)
+        if found is None or not self._shapes.ComputeDeformedPoints(*found, self._indices, self._offsets, points):
+            raise ClipError(f"{self.target.GetPrim().GetPath()}: its blend shapes cannot be evaluated at {code:g}")
+
+    @property
+    def space(self) -> Usd.Prim:
+        return self.query.GetPrim() if self.skins else self.target.GetPrim()
+
+    def largest(self, count: int) -> np.ndarray:
+        """(count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
+        found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
+        if not found or count == 0:
+            return np.full(count, -1, np.int32)
+        joints, weights = (np.array(each).reshape(count, -1) for each in found)
+        rows = np.arange(count), weights.argmax(axis=1)
+        chosen = joints[rows]
+        order = self.target.GetJointOrder()
+        if order:
+            places = {str(name): i for i, name in enumerate(self.query.GetJointOrder())}
+            own = np.array([places.get(str(name), -1) for name in order])
+            chosen = own[np.clip(chosen, 0, len(own) - 1)]
+        return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
+
+
+def _bind_skeletons(stage: Usd.Stage, parts: list[_Part]) -> list[UsdSkel.SkeletonQuery]:
+    by_path = {part.prim.GetPath(): part for part in parts}
+    predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+    queries = []
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), predicate):
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        root, cache = UsdSkel.Root(prim), UsdSkel.Cache()
+        cache.Populate(root, predicate)
+        for binding in cache.ComputeSkelBindings(root, predicate):
+            query = cache.GetSkelQuery(binding.GetSkeleton())
+            queries.append((cache, query))  # the cache owns what the query refers to
+            for target in binding.GetSkinningTargets():
+                part = by_path.get(target.GetPrim().GetPath())
+                if part is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
+                    part.skeleton = _Skeleton(query, target)
+    return queries
+
+
+def _skin(parts: list[_Part], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
+    """The joints of all skeletons, one after the other."""
+    parents, names, first = [], [], {}
+    for _, query in queries:
+        path = query.GetPrim().GetPath()
+        if path in first:
+            continue
+        first[path] = sum(map(len, parents))
+        own = np.array(query.GetTopology().GetParentIndices(), np.int32)
+        parents.append(np.where(own < 0, -1, own + first[path]))
+        names += [str(name) for name in query.GetJointOrder()]
+    if not names or not any(part.skeleton is not None and part.skeleton.skins for part in parts):
+        return None
+    joints = np.full(sum(part.count for part in parts), -1, np.int32)
+    for part in parts:
+        if part.skeleton is not None:
+            own = part.skeleton.largest(part.count)
+            offset = first[part.skeleton.query.GetPrim().GetPath()]
+            joints[part.first: part.first + part.count] = np.where(own < 0, -1, own + offset)
+    return Skin(np.concatenate(parents).astype(np.int32), joints, names)
+
+
+# ---- positions ----
+
+
+class _Reader:
+    """Positions of all parts, frame by frame."""
+
+    def __init__(self, source: _Stage, parts: list[_Part], codes: np.ndarray):
+        self._source, self._parts, self._codes = source, parts, codes
+        self._count = sum(part.count for part in parts)
+
+    def read(self, start: int, stop: int) -> np.ndarray:
+        """(stop - start, N, 3) float32. Raises ClipError."""
+        if self._source.stage is None:
+            raise ClipError("positions: the clip is closed")
+        out = np.empty((stop - start, self._count, 3), np.float32)
+        with quietly():
+            for row, frame in enumerate(range(start, stop)):
+                cache = UsdGeom.XformCache(self._codes[frame])
+                for part in self._parts:
+                    out[row, part.first: part.first + part.count] = self._part(part, frame, cache)
+        return out
+
+    def _part(self, part: _Part, frame: int, cache: UsdGeom.XformCache) -> np.ndarray:
+        if part.still is not None:
+            return part.still
+        points = _points(part, self._codes, frame)
+        if len(points) != part.count:
+            raise ClipError(f"{part.path}: got {len(points)} points in frame {frame} (time code "
+                            f"{self._codes[frame]:g}), expected {part.count} as in the first frame")
+        space = part.prim if part.skeleton is None else part.skeleton.space
+        moved = _moved(points, np.array(cache.GetLocalToWorldTransform(space)))
+        if part.skeleton is None and not part.moves and not part.points.ValueMightBeTimeVarying():
+            part.still = moved
+        return moved
+
+
+def _points(part: _Part, codes: np.ndarray, frame: int) -> np.ndarray:
+    points = part.points.Get(codes[frame])
+    if points is None:
+        raise ClipError(f"{part.path}: got no points in frame {frame} (time code {codes[frame]:g})")
+    if part.skeleton is not None:
+        points = part.skeleton.deform(points, float(codes[frame]))
+    return np.array(points, np.float32).reshape(-1, 3)
+
+
+def _moved(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    if np.array_equal(matrix, np.eye(4)):
+        return points
+    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+
+

@@ -1,0 +1,497 @@
+"""USD in and out: what USD itself writes is read, and of what we write USD itself has nothing to complain."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
+from athcodec.sources.frames import Frames
+
+GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
+QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [6, 7, 10, 9], [7, 8, 11, 10]], np.int32)
+FPS = float(Fraction(24000, 1001))
+
+
+def vec3(points):
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, np.float32))
+
+
+def sway(frame):
+    return (GRID + np.sin(frame / 3) * GRID[:, 1:2] * np.array([0.1, 0, 0.05])).astype(np.float32)
+
+
+def new_stage(path, first=101, last=110, fps=FPS):
+    stage = Usd.Stage.CreateNew(str(path))
+    stage.SetTimeCodesPerSecond(fps)
+    if first is not None:
+        stage.SetStartTimeCode(first)
+        stage.SetEndTimeCode(last)
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    return stage
+
+
+def add_grid(stage, place="/root/grid", frames=range(101, 111), points=sway):
+    mesh = UsdGeom.Mesh.Define(stage, place)
+    mesh.CreateFaceVertexCountsAttr([4] * len(QUADS))
+    mesh.CreateFaceVertexIndicesAttr(QUADS.reshape(-1).tolist())
+    for frame in frames:
+        mesh.GetPointsAttr().Set(vec3(points(frame)), frame)
+    return mesh
+
+
+def read_all(path, **options):
+    with athcodec.read(path, **options) as clip:
+        return clip, clip.block(0, clip.frame_count)
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd"])
+def test_a_mesh_that_moves_under_a_transform_that_moves(tmp_path, suffix):
+    stage = new_stage(tmp_path / f"a.{suffix}")
+    root = UsdGeom.Xform.Define(stage, "/root")
+    turn, shift = root.AddRotateZOp(), root.AddTranslateOp()
+    for frame in (101, 110):
+        turn.Set(10.0 * (frame - 101), frame)
+        shift.Set(Gf.Vec3d(frame - 101, 0, 5), frame)
+    add_grid(stage)
+    stage.Save()
+    clip, positions = read_all(tmp_path / f"a.{suffix}")
+    for i in range(10):
+        angle = np.radians(10.0 * i)
+        rotation = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        expected = (sway(101 + i) + np.array([i, 0, 5])) @ rotation.T
+        assert np.allclose(positions[i], expected, rtol=0, atol=3e-6)
+    assert np.array_equal(clip.faces, QUADS) and clip.faces.dtype == np.int32
+    assert clip.metadata == {"fps": FPS, "start_frame": 101, "unit": "cm", "up_axis": "z", "part_names": ["grid"],
+                             "part_kinds": ["mesh"], "domains": {"part_vertex_counts": "constant"}}
+    assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
+
+
+def test_points_without_a_transform_are_bit_for_bit(tmp_path):
+    stage = new_stage(tmp_path / "a.usdc")
+    add_grid(stage)
+    stage.Save()
+    _, positions = read_all(tmp_path / "a.usdc")
+    assert np.array_equal(positions, np.stack([sway(frame) for frame in range(101, 111)]))
+
+
+def test_frames_are_the_samples_where_the_stage_has_no_range_and_what_fps_says(tmp_path):
+    stage = new_stage(tmp_path / "a.usda", first=None, fps=24.0)
+    add_grid(stage, frames=[2, 3, 5.5])
+    stage.Save()
+    clip, positions = read_all(tmp_path / "a.usda")
+    assert np.allclose(clip.time, [0, 1 / 24, 3.5 / 24]) and clip.metadata["start_frame"] == 2
+    assert np.array_equal(positions[2], sway(5.5))
+    clip, positions = read_all(tmp_path / "a.usda", fps=48.0)
+    assert np.allclose(clip.time, np.arange(8) / 48) and clip.metadata["fps"] == 48
+    assert np.allclose(positions[1], (sway(2) + sway(3)) / 2, atol=1e-6)
+
+
+def test_units_that_no_symbol_has_and_files_that_name_none(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    add_grid(stage)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.metadata.keys().isdisjoint({"unit", "up_axis", "meters_per_unit"}) and clip.metadata["fps"] == 24
+    UsdGeom.SetStageMetersPerUnit(stage, 0.9144)
+    stage.Save()
+    clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.metadata["meters_per_unit"] == 0.9144 and "unit" not in clip.metadata
+
+
+def whole_plant(path):
+    """Two meshes of other polygons, curves and points, in a stage with static data of every kind."""
+    stage = new_stage(path)
+    grid = add_grid(stage)
+    api = UsdGeom.PrimvarsAPI(grid)
+    uv = np.random.default_rng(1).random((24, 2)).astype(np.float32)
+    api.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying").Set(Vt.Vec2fArray.FromNumpy(uv))
+    api.CreatePrimvar("branch_id", Sdf.ValueTypeNames.IntArray, "vertex").Set([0] * 6 + [1] * 6)
+    api.CreatePrimvar("age", Sdf.ValueTypeNames.FloatArray, "uniform").Set([1, 2, 3, 4, 5, 6])
+    leaf = UsdGeom.Mesh.Define(stage, "/root/leaf")
+    leaf.CreateFaceVertexCountsAttr([3])
+    leaf.CreateFaceVertexIndicesAttr([0, 2, 1])
+    leaf.CreatePointsAttr(vec3([[0, 0, 1], [1, 0, 1], [0, 1, 1]]))
+    leaf.CreateNormalsAttr(vec3([[0, 0, -1]] * 3))
+    leaf.AddTranslateOp().Set(Gf.Vec3d(0, 0, 3))
+    hair = UsdGeom.BasisCurves.Define(stage, "/root/hair")
+    hair.CreateTypeAttr("linear")
+    hair.CreateCurveVertexCountsAttr([3, 2])
+    hair.CreateWidthsAttr([0.5, 0.4, 0.3, 0.2, 0.1])
+    hair.SetWidthsInterpolation("vertex")
+    for frame in (101, 110):
+        hair.GetPointsAttr().Set(vec3(np.arange(15).reshape(5, 3) + frame), frame)
+    dust = UsdGeom.Points.Define(stage, "/root/dust")
+    dust.CreatePointsAttr(vec3([[9, 9, 9], [8, 8, 8]]))
+    stage.Save()
+    return uv
+
+
+def test_several_prims_are_one_clip_and_their_static_data_is_kept(tmp_path):
+    uv = whole_plant(tmp_path / "a.usdc")
+    clip, positions = read_all(tmp_path / "a.usdc")
+    assert clip.metadata["part_names"] == ["grid", "leaf", "hair", "dust"]
+    assert clip.metadata["part_kinds"] == ["mesh", "mesh", "curves", "points"]
+    assert clip.attributes["part_vertex_counts"].tolist() == [12, 3, 5, 2]
+    counts, indices = clip.polygons
+    assert counts.tolist() == [4] * 6 + [3] and indices.tolist() == [*QUADS.reshape(-1), 12, 14, 13]
+    assert clip.edges.tolist() == [[15, 16], [16, 17], [18, 19]]
+    assert np.array_equal(clip.attributes["uv"][:24], uv) and clip.attributes["uv"].shape == (27, 2)
+    assert clip.attributes["branch_id"].tolist() == [0] * 6 + [1] * 6 + [0] * 10
+    assert clip.attributes["age"].tolist() == [1, 2, 3, 4, 5, 6, 0]
+    assert np.allclose(clip.attributes["radius"], [0] * 15 + [0.25, 0.2, 0.15, 0.1, 0.05] + [0] * 2)
+    assert np.array_equal(clip.attributes["normals"][12:15], [[0, 0, -1]] * 3)
+    assert clip.metadata["domains"]["uv"] == "corner" and clip.metadata["domains"]["age"] == "face"
+    assert np.array_equal(positions[4, 12:15], [[0, 0, 4], [1, 0, 4], [0, 1, 4]])
+    assert np.allclose(positions[3, 15:20], np.arange(15).reshape(5, 3) + 104)
+
+
+def test_only_and_skip_choose_prims_and_arrays(tmp_path):
+    whole_plant(tmp_path / "a.usdc")
+    clip, _ = read_all(tmp_path / "a.usdc", only=["le*", "/root/dust"], skip=["normals"])
+    assert clip.metadata["part_names"] == ["leaf", "dust"] and clip.vertex_count == 5
+    assert "normals" not in clip.attributes
+    with pytest.raises(ClipError, match="a.usdc: prims: got none with points named like bark"):
+        athcodec.read(tmp_path / "a.usdc", only=["bark"])
+
+
+def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    stage.CreateClassPrim("/proto")
+    add_grid(stage, "/proto/grid")
+    for i in range(2):
+        prim = stage.DefinePrim(f"/tree{i}", "Xform")
+        prim.GetReferences().AddInternalReference("/proto")
+        prim.SetInstanceable(True)
+        UsdGeom.Xform(prim).AddTranslateOp().Set(Gf.Vec3d(10 * i, 0, 0))
+    UsdGeom.Imageable(add_grid(stage, "/hidden")).MakeInvisible()
+    add_grid(stage, "/late").GetVisibilityAttr().Set("invisible", 101)
+    stage.GetPrimAtPath("/late").GetAttribute("visibility").Set("inherited", 105)
+    for purpose in ("guide", "proxy"):
+        UsdGeom.Imageable(add_grid(stage, f"/{purpose}")).CreatePurposeAttr(purpose)
+    stage.Save()
+    clip, positions = read_all(tmp_path / "a.usda")
+    assert sorted(clip.metadata["part_names"]) == ["/late", "/tree0/grid", "/tree1/grid"]
+    first = 12 * clip.metadata["part_names"].index("/tree0/grid")
+    assert np.allclose(positions[:, first + 12: first + 24] - positions[:, first: first + 12], [10, 0, 0], atol=1e-5)
+
+
+def skinned(path):
+    """A grid on two joints that turn, and a bump that swells by a blend shape."""
+    stage = new_stage(path)
+    UsdSkel.Root.Define(stage, "/plant")
+    skeleton = UsdSkel.Skeleton.Define(stage, "/plant/skeleton")
+    skeleton.CreateJointsAttr(["stem", "stem/twig"])
+    bind = [Gf.Matrix4d(1), Gf.Matrix4d().SetTranslate(Gf.Vec3d(0, 2, 0))]
+    skeleton.CreateBindTransformsAttr(bind)
+    skeleton.CreateRestTransformsAttr(bind)
+    UsdGeom.Xform(skeleton).AddTranslateOp().Set(Gf.Vec3d(0, 0, 7))
+    animation = UsdSkel.Animation.Define(stage, "/plant/animation")
+    animation.CreateJointsAttr(["stem", "stem/twig"])
+    animation.CreateTranslationsAttr([Gf.Vec3f(0), Gf.Vec3f(0, 2, 0)])
+    animation.CreateScalesAttr([Gf.Vec3h(1), Gf.Vec3h(1)])
+    animation.CreateBlendShapesAttr(["bump"])
+    for frame in (101, 110):
+        turn = Gf.Quatf(Gf.Rotation(Gf.Vec3d(0, 0, 1), 5.0 * (frame - 101)).GetQuat())
+        animation.GetRotationsAttr().Set([Gf.Quatf(1), turn], frame)
+        animation.GetBlendShapeWeightsAttr().Set([(frame - 101) / 9], frame)
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(["/plant/animation"])
+    mesh = add_grid(stage, "/plant/mesh", frames=[])
+    mesh.CreatePointsAttr(vec3(GRID))
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets(["/plant/skeleton"])
+    heights = GRID[:, 1] / 3
+    binding.CreateJointIndicesPrimvar(False, 2).Set(Vt.IntArray([0, 1] * 12))
+    weights = np.stack([1 - heights, heights], axis=1).astype(np.float32)
+    binding.CreateJointWeightsPrimvar(False, 2).Set(Vt.FloatArray.FromNumpy(weights.reshape(-1)))
+    bump = UsdSkel.BlendShape.Define(stage, "/plant/mesh/bump")
+    bump.CreateOffsetsAttr([Gf.Vec3f(0, 0, 1)])
+    bump.CreatePointIndicesAttr([4])
+    binding.CreateBlendShapesAttr(["bump"])
+    binding.CreateBlendShapeTargetsRel().SetTargets(["/plant/mesh/bump"])
+    stage.Save()
+    return weights
+
+
+def test_skeletons_and_blend_shapes_are_evaluated_and_the_joints_are_kept(tmp_path):
+    weights = skinned(tmp_path / "a.usda")
+    clip, positions = read_all(tmp_path / "a.usda")
+    for i in (0, 9):
+        angle = np.radians(5.0 * i)
+        rotation = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        points = GRID.astype(float)
+        points[4, 2] += i / 9
+        twig = (points - [0, 2, 0]) @ rotation.T + [0, 2, 0]
+        expected = weights[:, :1] * points + weights[:, 1:] * twig + [0, 0, 7]
+        assert np.allclose(positions[i], expected, rtol=0, atol=2e-6)
+    assert clip.skin.joint_parent.tolist() == [-1, 0] and list(clip.skin.names) == ["stem", "stem/twig"]
+    assert clip.skin.vertex_joint.tolist() == [0] * 6 + [1] * 6
+
+
+@pytest.mark.parametrize("change", ["faces", "points"])
+def test_a_topology_that_changes_is_refused_with_its_frame(tmp_path, change):
+    stage = new_stage(tmp_path / "a.usda")
+    mesh = add_grid(stage)
+    if change == "faces":
+        mesh.GetFaceVertexIndicesAttr().Set(QUADS.reshape(-1).tolist(), 101)
+        mesh.GetFaceVertexIndicesAttr().Set(QUADS[:, ::-1].reshape(-1).tolist(), 104)
+    else:
+        for frame in range(104, 111):
+            mesh.GetPointsAttr().Set(vec3(GRID[:-1]), frame)
+    stage.Save()
+    with pytest.raises(ClipError, match=r"frame 3 \(time code 104\)"):
+        with athcodec.read(tmp_path / "a.usda") as clip:
+            clip.block(0, clip.frame_count)
+
+
+def test_missing_layers_are_named_and_the_rest_is_read(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    stage.DefinePrim("/gone").GetReferences().AddReference("./none.usda")
+    stage.Save()
+    del stage
+    with pytest.warns(UserWarning, match="none.usda"):
+        clip, _ = read_all(tmp_path / "a.usda")
+    assert clip.metadata["part_names"] == ["grid"]
+
+
+def test_a_file_that_changes_while_it_is_read_is_noticed_and_read_afresh_the_next_time(tmp_path):
+    path = tmp_path / "a.usda"
+    stage = new_stage(path)
+    add_grid(stage)
+    stage.Save()
+    with athcodec.read(path) as clip:
+        assert clip.unchanged()
+        text = path.read_text().replace("0.01", "1.0")
+        path.write_text(text)
+        os.utime(path, (1, 1))
+        assert not clip.unchanged()
+        with athcodec.read(path) as again:
+            assert again.metadata["unit"] == "m"
+
+
+def test_a_closed_clip_says_so(tmp_path):
+    stage = new_stage(tmp_path / "a.usda")
+    add_grid(stage)
+    stage.Save()
+    with athcodec.read(tmp_path / "a.usda") as clip:
+        pass
+    with pytest.raises(ClipError, match="closed"):
+        clip.block(0, 1)
+
+
+# ---- export ----
+
+
+def complaints(path):
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    context = UsdValidation.ValidationContext(validators)
+    stage = Usd.Stage.Open(str(path))
+    return [f"{error.GetName()} {error.GetMessage()}" for error in context.Validate(stage)]
+
+
+def assert_same(a, b):
+    """Everything that a clip from USD holds."""
+    assert np.array_equal(a.block(0, a.frame_count), b.block(0, b.frame_count))
+    assert np.allclose(a.time, b.time, rtol=0, atol=1e-9) and np.array_equal(a.rest, b.rest)
+    assert a.metadata == b.metadata
+    assert a.attributes.keys() == b.attributes.keys()
+    for name, values in a.attributes.items():
+        assert np.array_equal(values, b.attributes[name]) and values.dtype == b.attributes[name].dtype, name
+    for name in ("faces", "edges", "vertex_branch", "branch_parent", "stem_index"):
+        x, y = getattr(a, name), getattr(b, name)
+        assert (x is None) == (y is None) and (x is None or np.array_equal(x, y)), name
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd", "usdz"])
+def test_what_was_read_is_written_again_as_it_was(tmp_path, suffix):
+    whole_plant(tmp_path / "a.usdc")
+    out = tmp_path / f"b.{suffix}"
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        athcodec.write(clip, out)
+        with athcodec.read(out) as again:
+            assert_same(clip, again)
+    assert sorted(os.listdir(tmp_path)) == ["a.usdc", out.name]
+    assert complaints(out) == []
+
+
+def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
+    whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        athcodec.write(clip, tmp_path / "b.usdc")
+        expected = clip.block(0, 10)
+    stage = Usd.Stage.Open(str(tmp_path / "b.usdc"))
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (101, 110)
+    assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == FPS
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 0.01 and UsdGeom.GetStageUpAxis(stage) == "Z"
+    prims = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased)]
+    assert [(prim.GetName(), prim.GetTypeName()) for prim in prims] == [
+        ("grid", "Mesh"), ("leaf", "Mesh"), ("hair", "BasisCurves"), ("dust", "Points")]
+    assert UsdGeom.Mesh(prims[0]).GetSubdivisionSchemeAttr().Get() == "none"
+    for i, code in enumerate(range(101, 111)):
+        points = np.concatenate([np.array(UsdGeom.PointBased(prim).GetPointsAttr().Get(code)) for prim in prims])
+        assert np.array_equal(points, expected[i])
+        for prim in prims:
+            wanted = UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), code)
+            assert np.allclose(wanted, UsdGeom.Boundable(prim).GetExtentAttr().Get(code), atol=1e-5)
+    for attribute in (each for prim in prims for each in prim.GetAttributes() if each.GetNumTimeSamples()):
+        assert attribute.GetName() in ("points", "extent")
+
+
+def awkward_clip():
+    """Numbers and records that USD has no types for, steps in time that differ, no parts, an axis USD does not know."""
+    rng = np.random.default_rng(3)
+    record = np.array([(1, 2.5), (3, 4.5)], [("a", "<i2"), ("b", "<f8")])
+    return MotionClip(
+        positions=rng.random((5, 12, 3), np.float32), time=np.array([0, 0.1, 0.3, 0.35, 2.0]), faces=QUADS,
+        vertex_branch=np.repeat([0, 1], 6), branch_parent=np.array([-1, 0]),
+        edges=np.array([[0, 1], [6, 7]], np.uint16), stem_index=np.array([5, 4, 3, 2, 1, 0] * 2),
+        attributes={"age": np.arange(12, dtype=np.int16), "mass": np.arange(2.0), "record": record,
+                    "alive": np.ones(12, bool),
+                    "scans/first": rng.random((12, 3)), "matrix": rng.random((12, 3, 3)), "species": np.array([b"oak"]),
+                    "big": np.arange(12, dtype=">i4"), "face_kind": np.arange(6, dtype=np.uint8)},
+        metadata={"unit": "m", "up_axis": "x", "note": "wind from the west", "fps": 30.0, "start_frame": 7,
+                  "domains": {"mass": "branch", "record": "constant", "species": "constant", "face_kind": "face"}},
+    )
+
+
+def test_what_usd_has_no_place_for_comes_back(tmp_path):
+    clip = awkward_clip()
+    athcodec.write(clip, tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as again:
+        for name, values in clip.attributes.items():
+            assert np.array_equal(again.attributes[name], values) and again.attributes[name].dtype == values.dtype, name
+        for name in ("vertex_branch", "branch_parent", "edges", "rest", "stem_index"):
+            assert np.array_equal(getattr(again, name), getattr(clip, name)), name
+        assert np.allclose(again.time, clip.time, rtol=0, atol=1e-7)
+        assert again.metadata["up_axis"] == "x" and again.metadata["note"] == "wind from the west"
+        assert again.metadata["start_frame"] == 7
+        assert np.array_equal(again.block(0, 5), clip.block(0, 5))
+
+
+def test_a_plant_of_edges_becomes_curves_that_keep_its_order(tmp_path, sample_clip):
+    athcodec.write(sample_clip, tmp_path / "a.usdc")
+    stage = Usd.Stage.Open(str(tmp_path / "a.usdc"))
+    curves = next(UsdGeom.BasisCurves(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves))
+    assert sum(curves.GetCurveVertexCountsAttr().Get()) == sample_clip.vertex_count
+    assert len(curves.GetCurveVertexCountsAttr().Get()) > 90
+    with athcodec.read(tmp_path / "a.usdc") as again:
+        assert np.array_equal(again.edges, sample_clip.edges)
+        assert np.array_equal(again.vertex_branch, sample_clip.vertex_branch)
+
+
+def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
+    whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        labelled = dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32),
+                                       branch_parent=np.array([-1]), rest=clip.rest.astype(clip.rest_dtype))
+        athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
+        with athcodec.open(tmp_path / "a.ath") as decoder:
+            athcodec.write(athcodec.Excerpt(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
+            bound = decoder.max_error_bound
+        with athcodec.read(tmp_path / "b.usdc") as again:
+            error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()
+            assert 0 < error <= bound * (1 + 1e-5)
+            assert again.metadata["start_frame"] == 103
+            assert again.metadata["part_names"] == clip.metadata["part_names"]
+            assert np.array_equal(again.attributes["uv"], clip.attributes["uv"])
+
+
+MEASURE = """
+import sys, json, numpy as np, athcodec
+from athcodec.clip import MotionClip
+from athcodec.sources.frames import Frames
+frames = int(sys.argv[1])
+most = 0
+def note(done=None):
+    global most
+    most = max(most, next(int(x.split()[1]) for x in open("/proc/self/status") if x.startswith("RssAnon")))
+def make(start, stop):
+    note()
+    return np.random.default_rng(start).random((stop - start, 20000, 3), np.float32)
+clip = MotionClip(Frames(make, frames, 20000), np.arange(frames) / 24.0)
+athcodec.write(clip, sys.argv[2], progress=lambda stage, done: note())
+written, most = most, 0
+with athcodec.read(sys.argv[2]) as again:
+    for start, block in again.blocks():
+        note()
+print(json.dumps([written, most]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is told by Linux only")
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    def measure(frames):
+        command = [sys.executable, "-c", MEASURE, str(frames), str(tmp_path / "a.usdc")]
+        return np.array(json.loads(subprocess.run(command, check=True, capture_output=True).stdout))
+
+    few, many = measure(300), measure(1000)  # 72 and 240 MB
+    assert ((many - few) * 1024 < 60e6).all(), (few, many)
+
+
+def test_an_export_that_fails_leaves_what_was_there(tmp_path, sample_clip):
+    (tmp_path / "a.usdc").write_bytes(b"old")
+    broken = Frames(lambda start, stop: np.full((stop - start, 4, 3), np.inf if start else 1, np.float32), 9, 4)
+    clip = MotionClip(broken, np.arange(9.0), rest=np.zeros((4, 3)))
+    clip._block_length = lambda most: 3
+    with pytest.raises(ClipError, match="frame 3"):
+        athcodec.write(clip, tmp_path / "a.usdc")
+    assert os.listdir(tmp_path) == ["a.usdc"] and (tmp_path / "a.usdc").read_bytes() == b"old"
+
+
+# ---- broken files ----
+
+
+def try_to_read(path):
+    try:
+        with athcodec.read(path) as clip:
+            for _ in clip.blocks():
+                pass
+    except (ClipError, OSError) as error:
+        assert "\n" not in str(error) and str(path) in str(error) or "positions" in str(error)
+        return True
+    return False
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "usdz"])
+def test_broken_files_are_refused(tmp_path, suffix, capfd):
+    whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        athcodec.write(clip, tmp_path / f"b.{suffix}")
+    data = (tmp_path / f"b.{suffix}").read_bytes()
+    rng, refused = np.random.default_rng(7), 0
+    for i, cut in enumerate(np.linspace(1, len(data) - 1, 25).astype(int)):
+        path = tmp_path / f"cut{i}.{suffix}"
+        path.write_bytes(data[:cut])
+        refused += try_to_read(path)
+    assert refused >= 20
+    for i in range(60):
+        damaged = bytearray(data)
+        for place in rng.integers(0, len(data), rng.integers(1, 9)):
+            damaged[place] = rng.integers(256)
+        path = tmp_path / f"damaged{i}.{suffix}"
+        path.write_bytes(damaged)
+        try_to_read(path)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_other_files_are_refused_in_one_line(tmp_path):
+    for name, content in {"a.usdc": b"x" * 99, "b.usda": b"#usda 1.0\n", "c.usdz": b"PK\3\4" + bytes(40)}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ClipError, match=name) as caught:
+            athcodec.read(tmp_path / name, "usd")
+        assert "\n" not in str(caught.value)
+    with pytest.raises(FileNotFoundError):
+        athcodec.read(tmp_path / "none.usd")
