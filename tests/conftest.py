@@ -8,6 +8,7 @@ import pytest
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
+from blender import INSTALL, Blender, build_extension, find_python
 from plants import awkward, plant
 
 
@@ -105,3 +106,19 @@ def full_ath(full_clip, tmp_path_factory):
     path = tmp_path_factory.mktemp("full") / "full.ath"
     athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16)
     return path
+
+
+@pytest.fixture(scope="session")
+def blender(tmp_path_factory):
+    """A Blender of its own, for tests marked `programs`."""
+    return Blender(find_python(), tmp_path_factory.mktemp("blender"))
+
+
+@pytest.fixture(scope="session")
+def extended_blender(tmp_path_factory):
+    """A Blender that has athcodec's extension, installed as a user installs it."""
+    folder = tmp_path_factory.mktemp("extended")
+    blender = Blender(find_python(), folder)
+    blender.run(INSTALL, zip=build_extension(folder))
+    blender.has_extension = True
+    return blender

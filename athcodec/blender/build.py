@@ -1,0 +1,92 @@
+"""Packs the Blender extension: python -m athcodec.blender.build athcodec.zip athcodec-*.whl
+
+The wheels of athcodec (one per platform) are given; those of zstandard, which it needs besides what Blender has, are
+given too or fetched by pip for the same platforms and the Pythons of Blender. Wheels go in as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from athcodec.files import new_file
+
+PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
+NEEDED = "zstandard"
+EXTENSION = Path(__file__).resolve().parent / "extension"
+PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}
+MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64"}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m athcodec.blender.build", description=__doc__.splitlines()[0])
+    parser.add_argument("output", type=Path, help="the .zip to write, which Blender installs")
+    parser.add_argument("wheels", type=Path, nargs="+", help="wheels of athcodec, and of zstandard if not by pip")
+    args = parser.parse_args(argv)
+    with tempfile.TemporaryDirectory() as folder:
+        pack(args.output, [*args.wheels, *_fetched(args.wheels, Path(folder))])
+    print(f"{args.output}: {args.output.stat().st_size:,} bytes")
+    return 0
+
+
+def pack(output: Path, wheels: Sequence[Path]) -> None:
+    """Write the extension with these wheels. Raises ValueError where none of them is athcodec's, OSError."""
+    own = [each for each in wheels if each.name.startswith("athcodec-")]
+    if not own:
+        raise ValueError(f"wheels: got {', '.join(each.name for each in wheels)}, expected one of athcodec")
+    platforms = sorted({platform(each) for each in own})
+    names = sorted({each.name: each for each in wheels})
+    manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
+    for before, after in (('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
+                          ("platforms = []", f"platforms = {_toml(platforms)}"),
+                          ("wheels = []", f"wheels = {_toml([f'./wheels/{name}' for name in names])}")):
+        manifest = manifest.replace(before, after)
+    with new_file(output) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("blender_manifest.toml", manifest)
+        for source in sorted(EXTENSION.glob("*.py")):
+            archive.write(source, source.name)
+        for wheel in {each.name: each for each in wheels}.values():
+            archive.write(wheel, f"wheels/{wheel.name}", zipfile.ZIP_STORED)
+
+
+def _toml(texts: Sequence[str]) -> str:
+    return "[" + ", ".join(f'"{text}"' for text in texts) + "]"
+
+
+def platform(wheel: Path) -> str:
+    """Blender's name of the platform that a wheel is for. Raises ValueError."""
+    tag = wheel.stem.split("-")[-1].split(".")[0]
+    system = next((name for start, name in PLATFORMS.items() if tag.startswith(start)), None)
+    machine = next((name for end, name in MACHINES.items() if tag.endswith(end)), None)
+    if system is None or machine is None:
+        raise ValueError(f"{wheel.name}: got the platform {tag}, expected one that Blender has")
+    return f"{system}-{machine}"
+
+
+def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
+    """Wheels of what is needed for each platform and Python, by pip; none where some are given."""
+    if any(each.name.startswith(f"{NEEDED}-") for each in wheels):
+        return []
+    for tag in sorted({each.stem.split("-")[-1] for each in wheels}):
+        tags = [option for each in _pip_platforms(tag) for option in ("--platform", each)]
+        for python in PYTHONS:
+            subprocess.run([sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
+                            "--python-version", python, *tags, "--dest", str(folder), NEEDED], check=True)
+    return sorted(folder.glob("*.whl"))
+
+
+def _pip_platforms(tag: str) -> list[str]:
+    """What pip may choose for a platform: a wheel that was built here is for "linux", published ones for manylinux."""
+    machine = tag.removeprefix("linux_")
+    if machine != tag:
+        return [f"manylinux2014_{machine}", f"manylinux_2_17_{machine}", f"manylinux_2_28_{machine}"]
+    return tag.split(".")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

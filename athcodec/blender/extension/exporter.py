@@ -1,0 +1,232 @@
+"""File, Export, Plant Motion: the active object, as its modifiers leave it in each frame, compressed to an .ath file.
+
+The frames go to a temporary file first, uncompressed: Blender evaluates each once, the encoder reads them twice.
+Branches come from the vertex attribute vertex_branch, with the mesh's property ath_branch_parent, where both are there
+(an imported mesh has them), else athcodec finds them, by the armature if there is one.
+"""
+
+# ruff: noqa: F722, F821 -- Blender's properties are annotations
+
+import math
+import tempfile
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from .importer import FIELDS, KINDS, PARENTS
+
+DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face"}
+WIDTHS = {kind: row for (_, row), kind in KINDS.items()}
+
+
+class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
+    """Compress the motion of the active object"""
+
+    bl_idname = "export_scene.ath"
+    bl_label = "Export Plant Motion"
+
+    filename_ext = ".ath"
+    filter_glob: StringProperty(default="*.ath", options={"HIDDEN"})
+    bound: EnumProperty(name="Error", default="RELATIVE", items=(
+        ("RELATIVE", "Relative", "At most a fraction of the diagonal of the box around the whole motion"),
+        ("LENGTH", "Length", "At most a length in the scene's units"),
+        ("LOSSLESS", "Lossless", "Every bit of the positions")))
+    rel_error: FloatProperty(name="Fraction", default=1e-4, min=1e-9, max=1.0, precision=6)
+    max_error: FloatProperty(name="Length", default=0.001, min=1e-12, precision=6, unit="LENGTH")
+    effort: EnumProperty(name="Effort", default="default", items=(
+        ("fast", "Fast", "Quick, larger"), ("default", "Default", ""), ("best", "Best", "Slow, smaller")))
+    space: EnumProperty(name="Space", default="WORLD", items=(
+        ("WORLD", "World", "With the transforms of the object and of its parents"),
+        ("LOCAL", "Local", "As the mesh has them, for an object that is imported again below the same parents")))
+    attributes: BoolProperty(name="Static Data", default=True, description="Faces, texture coordinates and attributes")
+
+    @classmethod
+    def poll(cls, context) -> bool:
+        return context.active_object is not None and context.active_object.type == "MESH"
+
+    def execute(self, context):
+        try:
+            summary = write_object(context, context.active_object, self.filepath, self.space == "WORLD",
+                                   self.effort, self.attributes, **self._bound())
+        except Exception as error:  # told in one line
+            self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{summary.bytes:,} bytes, {summary.ratio:.1f} times smaller")
+        return {"FINISHED"}
+
+    def _bound(self) -> dict:
+        if self.bound == "LENGTH":
+            return {"max_error": self.max_error}
+        return {"lossless": True} if self.bound == "LOSSLESS" else {"rel_error": self.rel_error}
+
+
+def write_object(context, obj, path: str, world: bool = True, effort: str = "default", attributes: bool = True,
+                 **bound):
+    """Compress the frames of the scene; returns athcodec's Summary. Raises athcodec's errors, OSError."""
+    import athcodec
+
+    scene = context.scene
+    before = scene.frame_current_final
+    manager = context.window_manager
+    manager.progress_begin(0, 1)
+    try:
+        with tempfile.TemporaryFile() as spool:
+            clip = _clip(context, obj, spool, world, lambda done: manager.progress_update(done / 2))
+            return athcodec.encode(clip, bpy.path.abspath(path), effort=effort,
+                                   attributes="all" if attributes else "none",
+                                   progress=lambda stage, done: manager.progress_update(0.5 + done / 2), **bound)
+    finally:
+        manager.progress_end()
+        _set_frame(scene, before)
+
+
+def _set_frame(scene, frame: float) -> None:
+    scene.frame_set(math.floor(frame), subframe=frame - math.floor(frame))
+
+
+def _clip(context, obj, spool, world: bool, report):
+    from athcodec.clip import MotionClip
+
+    scene = context.scene
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    rate = scene.render.fps / scene.render.fps_base
+    static = None
+    for i, frame in enumerate(frames):
+        _set_frame(scene, frame)
+        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+        mesh = evaluated.to_mesh()
+        try:
+            if static is None:
+                static = _static(mesh, obj)
+                shape = _shape(mesh)
+            elif _shape(mesh) != shape:
+                raise ValueError(f"{obj.name}: the vertices or faces change in frame {frame}, expected the same in all")
+            spool.write(_positions(mesh, evaluated.matrix_world if world else None).tobytes())
+        finally:
+            evaluated.to_mesh_clear()
+        report((i + 1) / len(frames))
+    spool.flush()
+    positions = np.memmap(spool, np.float32, "r", shape=(len(frames), shape[0], 3))
+    metadata = {"fps": rate, "start_frame": frames[0], "up_axis": "z", **_unit(scene, world), "part_names": [obj.name],
+                "part_kinds": ["mesh"], "domains": static.pop("domains")}
+    return MotionClip(positions, np.arange(len(frames)) / rate, metadata=metadata, skin=_skin(obj, shape[0]), **static)
+
+
+def _shape(mesh) -> tuple[int, int, int, int]:
+    """What has to stay: numbers of vertices, edges, faces, and a hash of which vertices the corners are."""
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    return len(mesh.vertices), len(mesh.edges), len(mesh.polygons), hash(corners.tobytes())
+
+
+def _positions(mesh, matrix) -> np.ndarray:
+    positions = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    positions = positions.reshape(-1, 3)
+    if matrix is None:
+        return positions
+    matrix = np.array(matrix)
+    return (positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+
+
+def _unit(scene, world: bool) -> dict:
+    from athcodec.units import METRES
+
+    if scene.unit_settings.system == "NONE" or not world:
+        return {}
+    scale = scene.unit_settings.scale_length
+    return {"unit": symbol for symbol, metres in METRES.items() if math.isclose(metres, scale, rel_tol=1e-5)}
+
+
+def _static(mesh, obj) -> dict:
+    """Arguments of MotionClip that do not move, and the domains of the attributes."""
+    found, arrays, domains = {}, {}, {}
+    counts = np.empty(len(mesh.polygons), np.int32)
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.polygons.foreach_get("loop_total", counts)
+    mesh.loops.foreach_get("vertex_index", corners)
+    if len(counts) and counts.min() == counts.max():
+        found["faces"] = corners.reshape(len(counts), -1)
+    elif len(counts):
+        arrays |= {"face_vertex_counts": counts, "face_vertex_indices": corners}
+        domains |= {"face_vertex_counts": "face", "face_vertex_indices": "corner"}
+    elif len(mesh.edges):
+        edges = np.empty(2 * len(mesh.edges), np.int32)
+        mesh.edges.foreach_get("vertices", edges)
+        found["edges"] = edges.reshape(-1, 2)
+    if mesh.uv_layers.active is not None and len(corners):
+        uv = np.empty(2 * len(corners), np.float32)
+        mesh.uv_layers.active.data.foreach_get("uv", uv)
+        arrays["uv"], domains["uv"] = uv.reshape(-1, 2), "corner"
+    _add_attributes(mesh, arrays, domains)
+    _take_branches(obj, arrays, found)
+    return {**found, "attributes": arrays, "domains": domains}
+
+
+def _add_attributes(mesh, arrays: dict, domains: dict) -> None:
+    from athcodec.clip import RESERVED_NAMES
+
+    uv_names = {layer.name for layer in mesh.uv_layers}
+    kept = ("vertex_branch", "stem_index")
+    for layer in mesh.attributes:
+        known = layer.domain in DOMAINS and layer.data_type in FIELDS and len(layer.data)
+        own = layer.is_internal or layer.name.startswith(".") or layer.name in uv_names or layer.name in arrays
+        if not known or own or layer.name in RESERVED_NAMES and layer.name not in kept:
+            continue
+        if layer.name in ("position", "sharp_face", "material_index"):
+            continue
+        row = WIDTHS[layer.data_type]
+        dtype = {"INT": np.int32, "BOOLEAN": bool}.get(layer.data_type, np.float32)
+        values = np.empty(len(layer.data) * int(np.prod(row, dtype=int)), dtype)
+        layer.data.foreach_get(FIELDS[layer.data_type], values)
+        arrays[layer.name] = values.reshape(len(layer.data), *row)
+        if layer.domain != "POINT":
+            domains[layer.name] = DOMAINS[layer.domain]
+
+
+def _take_branches(obj, arrays: dict, found: dict) -> None:
+    vertex_branch, stem_index = arrays.pop("vertex_branch", None), arrays.pop("stem_index", None)
+    parents = obj.data.get(PARENTS)
+    if vertex_branch is not None and parents is not None:
+        found |= {"vertex_branch": vertex_branch, "branch_parent": np.array(parents, np.int32)}
+        if stem_index is not None:
+            found["stem_index"] = stem_index
+    elif vertex_branch is not None:
+        arrays["branch_id"] = vertex_branch
+
+
+def _skin(obj, vertex_count: int):
+    """The armature that moves the object, for finding its branches."""
+    from athcodec.clip import Skin
+
+    armature = next((each.object for each in obj.modifiers if each.type == "ARMATURE" and each.object), None)
+    if armature is None or len(obj.data.vertices) != vertex_count:
+        return None
+    bones = list(armature.data.bones)  # parents first
+    places = {bone.name: i for i, bone in enumerate(bones)}
+    parents = [places[bone.parent.name] if bone.parent else -1 for bone in bones]
+    joints = [places.get(group.name, -1) for group in obj.vertex_groups]
+    of_vertex = np.full(vertex_count, -1, np.int32)
+    for vertex in obj.data.vertices:
+        weights = [(each.weight, joints[each.group]) for each in vertex.groups if joints[each.group] >= 0]
+        if weights:
+            of_vertex[vertex.index] = max(weights)[1]
+    if any(parent >= i for i, parent in enumerate(parents)):
+        return None
+    return Skin(np.array(parents, np.int32), of_vertex, [bone.name for bone in bones])
+
+
+def _menu(self, context) -> None:
+    self.layout.operator(EXPORT_OT_ath.bl_idname, text="Plant Motion (.ath)")
+
+
+def register() -> None:
+    bpy.utils.register_class(EXPORT_OT_ath)
+    bpy.types.TOPBAR_MT_file_export.append(_menu)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_file_export.remove(_menu)
+    bpy.utils.unregister_class(EXPORT_OT_ath)

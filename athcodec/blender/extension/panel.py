@@ -1,0 +1,52 @@
+"""The panel of an object that plays from a file: Properties, Object, Plant Motion."""
+
+import bpy
+
+from . import player
+
+
+class OBJECT_PT_ath(bpy.types.Panel):
+    bl_label = "Plant Motion (.ath)"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context) -> bool:
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context) -> None:
+        obj, layout = context.object, self.layout
+        layout.use_property_split = True
+        layout.prop(obj.ath, "filepath")
+        if not obj.ath.filepath:
+            return
+        for name in ("depth", "frame_offset", "speed", "loop"):
+            layout.prop(obj.ath, name)
+        problem = player.problem_of(obj)
+        if problem:
+            layout.label(text=problem, icon="ERROR")
+            return
+        for line in self._facts(obj):
+            layout.label(text=line)
+
+    @staticmethod
+    def _facts(obj) -> list[str]:
+        try:
+            decoder = player.decoder_of(player.path_of(obj))
+        except Exception as error:  # shown, not raised while drawing
+            return [" ".join(str(error).split())]
+        shown = decoder.depths[player.depth_of(obj, decoder)]
+        unit = decoder.metadata.get("unit", "")
+        return [f"level {shown.depth} of 0 to {decoder.deepest}: {shown.nodes:,} nodes",
+                f"largest error {shown.max_error:.3g} {unit}",
+                f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.vertex_count:,} vertices"]
+
+
+def register() -> None:
+    bpy.utils.register_class(OBJECT_PT_ath)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(OBJECT_PT_ath)

@@ -1,0 +1,169 @@
+"""Puts the vertices of a file's frame into the objects that play it, whenever the frame changes, also in a render.
+
+One decoder per file is shared by all objects, and no positions are kept but those of the frame that is shown. The
+handlers outlive the loading of another .blend; paths that are relative stay so when the .blend is saved elsewhere.
+"""
+
+import os
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from .settings import DEEPEST
+
+_decoders: dict = {}  # path: (its size and time, the decoder)
+_problems: dict = {}  # name of an object: what keeps it from playing
+_moved: dict = {}  # name of an object: its path before the .blend was saved
+_busy = False
+
+
+def decoder_of(path: str):
+    """The decoder of a file, opened again where the file has changed. Raises OSError, athcodec's errors."""
+    import athcodec
+
+    found = os.stat(path)
+    stamp = found.st_size, found.st_mtime_ns
+    known = _decoders.get(path)
+    if known is None or known[0] != stamp:
+        if known is not None:
+            _decoders.pop(path)[1].close()
+        _decoders[path] = stamp, athcodec.open(path)
+    return _decoders[path][1]
+
+
+def close_all() -> None:
+    while _decoders:
+        _decoders.popitem()[1][1].close()
+
+
+def path_of(obj) -> str:
+    return os.path.normpath(bpy.path.abspath(obj.ath.filepath, library=obj.library))
+
+
+def problem_of(obj) -> str:
+    return _problems.get(obj.name_full, "")
+
+
+def depth_of(obj, decoder) -> int:
+    """The level that an object shows: what it asks for, as far as the file has it."""
+    return decoder.deepest if obj.ath.depth == DEEPEST else min(obj.ath.depth, decoder.deepest)
+
+
+def place_in(decoder, settings, scene) -> float:
+    """The frame of the file, a fraction between two of them, that the scene's frame shows."""
+    rate = scene.render.fps / scene.render.fps_base
+    seconds = (scene.frame_current_final - settings.frame_offset) / rate * settings.speed
+    time = decoder.time - decoder.time[0]
+    if settings.loop and len(time) > 1:
+        seconds %= time[-1] + (time[-1] - time[-2])  # the last frame lasts as long as the one before
+    place = float(np.interp(seconds, time, np.arange(len(time))))
+    return round(place) if abs(place - round(place)) < 1e-4 else place
+
+
+def positions_at(decoder, place: float, depth: int) -> np.ndarray:
+    """(N, 3) float32; between two frames on the line from one to the other."""
+    frame = int(place)
+    positions = decoder.positions(frame, depth, np.float32)
+    if place > frame:
+        positions += np.float32(place - frame) * (decoder.positions(frame + 1, depth, np.float32) - positions)
+    return positions
+
+
+def show(obj, scene) -> None:
+    """Put the scene's frame into an object; what goes wrong is kept for the panel and told once."""
+    if _busy or obj.type != "MESH" or not obj.ath.filepath or obj.mode == "EDIT":
+        return
+    try:
+        _show(obj, scene)
+        _problems.pop(obj.name_full, None)
+    except Exception as error:  # a handler that raises stops all others
+        text = " ".join(str(error).split()) or type(error).__name__
+        if _problems.get(obj.name_full) != text:
+            print(f"athcodec: {obj.name_full}: {text}")
+        _problems[obj.name_full] = text
+
+
+def _show(obj, scene) -> None:
+    decoder = decoder_of(path_of(obj))
+    mesh = obj.data
+    if len(mesh.vertices) != decoder.vertex_count:
+        raise ValueError(f"the mesh has {len(mesh.vertices)} vertices, the file {decoder.vertex_count}")
+    positions = positions_at(decoder, place_in(decoder, obj.ath, scene), depth_of(obj, decoder))
+    mesh.vertices.foreach_set("co", positions.reshape(-1))
+    mesh.update()
+
+
+@persistent
+def _on_frame(scene, *_) -> None:
+    for obj in scene.objects:
+        if obj.type == "MESH" and obj.ath.filepath:
+            show(obj, scene)
+
+
+@persistent
+def _on_load(*_) -> None:
+    close_all()
+    _problems.clear()
+    for scene in bpy.data.scenes:
+        _on_frame(scene)
+
+
+@persistent
+def _on_save(target=None, *_) -> None:
+    """Blender itself keeps the paths of an extension as they are when a .blend is saved in another folder."""
+    global _busy
+    if not isinstance(target, str) or not target:
+        return
+    folder, relative = os.path.dirname(target), bpy.context.preferences.filepaths.use_relative_paths
+    _moved.clear()
+    _busy = True
+    try:
+        for obj in bpy.data.objects:
+            before = obj.ath.filepath
+            if obj.library is None and before and (before.startswith("//") or relative):
+                after = _relative(path_of(obj), folder)
+                if after != before:
+                    _moved[obj.name_full] = before
+                    obj.ath.filepath = after
+    finally:
+        _busy = False
+
+
+@persistent
+def _after_save(*_) -> None:
+    """Puts paths back where only a copy has been saved elsewhere."""
+    global _busy
+    _busy = True
+    try:
+        for name, before in _moved.items():
+            obj = bpy.data.objects.get(name)
+            if obj is not None and not os.path.exists(path_of(obj)):
+                obj.ath.filepath = before
+    finally:
+        _busy = False
+        _moved.clear()
+
+
+def _relative(path: str, folder: str) -> str:
+    try:
+        return bpy.path.relpath(path, start=folder)
+    except ValueError:  # on another drive
+        return path
+
+
+HANDLERS = (("frame_change_post", _on_frame), ("load_post", _on_load), ("save_pre", _on_save),
+            ("save_post", _after_save))
+
+
+def register() -> None:
+    for name, handler in HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    for name, handler in HANDLERS:
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    close_all()
