@@ -12,13 +12,12 @@ velocities are not read. A stage is opened by its structure; positions are read 
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from os import PathLike, fspath
 from typing import Any
@@ -26,18 +25,28 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from athcodec.clip import RESERVED_NAMES, MotionClip, Skin
+from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
 from athcodec.sources.frames import Frames
+from athcodec.sources.parts import (
+    OWN,
+    Part,
+    Static,
+    edges,
+    faces,
+    fields,
+    joined,
+    names_and_kinds,
+    own_array,
+    own_metadata,
+)
 from athcodec.units import METRES
 
 MAX_FRAMES = 1 << 24
-MAX_METADATA_BYTES = 1 << 24
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
-OWN = "athcodec"  # the namespace of what exporters/usd.py writes besides
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
 
 
@@ -111,47 +120,19 @@ class _Stage:
 
 
 @dataclass
-class _Static:
-    """A named array of one part and what its rows stand for: vertex, corner, face or constant."""
+class _Prim(Part):
+    """A prim that is read, and how its points are found."""
 
-    domain: str
-    values: np.ndarray
-
-
-@dataclass
-class _Part:
-    """One prim: its place among the vertices, how its points are found, and what does not move."""
-
-    prim: Usd.Prim
-    kind: str
-    points: Usd.AttributeQuery
-    first: int = 0
-    count: int = 0
-    face_counts: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
-    face_indices: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
-    curve_counts: np.ndarray | None = None
-    details: dict[str, str] = field(default_factory=dict)
-    statics: dict[str, _Static] = field(default_factory=dict)
+    prim: Usd.Prim = None
+    points: Usd.AttributeQuery = None
     skeleton: _Skeleton | None = None
     moves: bool = False
     still: np.ndarray | None = None  # the positions where nothing moves
 
-    @property
-    def name(self) -> str:
-        return self.prim.GetName()
-
-    @property
-    def path(self) -> str:
-        return str(self.prim.GetPath())
-
-    def rows(self, domain: str) -> int:
-        sizes = {"vertex": self.count, "corner": len(self.face_indices), "face": len(self.face_counts), "constant": 1}
-        return sizes[domain]
-
 
 def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     stage = source.stage
-    layer = _own_metadata(stage)
+    layer = own_metadata(stage.GetRootLayer().customLayerData.get(OWN))
     parts = _find_parts(stage, options.only)
     skins = _bind_skeletons(stage, parts)
     codes, rate = _time_codes(stage, parts, options.fps, layer.pop("irregular", False))
@@ -159,27 +140,26 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     _measure(parts, codes)
     metadata = layer | _metadata(stage, parts, codes, rate)
     frames = _Reader(source, parts, codes)
-    attributes, domains = _attributes(parts, options.skip)
+    attributes, domains = joined(parts, options.skip)
     _own_attributes(stage, attributes, domains, options.skip)
     if domains:
         metadata["domains"] = domains
-    fields = _fields(attributes, domains)
-    faces = _faces(parts, attributes)
-    rest = fields.pop("rest", None)
-    edges = fields.pop("edges", None)
+    known = fields(attributes, domains)
+    rest, joints = known.pop("rest", None), known.pop("edges", None)
+    polygons = faces(parts, attributes)
     clip = MotionClip(
         positions=Frames(frames.read, len(codes), sum(part.count for part in parts)),
         time=(codes - codes[0]) / stage.GetTimeCodesPerSecond(),
         rest=rest if options.rest == "auto" else None,
         rest_pose="mean" if options.rest == "mean" else "first",
-        edges=_edges(parts) if edges is None else edges,
-        faces=faces,
+        edges=edges(parts) if joints is None else joints,
+        faces=polygons,
         attributes=attributes,
         metadata=metadata,
         resource=source,
         unchanged=source.unchanged,
         skin=_skin(parts, skins),
-        **fields,
+        **known,
     )
     return clip
 
@@ -187,7 +167,7 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
 # ---- prims ----
 
 
-def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Part]:
+def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
     parts = []
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
@@ -199,7 +179,7 @@ def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Part]:
             continue
         points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
         if points.HasAuthoredValue():
-            parts.append(_Part(prim, kind, points))
+            parts.append(_Prim(kind, prim.GetName(), str(prim.GetPath()), prim=prim, points=points))
     if not parts:
         what = f" named like {', '.join(only)}" if only else ""
         raise ClipError(f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or "
@@ -225,7 +205,7 @@ def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
         prim = prim.GetParent()
 
 
-def _visible(parts: list[_Part], codes: np.ndarray) -> list[_Part]:
+def _visible(parts: list[_Prim], codes: np.ndarray) -> list[_Prim]:
     """Those that are seen at some time from the first frame to the last."""
     def seen(prim: Usd.Prim) -> bool:
         times = {float(codes[0])}
@@ -241,7 +221,7 @@ def _visible(parts: list[_Part], codes: np.ndarray) -> list[_Part]:
     return left
 
 
-def _measure(parts: list[_Part], codes: np.ndarray) -> None:
+def _measure(parts: list[_Prim], codes: np.ndarray) -> None:
     """Fills in what the parts are at the first frame."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
     for part in parts:
@@ -256,42 +236,30 @@ def _measure(parts: list[_Part], codes: np.ndarray) -> None:
         raise ClipError("points: got none, expected at least one")
 
 
-def _topology(part: _Part, codes: np.ndarray) -> None:
+def _topology(part: _Prim, codes: np.ndarray) -> None:
     if part.kind == "mesh":
         mesh = UsdGeom.Mesh(part.prim)
         part.face_counts = _fixed(part, mesh.GetFaceVertexCountsAttr(), codes)
         part.face_indices = _fixed(part, mesh.GetFaceVertexIndicesAttr(), codes)
-        if (part.face_counts < 0).any() or part.face_counts.sum(dtype=np.int64) != len(part.face_indices):
-            raise ClipError(f"{part.path}: got faces of {part.face_counts.sum(dtype=np.int64)} corners, expected "
-                            f"{len(part.face_indices)}, one per index")
-        _check_range(part, part.face_indices)
         _note(part, "orientation", mesh.GetOrientationAttr(), "rightHanded")
     elif part.kind == "curves":
         part.curve_counts = _fixed(part, UsdGeom.Curves(part.prim).GetCurveVertexCountsAttr(), codes)
-        if (part.curve_counts < 0).any() or part.curve_counts.sum(dtype=np.int64) != part.count:
-            raise ClipError(f"{part.path}: got curves of {part.curve_counts.sum(dtype=np.int64)} points, expected "
-                            f"{part.count}")
         if part.prim.IsA(UsdGeom.BasisCurves):
             curves = UsdGeom.BasisCurves(part.prim)
             _note(part, "type", curves.GetTypeAttr(), "linear")
             _note(part, "wrap", curves.GetWrapAttr(), "nonperiodic")
             if "type" in part.details:
                 _note(part, "basis", curves.GetBasisAttr(), "")
+    part.check()
 
 
-def _note(part: _Part, name: str, attribute: Usd.Attribute, usual: str) -> None:
+def _note(part: _Prim, name: str, attribute: Usd.Attribute, usual: str) -> None:
     value = attribute.Get()
     if value and value != usual:
         part.details[name] = str(value)
 
 
-def _check_range(part: _Part, indices: np.ndarray) -> None:
-    bad = np.flatnonzero((indices < 0) | (indices >= part.count))
-    if bad.size:
-        raise ClipError(f"{part.path}: corner {bad[0]} is vertex {indices[bad[0]]}, expected 0 to {part.count - 1}")
-
-
-def _fixed(part: _Part, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
+def _fixed(part: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
     """Integers that stay the same in every frame; ClipError where they change."""
     query = Usd.AttributeQuery(attribute)
     first = _array(query.Get(codes[0]), np.int32)
@@ -315,7 +283,7 @@ def _array(value: Any, dtype: Any) -> np.ndarray:
 # ---- time ----
 
 
-def _time_codes(stage: Usd.Stage, parts: list[_Part], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
+def _time_codes(stage: Usd.Stage, parts: list[_Prim], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
     """Time codes to read, and frames per second."""
     own = stage.GetTimeCodesPerSecond()
     if not 0 < own < math.inf:
@@ -335,7 +303,7 @@ def _time_codes(stage: Usd.Stage, parts: list[_Part], fps: float | None, irregul
     return start + np.arange(count) * step, fps or own
 
 
-def _sampled(parts: list[_Part]) -> list[float]:
+def _sampled(parts: list[_Prim]) -> list[float]:
     found: set[float] = set()
     for part in parts:
         found.update(part.points.GetTimeSamples())
@@ -349,7 +317,7 @@ def _sampled(parts: list[_Part]) -> list[float]:
     return sorted(time for time in found if math.isfinite(time))
 
 
-def _metadata(stage: Usd.Stage, parts: list[_Part], codes: np.ndarray, rate: float) -> dict[str, Any]:
+def _metadata(stage: Usd.Stage, parts: list[_Prim], codes: np.ndarray, rate: float) -> dict[str, Any]:
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
     metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
@@ -358,32 +326,13 @@ def _metadata(stage: Usd.Stage, parts: list[_Part], codes: np.ndarray, rate: flo
         metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
         metadata["up_axis"] = str(UsdGeom.GetStageUpAxis(stage)).lower()
-    names = [part.name for part in parts]
-    unique = len(set(names)) == len(names)
-    metadata["part_names"] = names if unique else [part.path for part in parts]
-    metadata["part_kinds"] = [part.kind for part in parts]
-    if any(part.details for part in parts):
-        metadata["part_usd"] = [part.details for part in parts]
-    return metadata
-
-
-def _own_metadata(stage: Usd.Stage) -> dict[str, Any]:
-    """What exporters/usd.py has kept of a clip's metadata, of any other file nothing."""
-    text = stage.GetRootLayer().customLayerData.get(OWN)
-    if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
-        return {}
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    known = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
-    return {name: value for name, value in found.items() if name not in known} if isinstance(found, dict) else {}
+    return metadata | names_and_kinds(parts)
 
 
 # ---- what does not move ----
 
 
-def _statics(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
+def _statics(part: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(part.prim).FindPrimvarsWithInheritance():
         if primvar.HasValue() and not primvar.ValueMightBeTimeVarying():
             values = primvar.ComputeFlattened(codes[0])
@@ -399,10 +348,10 @@ def _statics(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
         _widths(part, codes, matrix)
     rest = part.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
-        part.statics["rest"] = _Static(rest.domain, _moved(rest.values, matrix))
+        part.statics["rest"] = Static(rest.domain, _moved(rest.values, matrix))
 
 
-def _rename_first_uv(part: _Part) -> None:
+def _rename_first_uv(part: _Prim) -> None:
     """Where no primvar is called st, the first texture coordinates are what a renderer takes."""
     if "uv" in part.statics:
         return
@@ -413,7 +362,7 @@ def _rename_first_uv(part: _Part) -> None:
             return
 
 
-def _turn_normals(part: _Part, matrix: np.ndarray) -> None:
+def _turn_normals(part: _Prim, matrix: np.ndarray) -> None:
     """Into world space; away where what they belong to turns."""
     normals = part.statics.get("normals")
     if normals is None or normals.values.shape[1:] != (3,):
@@ -425,10 +374,10 @@ def _turn_normals(part: _Part, matrix: np.ndarray) -> None:
         return
     turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
     turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
-    part.statics["normals"] = _Static(normals.domain, turned.astype(normals.values.dtype))
+    part.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
 
 
-def _widths(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
+def _widths(part: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     schema = (UsdGeom.Curves if part.kind == "curves" else UsdGeom.Points)(part.prim)
     widths = schema.GetWidthsAttr()
     if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in part.statics:
@@ -436,28 +385,19 @@ def _widths(part: _Part, codes: np.ndarray, matrix: np.ndarray) -> None:
         if "radius" in part.statics:
             scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
             radius = part.statics["radius"]
-            part.statics["radius"] = _Static(radius.domain, (radius.values * scale).astype(radius.values.dtype))
+            part.statics["radius"] = Static(radius.domain, (radius.values * scale).astype(radius.values.dtype))
 
 
-def _keep(part: _Part, name: str, values: Any, interpolation: str, element_size: int = 1,
+def _keep(part: _Prim, name: str, values: Any, interpolation: str, element_size: int = 1,
           attribute: Usd.Attribute | None = None) -> None:
     """Notes a static array where its rows fit the prim; strings and references to files are none."""
     values = _numbers(values)
-    domain = DOMAINS.get(interpolation)
-    if values is None or domain is None or name in part.statics:
+    if values is None:
         return
     if element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
-    values = _as_written(values, attribute)
-    if domain == "constant" and len(values) != 1:
-        return
-    if domain == "face" and part.kind == "curves" and len(values) == len(part.curve_counts):
-        domain, values = "vertex", np.repeat(values, part.curve_counts, axis=0)
-    elif domain == "face" and part.kind == "points":
-        domain = "constant"
-    if len(values) == part.rows(domain):
-        part.statics[name] = _Static(domain, values)
+    part.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
 
 
 def _numbers(values: Any) -> np.ndarray | None:
@@ -490,94 +430,6 @@ def _said(attribute: Usd.Attribute, key: str) -> str | None:
 WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8", ">u8", ">f2", ">f4", ">f8", "<f2")
 
 
-def _attributes(parts: list[_Part], skip: Any) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Static arrays of all parts, one after the other, and what their rows stand for where that is no vertex."""
-    attributes, domains = {}, {}
-    for name in dict.fromkeys(name for part in parts for name in part.statics):
-        if name in skip:
-            continue
-        joined = _joined(name, parts)
-        if joined is not None:
-            attributes[name] = joined.values
-            if joined.domain != "vertex":
-                domains[name] = joined.domain
-    attributes["part_vertex_counts"] = np.array([part.count for part in parts], np.int32)
-    domains["part_vertex_counts"] = "constant"
-    if any(part.curve_counts is not None for part in parts):
-        attributes["curve_vertex_counts"] = np.concatenate([part.curve_counts for part in parts
-                                                            if part.curve_counts is not None])
-        domains["curve_vertex_counts"] = "constant"
-    return attributes, domains
-
-
-def _joined(name: str, parts: list[_Part]) -> _Static | None:
-    """A part that lacks the array has zeros; None where the parts' arrays do not go together."""
-    found = [part.statics[name] for part in parts if name in part.statics]
-    shapes = {each.values.shape[1:] for each in found}
-    if len(shapes) != 1:
-        return None
-    domain = _common_domain(found, len(parts))
-    dtypes = {each.values.dtype for each in found}
-    dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
-    if domain == "constant":
-        return _Static(domain, found[0].values.astype(dtype, copy=False))
-    rows = [_spread(part, part.statics.get(name), domain, next(iter(shapes))) for part in parts]
-    return _Static(domain, np.concatenate(rows).astype(dtype, copy=False))
-
-
-def _common_domain(found: list[_Static], part_count: int) -> str:
-    domains = {each.domain for each in found}
-    if domains == {"constant"}:
-        same = all(np.array_equal(each.values, found[0].values) for each in found)
-        return "constant" if same and len(found) == part_count else "vertex"
-    domains.discard("constant")
-    return domains.pop() if len(domains) == 1 else "corner"
-
-
-def _spread(part: _Part, static: _Static | None, domain: str, shape: tuple[int, ...]) -> np.ndarray:
-    if static is None:
-        return np.zeros((part.rows(domain), *shape), np.uint8)
-    if static.domain == domain:
-        return static.values
-    if static.domain == "constant":
-        return np.repeat(static.values, part.rows(domain), axis=0)
-    if static.domain == "vertex":
-        return static.values[part.face_indices]
-    return np.repeat(static.values, part.face_counts, axis=0)
-
-
-def _faces(parts: list[_Part], attributes: dict[str, np.ndarray]) -> np.ndarray | None:
-    """(F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
-    counts = np.concatenate([part.face_counts for part in parts])
-    if not len(counts):
-        return None
-    indices = np.concatenate([part.face_indices + np.int32(part.first) for part in parts])
-    if counts.min() == counts.max() > 0:
-        return indices.reshape(-1, counts[0])
-    attributes |= {"face_vertex_counts": counts, "face_vertex_indices": indices}
-    return None
-
-
-def _edges(parts: list[_Part]) -> np.ndarray | None:
-    """Those between the neighbours on each curve; closed where it is periodic."""
-    edges = []
-    for part in parts:
-        if part.curve_counts is None or not part.count:
-            continue
-        counts = part.curve_counts[part.curve_counts > 0].astype(np.int64)
-        ends = np.cumsum(counts)
-        vertices = np.arange(part.count)
-        following = vertices + 1
-        keep = np.ones(part.count, bool)
-        if part.details.get("wrap") == "periodic":
-            following[ends - 1] = ends - counts
-            keep[ends - 1] = counts > 2
-        else:
-            keep[ends - 1] = False
-        edges.append(np.stack([vertices, following], axis=1)[keep] + part.first)
-    return np.concatenate(edges).astype(np.int32) if edges else None
-
-
 # ---- what exporters/usd.py has written of a clip that USD has no place for ----
 
 
@@ -600,33 +452,7 @@ def _own_array(attribute: Usd.Attribute) -> np.ndarray | None:
     values, dtype, shape = attribute.Get(), _said(attribute, "dtype"), _said(attribute, "shape")
     if not isinstance(values, Vt.UCharArray) or dtype is None or shape is None:
         return None
-    try:
-        kind = np.dtype([tuple(each) for each in json.loads(dtype)] if dtype.startswith("[") else dtype)
-        return None if kind.hasobject else np.frombuffer(np.array(values).tobytes(), kind).reshape(json.loads(shape))
-    except (ValueError, TypeError, RecursionError):
-        return None
-
-
-def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
-    """Takes what a MotionClip has members for out of the attributes; others of these names are renamed."""
-    fields = {}
-    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
-    rest, edges = attributes.get("rest"), attributes.get("edges")
-    if rest is not None and rest.shape == (vertices, 3) and rest.dtype.kind == "f" and "rest" not in domains:
-        fields["rest"] = attributes.pop("rest")
-    if edges is not None and edges.ndim == 2 and edges.shape[1] == 2 and edges.dtype.kind in "iu":
-        fields["edges"] = attributes.pop("edges")
-    if "vertex_branch" in attributes and "branch_parent" in attributes:
-        for name in ("vertex_branch", "branch_parent", "stem_index"):
-            if name in attributes:
-                fields[name] = attributes.pop(name)
-    for name in [name for name in attributes if name in RESERVED_NAMES]:
-        attributes[f"{name}_primvar"] = attributes.pop(name)
-        if name in domains:
-            domains[f"{name}_primvar"] = domains.pop(name)
-    for name in fields:
-        domains.pop(name, None)
-    return fields
+    return own_array(np.array(values).tobytes(), dtype, shape)
 
 
 # ---- skeletons ----
@@ -687,7 +513,7 @@ class _Skeleton:
         return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
 
 
-def _bind_skeletons(stage: Usd.Stage, parts: list[_Part]) -> list[UsdSkel.SkeletonQuery]:
+def _bind_skeletons(stage: Usd.Stage, parts: list[_Prim]) -> list[UsdSkel.SkeletonQuery]:
     by_path = {part.prim.GetPath(): part for part in parts}
     predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     queries = []
@@ -706,7 +532,7 @@ def _bind_skeletons(stage: Usd.Stage, parts: list[_Part]) -> list[UsdSkel.Skelet
     return queries
 
 
-def _skin(parts: list[_Part], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
+def _skin(parts: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
     """The joints of all skeletons, one after the other."""
     parents, names, first = [], [], {}
     for _, query in queries:
@@ -734,7 +560,7 @@ def _skin(parts: list[_Part], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) 
 class _Reader:
     """Positions of all parts, frame by frame."""
 
-    def __init__(self, source: _Stage, parts: list[_Part], codes: np.ndarray):
+    def __init__(self, source: _Stage, parts: list[_Prim], codes: np.ndarray):
         self._source, self._parts, self._codes = source, parts, codes
         self._count = sum(part.count for part in parts)
 
@@ -750,7 +576,7 @@ class _Reader:
                     out[row, part.first: part.first + part.count] = self._part(part, frame, cache)
         return out
 
-    def _part(self, part: _Part, frame: int, cache: UsdGeom.XformCache) -> np.ndarray:
+    def _part(self, part: _Prim, frame: int, cache: UsdGeom.XformCache) -> np.ndarray:
         if part.still is not None:
             return part.still
         points = _points(part, self._codes, frame)
@@ -764,7 +590,7 @@ class _Reader:
         return moved
 
 
-def _points(part: _Part, codes: np.ndarray, frame: int) -> np.ndarray:
+def _points(part: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
     points = part.points.Get(codes[frame])
     if points is None:
         raise ClipError(f"{part.path}: got no points in frame {frame} (time code {codes[frame]:g})")
