@@ -215,3 +215,10 @@ def own_array(raw: bytes, dtype: str, shape: str) -> np.ndarray | None:
         return None if kind.hasobject else np.frombuffer(raw, kind).reshape(json.loads(shape))
     except (ValueError, TypeError, RecursionError):
         return None
+
+
+def turned_corners(counts: np.ndarray) -> np.ndarray:
+    """(C,) the corners of each face from the last to the first."""
+    counts = np.asarray(counts, np.int64)
+    ends = np.cumsum(counts)
+    return np.repeat(2 * ends - counts - 1, counts) - np.arange(int(ends[-1]) if len(ends) else 0)

@@ -1,0 +1,207 @@
+"""Writes Alembic (Ogawa): one mesh, curves or points object per part of a clip, its points sample by sample.
+
+Faces and static arrays are written once; samples go to disk as they come. Points are float32, a clip in float64 is
+rounded. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
+Alembic has no place for (unit, branches, records); sources/alembic.py takes it back from there.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import re
+from collections.abc import Callable
+from os import PathLike
+from typing import Any
+
+import imath
+import numpy as np
+from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+
+from athcodec.exporters import WriteOptions
+from athcodec.exporters.parts import (
+    DOMAINS,
+    KNOWN_ATTRIBUTES,
+    KNOWN_METADATA,
+    Part,
+    domain_of,
+    frame_numbers,
+    own_arrays,
+    parts_of,
+    rows_of,
+    told,
+)
+from athcodec.files import new_files
+from athcodec.sources.parts import OWN, turned_corners
+
+SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
+          "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}
+# of the dtype and the shape of a row: the array that holds it and the parameter that writes it
+TYPES = {("f4", ()): (imath.FloatArray, "Float"), ("f8", ()): (imath.DoubleArray, "Double"),
+         ("i4", ()): (imath.IntArray, "Int32"), ("u1", ()): (imath.UnsignedCharArray, "Uchar"),
+         ("f4", (2,)): (imath.V2fArray, "V2f"), ("f4", (3,)): (imath.V3fArray, "V3f"),
+         ("f8", (3,)): (imath.V3dArray, "V3d")}
+Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+    """Write a MotionClip or an Excerpt as .abc. Raises ClipError, OSError."""
+    path = os.fspath(path)
+    with new_files(path) as folder:
+        try:
+            _write(motion, os.path.join(folder, os.path.basename(path)), report)
+        except (RuntimeError, TypeError) as error:
+            raise OSError(f"{path}: cannot be written: {' '.join(str(error).split())}") from None
+        finally:
+            gc.collect()  # an archive is complete when nothing refers to it
+
+
+def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
+    numbers, rate = frame_numbers(motion)
+    archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
+    sampling = Abc.Argument(archive.addTimeSampling(_sampling(numbers, rate)))
+    root = AbcGeom.OXform(archive.getTop(), "clip")
+    if str(motion.metadata.get("up_axis", "y")).lower() == "z":
+        turn = AbcGeom.XformSample()
+        turn.setMatrix(imath.M44d(*(float(each) for row in Z_UP for each in row)))
+        root.getSchema().set(turn)
+    parts = parts_of(motion)
+    statics, left = _divide(motion)
+    _keep_own(root.getSchema().getUserProperties(), motion, left)
+    taken: set[str] = set()
+    for part in parts:
+        part.target = _create(root, _free_name(part.name, taken), part, sampling)
+    for start, block in motion.blocks():
+        for row, positions in enumerate(block.astype(np.float32, copy=False)):
+            for part in parts:
+                _add(part, positions[part.vertices], statics if start + row == 0 else None)
+        report((start + len(block)) / len(numbers))
+
+
+def _sampling(numbers: np.ndarray, rate: float) -> Any:
+    steps = np.diff(numbers)
+    if np.allclose(steps, 1.0, rtol=0, atol=1e-5):
+        return AbcCoreAbstract.TimeSampling(1.0 / rate, float(numbers[0]) / rate)
+    times = AbcCoreAbstract.TimeVector()
+    times.extend([float(number) / rate for number in numbers])
+    acyclic = AbcCoreAbstract.TimeSamplingType(AbcCoreAbstract.AcyclicFlag.kAcyclic)
+    return AbcCoreAbstract.TimeSampling(acyclic, times)
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """Alembic's names are any but those with a slash, and differ."""
+    wanted = found = re.sub(r"[/\0]", "_", name.strip("/")) or "part"
+    number = 1
+    while found in taken:
+        number += 1
+        found = f"{wanted}_{number}"
+    taken.add(found)
+    return found
+
+
+def _create(root: Any, name: str, part: Part, sampling: Any) -> Any:
+    kind = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}[part.kind]
+    return kind(AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
+
+
+def _filled(kind: Any, values: np.ndarray) -> Any:
+    array = kind(len(values))
+    if len(values):
+        np.asarray(memoryview(array))[...] = values
+    return array
+
+
+# ---- samples ----
+
+
+def _add(part: Part, positions: np.ndarray, statics: dict[str, tuple[np.ndarray, str]] | None) -> None:
+    """A sample of the points; the first one brings what does not move."""
+    points = _filled(imath.V3fArray, positions)
+    schema = part.target.getSchema()
+    if statics is None:
+        sample = {"mesh": AbcGeom.OPolyMeshSchemaSample, "curves": AbcGeom.OCurvesSchemaSample,
+                  "points": AbcGeom.OPointsSchemaSample}[part.kind](points)
+        schema.set(sample)
+        return
+    order = turned_corners(part.faces[0])
+    own = {name: (rows_of(values, domain, part), domain) for name, (values, domain) in statics.items()}
+    own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
+    # samples refer to arrays that somebody has to keep until they are written
+    held = {"points": points, "ids": _filled(imath.IntArray, np.arange(part.count)),
+            "counts": _filled(imath.IntArray, part.faces[0]), "curves": _filled(imath.IntArray, part.curves),
+            "indices": _filled(imath.IntArray, part.faces[1][order])}
+    schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[part.kind](part, held, own))
+    for name, (values, domain) in own.items():
+        if len(values) and (domain in ("vertex", "constant") or part.kind == "mesh"):
+            _write_param(schema.getArbGeomParams(), name, values, domain)
+
+
+def _mesh_sample(part: Part, held: dict, own: dict) -> Any:
+    further = {}
+    for name, row, array, keyword, kind in (
+            ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
+            ("normals", (3,), imath.V3fArray, "iNormals", AbcGeom.ON3fGeomParamSample)):
+        values, domain = own.get(name, (None, ""))
+        if values is not None and values.shape[1:] == row and values.dtype == np.float32:
+            del own[name]
+            held[name] = _filled(array, values)
+            further[keyword] = kind(held[name], SCOPES[domain])
+    return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
+
+
+def _curve_sample(part: Part, held: dict, own: dict) -> Any:
+    is_cubic = part.details.get("type") == "cubic"
+    kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
+    basis = AbcGeom.BasisType.kBsplineBasis if is_cubic else AbcGeom.BasisType.kNoBasis
+    is_closed = part.details.get("wrap") == "periodic"
+    wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
+    return AbcGeom.OCurvesSchemaSample(held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis,
+                                       **_widths(held, own, "iWidth"))
+
+
+def _point_sample(part: Part, held: dict, own: dict) -> Any:
+    return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, own, "iWidths"))
+
+
+def _widths(held: dict, own: dict, name: str) -> dict:
+    radius, domain = own.get("radius", (None, ""))
+    if radius is None or radius.dtype != np.float32 or radius.ndim != 1:
+        return {}
+    del own["radius"]
+    held["widths"] = _filled(imath.FloatArray, 2 * radius)
+    return {name: AbcGeom.OFloatGeomParamSample(held["widths"], SCOPES[domain])}
+
+
+# ---- static arrays ----
+
+
+def _divide(motion: Any) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
+    """Static arrays that Alembic has types and places for, and the others; each with its domain."""
+    fitting, left = {}, {}
+    for name, values in motion.attributes.items():
+        if name in KNOWN_ATTRIBUTES:
+            continue
+        domain = domain_of(motion, name, values, motion.metadata.get("domains", {}))
+        key = values.dtype.str[1:], values.shape[1:]
+        fits = domain in DOMAINS and key in TYPES and values.dtype.isnative and "/" not in name and len(values)
+        (fitting if fits else left)[name] = values, domain
+    return fitting, left
+
+
+def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> None:
+    array, kind = TYPES[values.dtype.str[1:], values.shape[1:]]
+    scope = SCOPES[domain]
+    param = getattr(AbcGeom, f"O{kind}GeomParam")(params, name, False, scope, 1)
+    held = _filled(array, values)
+    param.set(getattr(AbcGeom, f"O{kind}GeomParamSample")(held, scope))
+
+
+def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
+    kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
+    Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
+    for i, (name, values, domain) in enumerate(own_arrays(motion, left)):
+        raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
+        held = _filled(imath.UnsignedCharArray, raw)
+        Abc.OUcharArrayProperty(properties, f"array{i}").setValue(held)
+        Abc.OStringProperty(properties, f"array{i}.told").setValue(json.dumps(told(name, values, domain)))

@@ -1,0 +1,286 @@
+"""Alembic in and out: what its own library writes is read and reads what we write, and Blender does so too."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import os
+from fractions import Fraction
+
+import imath
+import numpy as np
+import pytest
+from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+from test_usd import GRID, QUADS, assert_same, awkward_clip, sway, whole_plant
+
+import athcodec
+from athcodec.errors import ClipError
+
+FPS = float(Fraction(24000, 1001))
+Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of rows whose Z is up
+TURN = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # by a right angle about Z, of rows
+
+
+def filled(kind, values):
+    array = kind(len(values))
+    np.asarray(memoryview(array))[...] = values
+    return array
+
+
+def matrix(rotation, shift):
+    rows = np.eye(4)
+    rows[:3, :3], rows[3, :3] = rotation, shift
+    return imath.M44d(*(float(x) for x in rows.reshape(-1)))
+
+
+def write_archive(path, faces=QUADS[:, ::-1], counts=(12,) * 10):
+    """A grid that sways below a transform that shifts, itself below one that turns; and a hidden twin."""
+    archive = Abc.OArchive(str(path))
+    sampling = Abc.Argument(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / FPS, 101 / FPS)))
+    turned = AbcGeom.OXform(archive.getTop(), "turned")
+    turn = AbcGeom.XformSample()
+    turn.setMatrix(matrix(TURN, [0, 0, 0]))
+    turned.getSchema().set(turn)
+    shifted = AbcGeom.OXform(turned, "shifted", sampling)
+    mesh = AbcGeom.OPolyMesh(shifted, "grid", sampling)
+    twin = AbcGeom.OPolyMesh(turned, "twin", sampling)
+    AbcGeom.CreateVisibilityProperty(twin, 0).setValue(0)
+    held = filled(imath.IntArray, np.full(len(faces), 4)), filled(imath.IntArray, faces.reshape(-1))
+    for i, count in enumerate(counts):
+        shift = AbcGeom.XformSample()
+        shift.setMatrix(matrix(np.eye(3), [i, 0, 5]))
+        shifted.getSchema().set(shift)
+        points = filled(imath.V3fArray, sway(101 + i)[:count])
+        for each in (mesh, twin):
+            sample = AbcGeom.OPolyMeshSchemaSample
+            each.getSchema().set(sample(points, held[1], held[0]) if i == 0 else sample(points))
+    del archive, turned, shifted, mesh, twin
+    gc.collect()
+
+
+def test_meshes_below_transforms_that_move(tmp_path):
+    write_archive(tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        for i, positions in enumerate(clip.block(0, 10)):
+            assert np.allclose(positions, (sway(101 + i) + [i, 0, 5]) @ TURN, rtol=0, atol=2e-6)
+        assert clip.metadata["fps"] == FPS and clip.metadata["start_frame"] == 101
+        assert clip.metadata["part_names"] == ["grid"]
+        assert np.array_equal(clip.faces, QUADS)  # clockwise in the file
+        assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
+
+
+def test_another_rate_lies_on_lines_between_samples(tmp_path):
+    write_archive(tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc", fps=2 * FPS) as clip:
+        assert clip.frame_count == 19 and clip.metadata["fps"] == 2 * FPS
+        expected = ((sway(101) + sway(102)) / 2 + [0.5, 0, 5]) @ TURN
+        assert np.allclose(clip.block(1, 2)[0], expected, rtol=0, atol=2e-6)
+
+
+def test_points_whose_number_changes_are_refused_with_the_frame(tmp_path):
+    write_archive(tmp_path / "a.abc", counts=(12,) * 4 + (11,) * 6)
+    with pytest.raises(ClipError, match="in frame 4, expected 12"):
+        with athcodec.read(tmp_path / "a.abc") as clip:
+            clip.block(0, clip.frame_count)
+
+
+def test_only_names_what_is_read(tmp_path):
+    write_archive(tmp_path / "a.abc")
+    with pytest.raises(ClipError, match="a.abc: objects: got none with points named like bark"):
+        athcodec.read(tmp_path / "a.abc", only=["bark"])
+
+
+def test_what_was_read_is_written_again_as_it_was(tmp_path):
+    whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        athcodec.write(clip, tmp_path / "a.abc")
+        with athcodec.read(tmp_path / "a.abc") as again:
+            assert_same(clip, again)
+    assert sorted(os.listdir(tmp_path)) == ["a.abc", "a.usdc"]
+
+
+def test_what_alembic_has_no_place_for_comes_back(tmp_path):
+    clip = awkward_clip()
+    athcodec.write(clip, tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc") as again:
+        for name, values in clip.attributes.items():
+            assert np.array_equal(again.attributes[name], values) and again.attributes[name].dtype == values.dtype, name
+        for name in ("vertex_branch", "branch_parent", "edges", "rest", "stem_index", "faces"):
+            assert np.array_equal(getattr(again, name), getattr(clip, name)), name
+        assert np.allclose(again.time, clip.time, rtol=0, atol=1e-7)
+        assert np.array_equal(again.block(0, 5), clip.block(0, 5))
+        for name in ("unit", "up_axis", "note", "fps", "start_frame"):
+            assert again.metadata[name] == clip.metadata[name]
+
+
+def test_alembic_reads_our_file(tmp_path):
+    whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc") as clip:
+        athcodec.write(clip, tmp_path / "a.abc")
+        expected = clip.block(0, 10)
+    archive = Abc.IArchive(str(tmp_path / "a.abc"))
+    root = archive.getTop().getChild(0)
+    up = np.array(AbcGeom.IXform(root, Abc.WrapExistingFlag.kWrapExisting).getSchema().getValue().getMatrix())
+    assert np.allclose(up[:3, :3], Y_UP)  # the clip's Z is up
+    assert [root.getChild(i).getName() for i in range(4)] == ["grid", "leaf", "hair", "dust"]
+    mesh = AbcGeom.IPolyMesh(root.getChild(0).getChild(0), Abc.WrapExistingFlag.kWrapExisting).getSchema()
+    assert mesh.getNumSamples() == 10 and mesh.getFaceCountsProperty().isConstant()
+    assert np.array_equal(np.array(mesh.getFaceIndicesProperty().getValue()).reshape(-1, 4), QUADS[:, ::-1])
+    for i, sample in enumerate(mesh.getPositionsProperty().samples):
+        assert np.array_equal(np.array(sample), expected[i, :12])
+        assert mesh.getTimeSampling().getSampleTime(i) == pytest.approx((101 + i) / FPS, abs=1e-12)
+    assert np.isclose(Abc.GetArchiveInfo(archive)["dccFPS"], FPS, rtol=1e-5)
+
+
+def test_from_alembic_to_ath_and_back_within_the_bound(tmp_path):
+    write_archive(tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        labelled = dataclasses.replace(clip, vertex_branch=np.zeros(12, np.int32), branch_parent=np.array([-1]),
+                                       rest=clip.rest.astype(clip.rest_dtype))
+        athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
+        with athcodec.open(tmp_path / "a.ath") as decoder:
+            athcodec.write(athcodec.Excerpt(decoder, frames=range(2, 9)), tmp_path / "b.abc")
+            bound = decoder.max_error_bound
+        with athcodec.read(tmp_path / "b.abc") as again:
+            error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()
+            assert 0 < error <= bound * (1 + 1e-5) and again.metadata["start_frame"] == 103
+
+
+def test_a_closed_clip_and_a_changed_file_are_told(tmp_path):
+    write_archive(tmp_path / "a.abc")
+    with athcodec.read(tmp_path / "a.abc") as clip:
+        assert clip.unchanged()
+        os.utime(tmp_path / "a.abc", (1, 1))
+        assert not clip.unchanged()
+    with pytest.raises(ClipError, match="closed"):
+        clip.block(0, 1)
+
+
+def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
+    write_archive(tmp_path / "a.abc")
+    data, rng, path = (tmp_path / "a.abc").read_bytes(), np.random.default_rng(5), tmp_path / "b.abc"
+    broken = [data[:cut] for cut in np.linspace(1, len(data) - 1, 8).astype(int)]
+    for _ in range(12):
+        damaged = bytearray(data)
+        for place in rng.integers(0, len(data), 6):
+            damaged[place] = rng.integers(256)
+        broken.append(bytes(damaged))
+    refused = 0
+    for content in [*broken, b"x" * 99, b"Ogawa" + bytes(60)]:
+        path.write_bytes(content)
+        try:
+            with athcodec.read(path, "alembic") as clip:
+                clip.block(0, clip.frame_count)
+        except ClipError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused >= 12 and capfd.readouterr().err == ""
+    with pytest.raises(FileNotFoundError):
+        athcodec.read(tmp_path / "none.abc", "alembic")
+
+
+def test_a_write_that_fails_leaves_what_was_there(tmp_path, sample_clip):
+    (tmp_path / "a.abc").write_bytes(b"old")
+    broken = sample_clip.block(0, 3).copy()
+    broken[2, 5] = np.inf
+    clip = athcodec.MotionClip(broken, np.arange(3.0), rest=broken[0])
+    with pytest.raises(ClipError, match="frame 2"):
+        athcodec.write(clip, tmp_path / "a.abc")
+    assert os.listdir(tmp_path) == ["a.abc"] and (tmp_path / "a.abc").read_bytes() == b"old"
+
+
+# ---- Blender ----
+
+SCENE = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps, scene.render.fps_base = 24, 1.001
+scene.frame_start, scene.frame_end = 3, 12
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=5, y_subdivisions=4)
+grid = bpy.context.object
+grid.name = grid.data.name = "Grid"
+wave = grid.modifiers.new("wave", "WAVE")
+wave.height, wave.speed = 0.4, 0.3
+grid.rotation_euler = (0.3, 0.2, 0.1)
+bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+ball = bpy.context.object
+ball.name = ball.data.name = "Ball"
+ball.parent, ball.scale = grid, (1, 2, 0.5)
+curve = bpy.data.curves.new("Hair", "CURVE")
+curve.dimensions = "3D"
+spline = curve.splines.new("POLY")
+spline.points.add(4)
+for i, point in enumerate(spline.points):
+    point.co, point.radius = (i, i * i * 0.1, 0, 1), 1 + i
+hair = bpy.data.objects.new("Hair", curve)
+scene.collection.objects.link(hair)
+for obj, ends in ((grid, ((1, 2, 3), (4, 2, 1))), (hair, ((0, 0, 0), (0, 0, 5)))):
+    for place, frame in zip(ends, (3, 12)):
+        obj.location = place
+        obj.keyframe_insert("location", frame=frame)
+shown = {name: [] for name in ("Grid", "Ball", "Hair")}
+for frame in range(3, 13):
+    scene.frame_set(frame)
+    shown["Grid"].append(world("Grid"))
+    shown["Ball"].append(world("Ball"))
+    shift = np.array(hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)[:3, 3]
+    shown["Hair"].append(np.array([point.co[:3] for point in spline.points]) + shift)
+bpy.ops.wm.alembic_export(filepath=args["path"] + ".abc", start=3, end=12)
+bpy.ops.wm.usd_export(filepath=args["path"] + ".usdc", export_animation=True)
+save(faces=[list(each.vertices) for each in grid.data.polygons], **shown)
+"""
+
+
+@pytest.mark.programs
+@pytest.mark.parametrize("suffix, turn", [("abc", Y_UP), ("usdc", np.eye(3))])
+def test_what_blender_writes_is_read_as_blender_shows_it(blender, tmp_path, suffix, turn):
+    shown = blender.run(SCENE, path=tmp_path / "a")
+    with athcodec.read(tmp_path / f"a.{suffix}") as clip:
+        assert sorted(clip.metadata["part_names"]) == ["Ball", "Grid", "Hair"]
+        positions, first = clip.block(0, clip.frame_count), 0
+        for name, count in zip(clip.metadata["part_names"], clip.attributes["part_vertex_counts"]):
+            own = positions[:, first: first + count]
+            assert np.allclose(own, shown[name] @ turn, rtol=0, atol=3e-6), name
+            if name == "Grid":
+                faces = clip.polygons[1][np.isin(clip.polygons[1], np.arange(first, first + count))] - first
+                assert np.array_equal(faces.reshape(-1, 4), shown["faces"])
+            first += count
+        assert clip.metadata["fps"] == pytest.approx(FPS, rel=1e-6) and clip.metadata["start_frame"] == 3
+        assert clip.frame_count == 10 and "uv" in clip.attributes
+
+
+OPEN = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps, scene.render.fps_base = 24, 1.001
+importer = bpy.ops.wm.alembic_import if args["path"].endswith("abc") else bpy.ops.wm.usd_import
+importer(filepath=args["path"])
+found = {}
+for obj in [each for each in bpy.data.objects if each.type == "MESH"]:
+    found[obj.name] = []
+    for frame in (101, 104, 110):
+        scene.frame_set(frame)
+        found[obj.name].append(world(obj.name))
+grid = next(each for each in bpy.data.objects if each.type == "MESH" and "grid" in each.name)
+uv = np.empty(2 * len(grid.data.loops), np.float32)
+grid.data.uv_layers[0].data.foreach_get("uv", uv)
+save(uv=uv.reshape(-1, 2), faces=[list(each.vertices) for each in grid.data.polygons],
+     names=list(found), kinds=[each.type for each in bpy.data.objects], **found)
+"""
+
+
+@pytest.mark.programs
+@pytest.mark.parametrize("suffix", ["abc", "usdc", "usdz"])
+def test_blender_opens_what_we_write(blender, tmp_path, suffix):
+    uv = whole_plant(tmp_path / "a.usdc")
+    with athcodec.read(tmp_path / "a.usdc", only=["grid", "leaf", "hair"]) as clip:
+        clip.metadata["unit"] = "m"  # Blender scales a stage in centimetres
+        athcodec.write(clip, tmp_path / f"b.{suffix}")
+        expected = clip.block(0, 10)
+    found = blender.run(OPEN, path=tmp_path / f"b.{suffix}")
+    for name, rows in (("grid", slice(0, 12)), ("leaf", slice(12, 15))):
+        shown = next(values for key, values in found.items() if key.startswith(name))
+        assert np.allclose(shown, expected[[0, 3, 9], rows], rtol=0, atol=2e-6), name
+    assert np.array_equal(found["faces"], QUADS) and np.allclose(found["uv"], uv)
+    assert {"CURVES", "CURVE"} & set(found["kinds"])
+    assert len(GRID) == found["grid"].shape[1]
