@@ -1,0 +1,493 @@
+"""Reads glTF 2.0, .glb or .gltf with its buffers, as positions in world space: skins, animated nodes, morph targets.
+
+Vertices are those of the meshes in the order of the nodes in the scene; a mesh that two nodes show is there twice.
+Frames are evaluated a block at a time; keys of animations and base meshes are held in memory, morph targets are read
+when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
+Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
+names of nodes and meshes, and "animation:NAME" for another animation. Not read: Draco, instancing on the GPU,
+materials, cameras; normals of a mesh that moves.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+
+from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, MotionClip, Skin
+from athcodec.errors import ClipError
+from athcodec.sources import ReadOptions
+from athcodec.sources.frames import Frames
+from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, integer
+from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
+
+WORK_BYTES = 64 << 20
+MOST_VERTICES = 1 << 27
+MOST_FRAMES = 1 << 20
+KINDS = ("points", "curves", "mesh")  # the last that a part has is what it is
+MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
+NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
+FILLERS = {"colors": 1.0}
+ANIMATION = "animation:"
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """Open the clip in the glTF file `path`; close it, or use it in a `with` statement.
+
+    The rest pose, where options.rest is "auto", is the scene without animation. metadata has "animations", the names of
+    those that are played. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its
+    compression needs a package, OSError where a file cannot be opened.
+    """
+    try:
+        file = GltfFile(path)
+    except ClipError as error:
+        raise _named(path, error) from error
+    try:
+        with np.errstate(all="ignore"):
+            return _read(file, options)
+    except ClipError as error:
+        file.close()
+        raise _named(path, error) from error
+    except (MemoryError, OverflowError, RecursionError, TypeError, ValueError) as error:
+        file.close()
+        raise ClipError(f"{fspath(path)}: got glTF that cannot be read: {str(error)[:100]}") from error
+    except BaseException:
+        file.close()
+        raise
+
+
+def _named(path: str | PathLike[str], error: ClipError) -> ClipError:
+    return ClipError(f"{fspath(path)}: {error}")
+
+
+@dataclass(eq=False)
+class Part:
+    """Vertices that a node shows: `first` to `first + count` - 1 of the clip."""
+
+    node: int
+    name: str
+    mesh: int
+    skin: int | None
+    attributes: dict[str, int]
+    targets: list[int | None]
+    weights: np.ndarray
+    first: int = 0
+    count: int = 0
+    kind: str = "points"
+    primitives: list[dict] = field(default_factory=list)
+    base: np.ndarray | None = None
+    joints: list[int] = field(default_factory=list)
+    bind: np.ndarray | None = None
+    influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
+    strongest: np.ndarray | None = None
+
+
+def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
+    scene, parts = _chosen(file, options.only)
+    for part in parts:
+        _load(part, scene)
+    vertex_count = parts[-1].first + parts[-1].count
+    motion = _Motion(scene, parts)
+    fps, times, clock = _sampling(scene, options.fps)
+    attributes, branches = _attributes(file, parts, options.skip, motion, keep_normals=len(times) == 1)
+    faces, edges = _connections(file, parts)
+    before = file.stamp()
+    rest = motion.read(None)[0] if options.rest == "auto" else None
+    return MotionClip(
+        positions=Frames(lambda start, stop: motion.read(times[start:stop]), len(times), vertex_count),
+        time=np.arange(len(times)) / fps,
+        rest=rest if rest is not None and np.isfinite(rest).all() else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, parts),
+        metadata={"unit": "m", "up_axis": "y"} | clock | _names(scene, parts),
+        unchanged=lambda: file.stamp() == before, **branches,
+    )
+
+
+# ---- what there is ----
+
+
+def _chosen(file: GltfFile, only: Sequence[str]) -> tuple[Scene, list[Part]]:
+    """The scene with the animations that are asked for, and its parts in the order of the nodes."""
+    names = [pattern[len(ANIMATION):] for pattern in only if pattern.startswith(ANIMATION)]
+    patterns = [pattern for pattern in only if not pattern.startswith(ANIMATION)]
+    scene = Scene(file, _animations(file, names) if names else None)
+    parts, seen = [], []
+    for node in scene.order:
+        index = scene.nodes[node].get("mesh")
+        if index is not None:
+            mesh = file.item("meshes", index)
+            called = [scene.name(node), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
+            seen.extend(called)
+            if not patterns or any(fnmatch.fnmatchcase(name, each) for name in called for each in patterns):
+                parts.extend(_parts(scene, node, mesh, next(filter(None, called), f"mesh {index}")))
+    if not parts:
+        names = brief(sorted({name for name in seen if name}))
+        raise ClipError(f"only: got {', '.join(patterns)}, expected names such as {names}" if patterns and seen else
+                        "meshes: got none in the scene, expected at least one")
+    first = 0
+    for part in parts:
+        part.first = first
+        first += part.count
+    if first > MOST_VERTICES:
+        raise ClipError(f"meshes: got {first} vertices, expected at most {MOST_VERTICES}")
+    return scene, parts
+
+
+def _animations(file: GltfFile, patterns: Sequence[str]) -> list[int]:
+    names = [_animation_name(file, i) for i in range(len(file.items("animations")))]
+    found = [i for i, name in enumerate(names) if any(fnmatch.fnmatchcase(name, each) for each in patterns)]
+    if not found:
+        raise ClipError(f"only: got {ANIMATION}{patterns[0]}, expected one of {brief(names)}")
+    return found
+
+
+def _animation_name(file: GltfFile, index: int) -> str:
+    name = file.item("animations", index).get("name")
+    return name if isinstance(name, str) and name else f"animation {index}"
+
+
+def _parts(scene: Scene, node: int, mesh: dict, name: str) -> list[Part]:
+    """One per set of vertices: primitives that use the same accessors share theirs."""
+    if "EXT_mesh_gpu_instancing" in (scene.nodes[node].get("extensions") or {}):
+        raise ClipError(f"node {node}: got EXT_mesh_gpu_instancing, expected a node per instance")
+    parts: dict[Any, Part] = {}
+    for primitive in entries(mesh, "primitives"):
+        attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
+        targets = [integer(each, "POSITION") if "POSITION" in each else None for each in entries(primitive, "targets")]
+        if "POSITION" not in attributes:
+            raise ClipError(f"mesh {name!r}: got a primitive without POSITION, expected one with it")
+        _refuse_draco(scene.file, primitive, attributes["POSITION"])
+        key = (tuple(sorted(attributes.items())), tuple(targets))
+        if key not in parts:
+            weights = scene.nodes[node].get("weights", mesh.get("weights")) or [0.0] * len(targets)
+            if not isinstance(weights, list) or len(weights) != len(targets):
+                raise ClipError(f"mesh {name!r}: got weights {brief(weights)}, expected {len(targets)}")
+            parts[key] = Part(node, name, scene.nodes[node]["mesh"], scene.nodes[node].get("skin"), attributes, targets,
+                              np.array(weights, np.float64), count=scene.file.count(attributes["POSITION"]))
+        part = parts[key]
+        kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
+        part.kind = max(part.kind, kind, key=KINDS.index)
+        part.primitives.append(primitive)
+    found = list(parts.values())
+    for number, part in enumerate(found[1:], 1):
+        part.name = f"{name}.{number}"
+    return found
+
+
+def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
+    packed = "KHR_draco_mesh_compression" in (primitive.get("extensions") or {})
+    if packed and file.item("accessors", positions).get("bufferView") is None:
+        raise ClipError("meshes: got KHR_draco_mesh_compression, expected a file without it: decompress it first, for "
+                        "example with gltf-transform copy")
+
+
+def _load(part: Part, scene: Scene) -> None:
+    file = scene.file
+    part.base = _triples(file, part.attributes["POSITION"], part.count, "POSITION")
+    for target in part.targets:
+        if target is not None and file.count(target) != part.count:
+            raise ClipError(f"mesh {part.name!r}: got a morph target of {file.count(target)} vertices, expected "
+                            f"{part.count}")
+    if part.skin is None:
+        return
+    skin = file.item("skins", part.skin)
+    part.joints = [integer({"joint": each}, "joint") for each in skin.get("joints") or ()]
+    part.bind = _bind_matrices(file, skin, len(part.joints))
+    if "JOINTS_0" not in part.attributes or not part.joints:
+        raise ClipError(f"mesh {part.name!r}: got a skin without joints, expected JOINTS_0 and WEIGHTS_0")
+    _load_influences(part, file)
+
+
+def _triples(file: GltfFile, index: int, count: int, what: str) -> np.ndarray:
+    values = file.floats(index)
+    if values.shape != (count, 3):
+        raise ClipError(f"{what}: got shape {values.shape}, expected ({count}, 3)")
+    return values
+
+
+def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
+    if skin.get("inverseBindMatrices") is None:
+        return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
+    values = file.floats(skin["inverseBindMatrices"]).astype(np.float64)
+    if values.shape[1] != 16 or len(values) < joint_count:
+        raise ClipError(f"skins: got inverse bind matrices of shape {values.shape}, expected ({joint_count}, 16)")
+    return values[:joint_count].reshape(-1, 4, 4).swapaxes(1, 2)
+
+
+def _load_influences(part: Part, file: GltfFile) -> None:
+    """Per joint its vertices and their weights, which add up to 1; where a file has none, the first joint counts."""
+    vertex, joint, weight = [], [], []
+    for slot in range(64):
+        names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
+        if names[0] not in part.attributes or names[1] not in part.attributes:
+            break
+        joints, weights = file.array(part.attributes[names[0]]), file.floats(part.attributes[names[1]])
+        if joints.shape != (part.count, 4) or joints.shape != weights.shape or joints.dtype.kind not in "iu":
+            raise ClipError(f"mesh {part.name!r}: got {names[0]} of shape {joints.shape}, expected ({part.count}, 4)")
+        rows, columns = np.nonzero(weights)
+        vertex.append(rows)
+        joint.append(joints[rows, columns].astype(np.int64))
+        weight.append(weights[rows, columns].astype(np.float64))
+        if slot == 0:
+            first = joints[:, 0].astype(np.int64)
+    if not vertex:
+        raise ClipError(f"mesh {part.name!r}: got JOINTS_0 without WEIGHTS_0, expected both")
+    total = np.bincount(np.concatenate(vertex), np.concatenate(weight), part.count)
+    bare = np.flatnonzero(~(np.abs(total) > 1e-12))
+    vertex, joint = np.concatenate([*vertex, bare]), np.concatenate([*joint, first[bare]])
+    weight = np.concatenate([*weight, np.ones(len(bare))])
+    total[bare] = 1.0
+    if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(part.joints):
+        raise ClipError(f"mesh {part.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
+                        f"joints below {len(part.joints)}")
+    pair, index = np.unique(joint * part.count + vertex, return_inverse=True)
+    weight = np.bincount(index, weight / total[vertex], len(pair))
+    joint, vertex = np.divmod(pair, part.count)
+    starts = np.flatnonzero(np.diff(joint, prepend=-1))
+    stops = np.append(starts[1:], len(pair))
+    part.influences = [(int(joint[a]), vertex[a:b], weight[a:b]) for a, b in zip(starts, stops)]
+    order = np.lexsort((weight, vertex))
+    part.strongest = np.empty(part.count, np.int64)
+    part.strongest[vertex[order]] = joint[order]
+
+
+# ---- how it moves ----
+
+
+class _Motion:
+    """Positions of all parts at any times."""
+
+    def __init__(self, scene: Scene, parts: list[Part]):
+        self._scene, self._parts = scene, parts
+        self.count = parts[-1].first + parts[-1].count
+        moving = {joint for part in parts for joint in part.joints} | {p.node for p in parts if p.skin is None}
+        self.nodes = scene.ancestors(moving)
+
+    def read(self, times: np.ndarray | None) -> np.ndarray:
+        """(k, N, 3) float32; None: the pose without animation, k = 1."""
+        out = np.empty((1 if times is None else len(times), self.count, 3), np.float32)
+        largest = max(part.count for part in self._parts)
+        step = max(1, WORK_BYTES // (48 * largest + 256 * len(self.nodes)))
+        with np.errstate(all="ignore"):
+            for start in range(0, len(out), step):
+                now = None if times is None else times[start : start + step]
+                matrices = self._scene.matrices(self.nodes, now)
+                for part in self._parts:
+                    rows = slice(part.first, part.first + part.count)
+                    out[start : start + step, rows] = self._positions(part, matrices, now)
+        return out
+
+    def _positions(self, part: Part, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
+        local = self._morphed(part, times)
+        if part.skin is None:
+            matrix = matrices[part.node]
+            return local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
+        return self._skinned(part, matrices, local)
+
+    def _morphed(self, part: Part, times: np.ndarray | None) -> np.ndarray:
+        """(k or 1, n, 3): only targets that count in a frame are read."""
+        if not part.targets:
+            return part.base[None].astype(np.float64)
+        weights = self._scene.weights(part.node, times, part.weights)
+        local = np.repeat(part.base[None].astype(np.float64), len(weights), axis=0)
+        for column in np.flatnonzero((weights != 0).any(axis=0)):
+            if part.targets[column] is not None:
+                rows = np.flatnonzero(weights[:, column])
+                moved = _triples(self._scene.file, part.targets[column], part.count, "morph target")
+                local[rows] += weights[rows, column, None, None] * moved
+        return local
+
+    def _skinned(self, part: Part, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
+        frames = max(len(local), *(len(matrices[joint]) for joint in part.joints))
+        out = np.zeros((frames, 3, part.count))
+        for joint, vertices, weights in part.influences:
+            matrix = (matrices[part.joints[joint]] @ part.bind[joint])[:, :3]
+            points = np.ones((len(local), 4, len(vertices)))
+            points[:, :3] = local[:, vertices].swapaxes(1, 2)
+            points *= weights
+            out[:, :, vertices] += _product(matrix, points)
+        return out.swapaxes(1, 2)
+
+    def normal_matrix(self, part: Part) -> np.ndarray:
+        """(3, 3) that turns normals of an unskinned part into the world."""
+        matrix = self._scene.matrices(self.nodes, None)[part.node][0, :3, :3]
+        return np.linalg.pinv(matrix).T if np.isfinite(matrix).all() else np.eye(3)
+
+
+def _product(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k, 3, 4) by (k or 1, 4, m); one multiplication where all frames have the same points."""
+    if len(points) > 1:
+        return matrices @ points
+    return (matrices.reshape(-1, 4) @ points[0]).reshape(len(matrices), 3, -1)
+
+
+def _sampling(scene: Scene, wanted: float | None) -> tuple[float, np.ndarray, dict[str, Any]]:
+    """Frames per second, the times (T,) to evaluate, and metadata of both."""
+    keys = scene.keys
+    if not len(keys):
+        return DEFAULT_FPS, np.zeros(1), {}
+    extras = scene.file.json["asset"].get("extras")
+    said = extras if isinstance(extras, dict) else {}
+    fps = wanted or _said_rate(said, keys) or key_rate(keys) or DEFAULT_FPS
+    count = float(keys[-1] - keys[0]) * fps
+    if not count < MOST_FRAMES:
+        raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")
+    times = keys[0] + np.arange(int(count + 0.02) + 1) / fps
+    first = float(keys[0] * fps) + (said["start_frame"] if _is_number(said.get("start_frame")) else 0)
+    whole = round(first)
+    clock = {"fps": float(fps), "start_frame": whole if abs(first - whole) < 1e-3 else first}
+    return float(fps), _on_keys(times, keys, fps), clock
+
+
+def _said_rate(said: dict, keys: np.ndarray) -> float | None:
+    """What the file says, where its keys agree."""
+    fps = said.get("fps")
+    return float(fps) if _is_number(fps) and 0 < fps < 1e6 and on_grid(keys, fps) else None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e15
+
+
+def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
+    """Times that are those of a key but for rounding become exactly it, which STEP asks for."""
+    after = np.clip(np.searchsorted(keys, times), 1, max(len(keys) - 1, 1))
+    right = keys[np.minimum(after, len(keys) - 1)]
+    nearest = np.where(np.abs(times - keys[after - 1]) <= np.abs(right - times), keys[after - 1], right)
+    return np.where(np.abs(nearest - times) * fps < 0.02, nearest, times)
+
+
+# ---- what does not move ----
+
+
+def _names(scene: Scene, parts: list[Part]) -> dict[str, Any]:
+    names = {"part_names": [part.name for part in parts], "part_kinds": [part.kind for part in parts]}
+    played = [_animation_name(scene.file, index) for index in scene.played]
+    return names | ({"animations": played} if played else {})
+
+
+def _connections(file: GltfFile, parts: list[Part]) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Faces (F, 3) and edges (E, 2), int32."""
+    found: dict[int, list[np.ndarray]] = {2: [], 3: []}
+    for part in parts:
+        for primitive in part.primitives:
+            mode = integer(primitive, "mode", 4)
+            if mode == 0:
+                continue
+            rows = _rows(_corners(file, primitive, part), mode)
+            found[rows.shape[1]].append((rows + part.first).astype(np.int32))
+    return tuple(np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+
+
+def _corners(file: GltfFile, primitive: dict, part: Part) -> np.ndarray:
+    if primitive.get("indices") is None:
+        return np.arange(part.count)
+    values = file.array(primitive["indices"])
+    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= part.count:
+        raise ClipError(f"mesh {part.name!r}: got indices up to {values.max()}, expected those of {part.count} "
+                        "vertices")
+    return values[:, 0].astype(np.int64)
+
+
+def _rows(corners: np.ndarray, mode: int) -> np.ndarray:
+    """Corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
+    if mode == 1:
+        return corners[: len(corners) // 2 * 2].reshape(-1, 2)
+    if mode in (2, 3):
+        ends = corners[1:] if mode == 3 else np.roll(corners, -1)
+        return np.stack([corners[: len(ends)], ends], axis=1)
+    if mode == 4:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    count = max(len(corners) - 2, 0)
+    if mode == 6:
+        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1) if count else None
+    else:
+        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if count else None
+        if count:
+            rows[1::2, 1:] = rows[1::2, :0:-1]
+    if rows is None:
+        return np.zeros((0, 3), np.int64)
+    return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]
+
+
+def _attributes(file: GltfFile, parts: list[Part], skip: Collection[str], motion: _Motion,
+                keep_normals: bool) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Static arrays over all vertices; parts that lack one have 0, no number, or white. And branches, where the file
+    was written with them."""
+    keep_normals = keep_normals and not any(part.skin is not None or part.weights.any() for part in parts)
+    keys = dict.fromkeys(key for part in parts for key in part.attributes
+                         if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL")
+    found: dict[str, np.ndarray] = {}
+    for key in keys:
+        name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:])
+        if name and name not in skip and name not in found:
+            found[name] = _attribute(file, parts, key, name, motion)
+    branches = _branches(file, found)
+    for name in RESERVED_NAMES & found.keys():
+        found[f"{name}_"] = found.pop(name)
+    found["part_vertex_counts"] = np.array([part.count for part in parts], np.int32)
+    return found, branches
+
+
+def _attribute(file: GltfFile, parts: list[Part], key: str, name: str, motion: _Motion) -> np.ndarray:
+    pieces = {}
+    for number, part in enumerate(parts):
+        if key in part.attributes:
+            index = part.attributes[key]
+            plain = key.startswith("_") and not file.item("accessors", index).get("normalized")
+            values = file.array(index) if plain else file.floats(index).astype(np.float32)
+            if len(values) != part.count:
+                raise ClipError(f"mesh {part.name!r}: got {len(values)} entries of {key}, expected {part.count}")
+            if key == "NORMAL" and values.shape[1] == 3:
+                turned = values @ motion.normal_matrix(part).T
+                length = np.linalg.norm(turned, axis=1, keepdims=True)
+                values = (turned / np.where(length > 0, length, 1)).astype(np.float32)
+            pieces[number] = values
+    dtype, width = np.result_type(*pieces.values()), max(piece.shape[1] for piece in pieces.values())
+    filler = FILLERS.get(name, np.nan if dtype.kind == "f" and key.startswith("_") else 0)
+    out = np.full((motion.count, width), filler, dtype)
+    for number, values in pieces.items():
+        out[parts[number].first : parts[number].first + len(values), : values.shape[1]] = values
+    return out[:, 0] if width == 1 else out
+
+
+def _branches(file: GltfFile, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
+    extras = file.json["asset"].get("extras")
+    ours = extras.get("athcodec") if isinstance(extras, dict) else None
+    parent = ours.get("branch_parent") if isinstance(ours, dict) else None
+    if not isinstance(parent, list) or "vertex_branch" not in found or not all(type(each) is int for each in parent):
+        return {}
+    names = [name for name in ("vertex_branch", "stem_index") if name in found]
+    found_branches = {name: found.pop(name).astype(np.int64) for name in names}
+    return found_branches | {"branch_parent": np.array(parent, np.int64)}
+
+
+def _skin(scene: Scene, parts: list[Part]) -> Skin | None:
+    """The joints, or nodes, that vertices hang on; None where one node moves them all."""
+    movers = {joint for part in parts for joint in part.joints} | {p.node for p in parts if p.skin is None}
+    order = [node for node in scene.order if node in movers]
+    if len(order) < 2:
+        return None
+    place = {node: number for number, node in enumerate(order)}
+    vertex_joint = np.full(parts[-1].first + parts[-1].count, -1, np.int32)
+    for part in parts:
+        rows = slice(part.first, part.first + part.count)
+        if part.skin is None:
+            vertex_joint[rows] = place[part.node]
+        else:
+            vertex_joint[rows] = np.array([place[joint] for joint in part.joints])[part.strongest]
+    return Skin(np.array([_above(scene, node, place) for node in order], np.int32), vertex_joint,
+                tuple(scene.name(node) for node in order))
+
+
+def _above(scene: Scene, node: int, place: dict[int, int]) -> int:
+    node = int(scene.parent[node])
+    while node >= 0 and node not in place:
+        node = int(scene.parent[node])
+    return place.get(node, -1)

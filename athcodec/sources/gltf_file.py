@@ -1,0 +1,335 @@
+"""The bytes of a glTF 2.0 file: GLB or JSON, its buffers, and its accessors as arrays.
+
+Buffers are the binary chunk of a GLB, files beside it, or data URIs; what is asked for is read when it is asked for.
+Buffer views compressed by EXT_meshopt_compression are decoded where the package meshoptimizer is installed, those of
+Draco are not. Based on the glTF 2.0 specification; nothing here knows nodes, meshes or animations (gltf_scene.py).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+import struct
+from collections.abc import Mapping
+from os import PathLike, fspath
+from typing import Any, BinaryIO
+from urllib.parse import unquote
+
+import numpy as np
+
+from athcodec.errors import ClipError
+
+COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+KEPT_VIEWS = 8  # that have been decompressed
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+# What a reader of positions may ignore, or knows.
+HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_", "EXT_lights_", "MSFT_texture_",
+            "ADOBE_materials_", "KHR_mesh_quantization", "KHR_animation_pointer", *MESHOPT)
+
+_GLB_HEADER = struct.Struct("<4sII")
+_CHUNK_HEADER = struct.Struct("<II")
+_JSON_CHUNK, _BIN_CHUNK = 0x4E4F534A, 0x004E4942
+
+
+class GltfFile:
+    """An opened file; close it. `json` is its structure, an object. Raises ClipError, OSError."""
+
+    def __init__(self, path: str | PathLike[str]):
+        self.path = fspath(path)
+        self._files: list[BinaryIO] = []
+        self._buffers: dict[int, _Bytes] = {}
+        self._unpacked_views: dict[int, bytes] = {}
+        try:
+            file = self._open(self.path)
+            self.size = os.fstat(file.fileno()).st_size
+            self._binary: _Bytes | None = None
+            self.json = _parsed(self._read_json(file))
+            self._check_version()
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self, path: str) -> BinaryIO:
+        if not os.path.isfile(path) and os.path.exists(path):
+            raise ClipError(f"{path}: got a folder or a device, expected a file")
+        self._files.append(open(path, "rb"))
+        return self._files[-1]
+
+    def close(self) -> None:
+        for file in self._files:
+            file.close()
+
+    def stamp(self) -> list[tuple[int, int]]:
+        """Sizes and times of the files, which tell whether they have been written to."""
+        states = [os.fstat(file.fileno()) for file in self._files]
+        return [(state.st_size, state.st_mtime_ns) for state in states]
+
+    # ---- structure ----
+
+    def _read_json(self, file: BinaryIO) -> bytes:
+        head = file.read(_GLB_HEADER.size)
+        if head[:4] != b"glTF":
+            return head + file.read()
+        if len(head) < _GLB_HEADER.size:
+            raise ClipError(f"GLB: got {len(head)} bytes, expected a header of {_GLB_HEADER.size}")
+        _, version, length = _GLB_HEADER.unpack(head)
+        if version != 2:
+            raise ClipError(f"GLB: got version {version}, expected 2")
+        if length > self.size:
+            raise ClipError(f"GLB: got {self.size} bytes, expected {length}: the file is cut off")
+        text, place = None, _GLB_HEADER.size
+        while place + _CHUNK_HEADER.size <= length:
+            file.seek(place)
+            size, kind = _CHUNK_HEADER.unpack(file.read(_CHUNK_HEADER.size))
+            place += _CHUNK_HEADER.size
+            if size > length - place:
+                raise ClipError(f"GLB: got a chunk of {size} bytes, expected at most {length - place}")
+            if text is None:
+                if kind != _JSON_CHUNK:
+                    raise ClipError(f"GLB: got a first chunk of type {kind:#x}, expected JSON")
+                text = file.read(size)
+            elif kind == _BIN_CHUNK and self._binary is None:
+                self._binary = _FilePart(file, place, size)
+            place += size + -size % 4
+        if text is None:
+            raise ClipError("GLB: got no chunk, expected JSON")
+        return text
+
+    def _check_version(self) -> None:
+        version = str(entry(self.json, "asset").get("version"))
+        if not version.startswith("2."):
+            raise ClipError(f"asset: got version {version[:20]!r}, expected 2.0")
+        for name in self.json.get("extensionsRequired") or ():
+            if not str(name).startswith(HARMLESS):
+                raise ClipError(f"extensionsRequired: got {str(name)[:60]!r}, which is not read here; expected a file "
+                                "without it")
+
+    def item(self, kind: str, index: Any) -> dict:
+        """Entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
+        every = self.json.get(kind)
+        count = len(every) if isinstance(every, list) else 0
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
+            raise ClipError(f"{kind}: got index {brief(index)}, expected one below {count}")
+        if not isinstance(every[index], dict):
+            raise ClipError(f"{kind}: entry {index} is {brief(every[index])}, expected an object")
+        return every[index]
+
+    def items(self, kind: str) -> list[dict]:
+        return entries(self.json, kind)
+
+    # ---- accessors ----
+
+    def count(self, index: Any) -> int:
+        """Number of elements of accessor `index`."""
+        return integer(self.item("accessors", index), "count", low=1)
+
+    def array(self, index: Any) -> np.ndarray:
+        """Accessor `index` as (count, width) in its component type. Raises ClipError."""
+        accessor, where = self.item("accessors", index), f"accessor {index}"
+        dtype = _looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
+        width = _looked_up(WIDTHS, accessor.get("type"), f"{where}: type")
+        count = integer(accessor, "count", low=1)
+        if accessor.get("bufferView") is None:
+            if count * width > max(self.size, 1 << 16):
+                raise ClipError(f"{where}: got {count} elements without bytes in a file of {self.size}")
+            values = np.zeros((count, width), dtype)
+        else:
+            values = self._strided(accessor, np.dtype(dtype), width, count, where)
+        if accessor.get("sparse") is not None:
+            values = self._sparse(entry(accessor, "sparse"), values, where)
+        return values
+
+    def floats(self, index: Any) -> np.ndarray:
+        """Accessor `index` as numbers: float32 as they are, normalized integers between -1 and 1 (float64)."""
+        values = self.array(index)
+        if values.dtype.kind == "f":
+            return values
+        if not self.item("accessors", index).get("normalized"):
+            return values.astype(np.float64)
+        return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
+
+    def _strided(self, accessor: Mapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
+        view = self.item("bufferViews", accessor["bufferView"])
+        item, offset = dtype.itemsize * width, integer(accessor, "byteOffset", 0)
+        stride = integer(view, "byteStride", 0) or item
+        size = stride * (count - 1) + item
+        length = integer(view, "byteLength", low=1)
+        if stride < item or offset + size > length:
+            raise ClipError(f"{where}: got {count} elements of {item} bytes at {offset}, expected what fits into the "
+                            f"{length} bytes of its buffer view")
+        raw = self._view(accessor["bufferView"], view, offset, size)
+        return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
+
+    def _sparse(self, sparse: Mapping, values: np.ndarray, where: str) -> np.ndarray:
+        count = integer(sparse, "count", low=1, stop=len(values) + 1)
+        indices, changed = entry(sparse, "indices"), entry(sparse, "values")
+        dtype = np.dtype(_looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
+        rows = self._strided(indices, dtype, 1, count, f"{where}: sparse indices")[:, 0]
+        if dtype.kind != "u" or int(rows.max()) >= len(values):
+            raise ClipError(f"{where}: got sparse indices up to {rows.max()}, expected those of {len(values)} elements")
+        values = values.copy()
+        values[rows] = self._strided(changed, values.dtype, values.shape[1], count, f"{where}: sparse values")
+        return values
+
+    def _view(self, index: Any, view: Mapping, offset: int, size: int) -> bytes:
+        extensions = view.get("extensions") or {}
+        for name in MESHOPT:
+            if name in extensions:
+                return self._unpacked(index, name)[offset : offset + size]
+        return self._slice(view, integer(view, "byteOffset", 0) + offset, size, f"bufferView {index}")
+
+    def _unpacked(self, index: int, name: str) -> bytes:
+        if index not in self._unpacked_views:
+            from athcodec.sources.gltf_meshopt import unpack  # most files do without
+
+            packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
+            raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
+            if len(self._unpacked_views) >= KEPT_VIEWS:
+                self._unpacked_views.pop(next(iter(self._unpacked_views)))
+            self._unpacked_views[index] = unpack(raw, packed)
+        return self._unpacked_views[index]
+
+    def _slice(self, view: Mapping, offset: int, size: int, where: str) -> bytes:
+        index = integer(view, "buffer")
+        if index not in self._buffers:
+            self._buffers[index] = self._buffer(index)
+        buffer = self._buffers[index]
+        if offset + size > buffer.size:
+            raise ClipError(f"{where}: got bytes {offset} to {offset + size}, expected those of a buffer of "
+                            f"{buffer.size}")
+        return buffer.read(offset, size)
+
+    def _buffer(self, index: int) -> _Bytes:
+        buffer = self.item("buffers", index)
+        uri = buffer.get("uri")
+        if uri is None and index == 0 and self._binary is not None:
+            found = self._binary
+        elif isinstance(uri, str) and uri.startswith("data:"):
+            found = _Bytes(_data_uri(uri))
+        elif isinstance(uri, str):
+            file = self._open(self._beside(uri))
+            found = _FilePart(file, 0, os.fstat(file.fileno()).st_size)
+        else:
+            raise ClipError(f"buffers: entry {index} has no bytes, expected a URI or the binary chunk of a GLB")
+        length = integer(buffer, "byteLength", low=1)
+        if length > found.size:
+            raise ClipError(f"buffers: entry {index} has {found.size} bytes, expected {length}")
+        found.size = length
+        return found
+
+    def _beside(self, uri: str) -> str:
+        """The file that a relative URI names. One that leads elsewhere is refused: a file from a stranger must not
+        read what else is on the disk."""
+        name = unquote(uri)
+        parts = name.replace("\\", "/").split("/")
+        if ":" in parts[0] or name.startswith(("/", "\\")) or ".." in parts or "\0" in name:
+            raise ClipError(f"buffers: got the URI {uri[:60]!r}, expected a file beside the glTF file or below it")
+        return os.path.join(os.path.dirname(self.path), *parts)
+
+
+class _Bytes:
+    """A buffer in memory."""
+
+    def __init__(self, data: bytes):
+        self._data, self.size = data, len(data)
+
+    def read(self, offset: int, size: int) -> bytes:
+        return self._data[offset : offset + size]
+
+
+class _FilePart(_Bytes):
+    """A buffer in a file."""
+
+    def __init__(self, file: BinaryIO, start: int, size: int):
+        self._file, self._start, self.size = file, start, size
+
+    def read(self, offset: int, size: int) -> bytes:
+        self._file.seek(self._start + offset)
+        data = self._file.read(size)
+        if len(data) < size:
+            raise ClipError(f"buffer: got {len(data)} bytes at {offset}, expected {size}: the file is cut off")
+        return data
+
+
+def entry(holder: Mapping, key: str) -> dict:
+    """The object `key` of another. Raises ClipError."""
+    value = holder.get(key)
+    if not isinstance(value, dict):
+        raise ClipError(f"{key}: got {brief(value)}, expected an object")
+    return value
+
+
+def entries(holder: Mapping, key: str) -> list[dict]:
+    """The array of objects `key`, empty where there is none. Raises ClipError."""
+    value = holder.get(key)
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
+        raise ClipError(f"{key}: got {brief(value)}, expected an array of objects")
+    return value
+
+
+def integer(holder: Mapping, key: str, default: int | None = None, low: int = 0, stop: int = 1 << 53) -> int:
+    """The whole number `key`, from `low` to `stop` - 1. Raises ClipError."""
+    value = holder.get(key, default)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < stop:
+        raise ClipError(f"{key}: got {brief(value)}, expected a whole number from {low} to {stop - 1}")
+    return value
+
+
+def indices(holder: Mapping, key: str) -> list[int]:
+    """The array of whole numbers `key`, empty where there is none. Raises ClipError."""
+    value = holder.get(key)
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(type(each) is int and each >= 0 for each in value):
+        raise ClipError(f"{key}: got {brief(value)}, expected an array of indices")
+    return value
+
+
+def vector(holder: Mapping, key: str, default: list[float]) -> np.ndarray:
+    """The array of as many finite numbers as `default` has, float64. Raises ClipError."""
+    value = holder.get(key, default)
+    if not isinstance(value, list) or len(value) != len(default) or any(type(n) not in (int, float) for n in value):
+        raise ClipError(f"{key}: got {brief(value)}, expected {len(default)} numbers")
+    return np.array([float(number) for number in value])
+
+
+def brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _looked_up(table: Mapping, key: Any, what: str) -> Any:
+    if not isinstance(key, (int, str)) or key not in table:
+        raise ClipError(f"{what}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
+    return table[key]
+
+
+def _parsed(text: bytes) -> dict:
+    try:
+        found = json.loads(text.decode("utf-8-sig"), parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise ClipError(f"JSON: got text that is none: {str(error)[:100]}, expected glTF 2.0") from None
+    if not isinstance(found, dict):
+        raise ClipError(f"JSON: got {brief(found)}, expected an object")
+    return found
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def _data_uri(uri: str) -> bytes:
+    head, _, data = uri.partition(",")
+    if not head.endswith(";base64"):
+        raise ClipError(f"buffers: got the URI {head[:60]!r}, expected data in base64")
+    try:
+        return base64.b64decode(data, validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise ClipError(f"buffers: got data that is no base64: {error}") from None

@@ -1,0 +1,261 @@
+"""Nodes and animations of a glTF file, evaluated: the matrices of all nodes, and morph weights, at any times.
+
+Follows the glTF 2.0 specification: STEP, LINEAR (rotations along the shorter arc) and CUBICSPLINE, values held before
+the first key and after the last. Matrices of many frames are made at once. It knows no meshes (gltf.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, indices, integer, vector
+
+TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
+INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
+RATES = (24.0, 25.0, 30.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
+SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart are meant to be interpolated
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One animated property: times (K,), values (K, W), or (K, 3, W) with tangents for CUBICSPLINE."""
+
+    times: np.ndarray
+    values: np.ndarray
+    interpolation: str
+    is_rotation: bool
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """(k, W) float64."""
+        after = np.searchsorted(self.times, times, "right")
+        last = len(self.times) - 1
+        left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
+        if self.interpolation == "STEP":
+            return self.values[left].astype(np.float64)
+        step = self.times[right] - self.times[left]
+        part = np.divide(times - self.times[left], step, out=np.zeros(len(times)), where=step > 0)
+        part = np.clip(part, 0, 1)[:, None]
+        if self.interpolation == "CUBICSPLINE":
+            return self._spline(left, right, step[:, None], part)
+        a, b = self.values[left].astype(np.float64), self.values[right].astype(np.float64)
+        return slerp(a, b, part) if self.is_rotation else a + (b - a) * part
+
+    def _spline(self, left: np.ndarray, right: np.ndarray, step: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, b = self.values[left, 1].astype(np.float64), self.values[right, 1].astype(np.float64)
+        out, into = step * self.values[left, 2], step * self.values[right, 0]
+        t2, t3 = t * t, t * t * t
+        value = (2 * t3 - 3 * t2 + 1) * a + (t3 - 2 * t2 + t) * out + (3 * t2 - 2 * t3) * b + (t3 - t2) * into
+        return normalized(value) if self.is_rotation else value
+
+
+def slerp(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """From quaternions a to b (k, 4), the shorter way, by `part` (k, 1)."""
+    cosine = (a * b).sum(axis=1, keepdims=True)
+    b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
+    angle = np.arccos(cosine)
+    sine = np.sin(angle)
+    near = sine < 1e-6
+    safe = np.where(near, 1.0, sine)
+    first = np.where(near, 1 - part, np.sin((1 - part) * angle) / safe)
+    second = np.where(near, part, np.sin(part * angle) / safe)
+    return a * first + b * second
+
+
+def normalized(quaternions: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
+
+
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
+    x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
+    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    return np.stack(rows, axis=-1).reshape(*quaternions.shape[:-1], 3, 3)
+
+
+class Scene:
+    """The nodes of the default scene, and of the animations those that `play` names (None: see _together)."""
+
+    def __init__(self, file: GltfFile, play: list[int] | None = None):
+        self.file = file
+        self.nodes = file.items("nodes")
+        self.parent = self._parents()
+        self.order = self._reached()
+        self.played = self._together() if play is None else play
+        self.tracks: dict[tuple[int, str], Track] = {}
+        for index in self.played:
+            self._add_animation(index)
+
+    def name(self, node: int) -> str:
+        name = self.nodes[node].get("name")
+        return name if isinstance(name, str) else ""
+
+    # ---- structure ----
+
+    def _parents(self) -> np.ndarray:
+        parent = np.full(len(self.nodes), -1)
+        for index, node in enumerate(self.nodes):
+            for child in indices(node, "children"):
+                if child >= len(parent) or parent[child] >= 0 or child == index:
+                    raise ClipError(f"nodes: node {index} has child {child}, expected another that has no parent yet")
+                parent[child] = index
+        return parent
+
+    def _reached(self) -> list[int]:
+        """The nodes of the default scene, parents first."""
+        scenes = self.file.items("scenes")
+        if scenes:
+            roots = indices(self.file.item("scenes", self.file.json.get("scene", 0)), "nodes")
+        else:
+            roots = np.flatnonzero(self.parent < 0).tolist()
+        order, waiting, seen = [], list(reversed(roots)), set()
+        while waiting:
+            node = waiting.pop()
+            if node >= len(self.nodes) or node in seen:
+                raise ClipError(f"scenes: got node {node} twice or beyond the {len(self.nodes)} nodes, expected trees")
+            seen.add(node)
+            order.append(node)
+            waiting.extend(reversed(indices(self.nodes[node], "children")))
+        return order
+
+    def ancestors(self, nodes: set[int]) -> list[int]:
+        """The nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
+        place = {node: i for i, node in enumerate(self.order)}
+        wanted: set[int] = set()
+        for node in nodes:
+            if node not in place:
+                raise ClipError(f"skins: got joint {node}, expected a node of the scene")
+            while node >= 0 and node not in wanted:
+                wanted.add(node)
+                node = int(self.parent[node])
+        return sorted(wanted & place.keys(), key=place.__getitem__)
+
+    # ---- animations ----
+
+    def _together(self) -> list[int]:
+        """The first animation, and every further one that moves no node that those before it move: tools that write an
+        animation per object mean them to run at once, one with several takes starts with the default one."""
+        played, moved = [], set()
+        for index, animation in enumerate(self.file.items("animations")):
+            targets = {node for node, _, _ in self._channels(animation)}
+            if targets and not targets & moved:
+                played.append(index)
+                moved |= targets
+        return played
+
+    def _channels(self, animation: dict) -> list[tuple[int, str, int]]:
+        """(node, path, sampler) of the channels that move nodes of the scene."""
+        found, inside = [], set(self.order)
+        for channel in entries(animation, "channels"):
+            target = entry(channel, "target")
+            if target.get("node") is not None and target.get("path") in (*TRS, "weights"):
+                node = integer(target, "node", stop=max(len(self.nodes), 1))
+                if node in inside:
+                    found.append((node, target["path"], integer(channel, "sampler")))
+        return found
+
+    def _add_animation(self, index: int) -> None:
+        animation = self.file.item("animations", index)
+        samplers = entries(animation, "samplers")
+        for node, path, sampler in self._channels(animation):
+            if sampler >= len(samplers):
+                raise ClipError(f"animation {index}: got sampler {sampler}, expected one below {len(samplers)}")
+            if "matrix" in self.nodes[node] and path in TRS:
+                raise ClipError(f"animation {index}: moves node {node}, which has a matrix, expected translation, "
+                                "rotation and scale")
+            self.tracks[node, path] = self._track(samplers[sampler], path, f"animation {index}, sampler {sampler}")
+
+    def _track(self, sampler: dict, path: str, where: str) -> Track:
+        interpolation = sampler.get("interpolation", "LINEAR")
+        if interpolation not in INTERPOLATIONS:
+            raise ClipError(f"{where}: got interpolation {brief(interpolation)}, expected one of "
+                            f"{', '.join(INTERPOLATIONS)}")
+        times = self.file.floats(integer(sampler, "input"))[:, 0].astype(np.float64)
+        if not np.isfinite(times).all() or (np.diff(times) < 0).any():
+            raise ClipError(f"{where}: got key times that run backward or are not finite, expected ascending seconds")
+        values = self.file.floats(integer(sampler, "output"))
+        each = 3 if interpolation == "CUBICSPLINE" else 1
+        width = len(TRS[path]) if path in TRS else values.size // (len(times) * each)
+        if width == 0 or values.size != len(times) * each * width:
+            raise ClipError(f"{where}: got {values.size} numbers for {len(times)} keys, expected "
+                            f"{each * max(width, 1)} per key")
+        shape = (len(times), 3, width) if each == 3 else (len(times), width)
+        return Track(times, values.reshape(shape), interpolation, path == "rotation")
+
+    @cached_property
+    def keys(self) -> np.ndarray:
+        """The times of all keys, ascending, each once."""
+        tables = {id(track.times): track.times for track in self.tracks.values()}
+        return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
+
+    # ---- evaluation ----
+
+    def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
+        """(k, targets) of a node's mesh; times None: without animation, k = 1."""
+        track = self.tracks.get((node, "weights"))
+        if track is None or times is None:
+            return default[None]
+        found = track.at(times)
+        if found.shape[1] != len(default):
+            raise ClipError(f"node {node}: got {found.shape[1]} animated weights, expected {len(default)}")
+        return found
+
+    def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
+        """(k, 4, 4), or (1, 4, 4) of those that stand still, from each node to the world; `nodes` are `ancestors`.
+
+        times None: the pose without animation.
+        """
+        found: dict[int, np.ndarray] = {}
+        for node in nodes:
+            local, parent = self._local(node, times), int(self.parent[node])
+            found[node] = found[parent] @ local if parent in found else local
+        return found
+
+    def _local(self, node: int, times: np.ndarray | None) -> np.ndarray:
+        values = self.nodes[node]
+        if "matrix" in values:
+            return vector(values, "matrix", np.eye(4).ravel().tolist()).reshape(1, 4, 4).swapaxes(1, 2)
+        found = {}
+        for path, default in TRS.items():
+            track = self.tracks.get((node, path)) if times is not None else None
+            found[path] = vector(values, path, default)[None] if track is None else track.at(times)
+        matrix = np.zeros((max(len(each) for each in found.values()), 4, 4))
+        matrix[:, :3, :3] = rotation_matrices(found["rotation"]) * found["scale"][:, None, :]
+        matrix[:, :3, 3] = found["translation"]
+        matrix[:, 3, 3] = 1.0
+        return matrix
+
+
+def key_rate(keys: np.ndarray) -> float | None:
+    """Frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
+    if len(keys) < 2:
+        return None
+    step = float(np.median(np.diff(keys)))
+    for rate in ((1 / step if step > 0 else 0.0), *RATES):
+        if SLOWEST <= rate <= FASTEST and on_grid(keys, rate):
+            return _exact(rate, keys)
+    return None
+
+
+def on_grid(keys: np.ndarray, rate: float) -> bool:
+    """Whether all keys, rounded to float32 as they are, lie on frames of a rate, from the first key on."""
+    places = (keys - keys[0]) * rate
+    blur = 0.01 + float(np.abs(keys).max()) * 4e-7 * rate
+    return blur < 0.3 and bool(np.abs(places - np.round(places)).max() <= blur)
+
+
+def _exact(rate: float, keys: np.ndarray) -> float:
+    """The rate that a tool would have said."""
+    span = float(keys[-1] - keys[0])
+    measured = max(round(span * rate), 1) / span
+    whole = round(measured)
+    for likely in (float(whole), whole * 1000 / 1001):
+        if abs(measured - likely) <= 2e-4 * likely and on_grid(keys, likely):
+            return likely
+    return measured
