@@ -1,0 +1,250 @@
+"""What of a motion moves as one, for formats that hold transforms in place of vertices.
+
+It starts from the parts that an .ath file has at a depth (nodes and stems), or from the branches of a clip, and fits to
+each, frame by frame, what a format can do: `Placed` finds translation, rotation and three scales, `Mapped` any affine
+map. A part that this leaves further off than allowed, such as a stem that bends, is cut into shorter ones, down to
+single vertices, which a translation places exactly. It knows no file format.
+
+A part has its own axes: its middle and its principal axes at rest, along which a stem stretches and thins. With scales
+fixed the rotation is the orthogonal Procrustes solution (Schonemann, Psychometrika 31, 1966), with the rotation fixed
+each scale is a projection; the two take turns. Axes along which a part has no extent follow the frame before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.excerpt import Excerpt
+from athcodec.hierarchy import build_hierarchy, hierarchy_of
+
+ROUNDS = 8
+CONVERGED = 1e-9
+SMALLEST_SCALE = 1e-4
+HELD = 1e-9  # how much, of a part's own extent, the rotation of the frame before counts
+WORK_BYTES = 32 << 20
+FINEST = 1e-5  # of the clip's size: nothing finer is asked for
+OF_LEVEL = 1.0  # what a transform may add to the error of the level, as a multiple of it
+OF_CLIP = 1e-4  # of the clip's size, where there is no level
+
+
+def allowed_error(motion: Any) -> float:
+    """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
+    size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
+    return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, Excerpt) else OF_CLIP * size
+
+
+@dataclass(eq=False)
+class Parts:
+    """K parts: part k is the vertices order[first[k] : first[k] + count[k]] of the clip. Its `middle` (K, 3), its axes
+    as columns (K, 3, 3), the mean squares along them (K, 3), how far its vertices `reach` from the middle (K,)."""
+
+    order: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    middle: np.ndarray
+    axes: np.ndarray
+    spread: np.ndarray
+    reach: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    @classmethod
+    def over(cls, order: np.ndarray, first: np.ndarray, count: np.ndarray, rest: np.ndarray) -> Parts:
+        rows = np.concatenate([order[a : a + n] for a, n in zip(first, count)])
+        starts, points = np.cumsum(count) - count, rest[rows]
+        middle = np.add.reduceat(points, starts) / count[:, None]
+        away = points - np.repeat(middle, count, axis=0)
+        square = np.add.reduceat(away[:, :, None] * away[:, None, :], starts) / count[:, None, None]
+        spread, axes = np.linalg.eigh(square)
+        axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
+        reach = np.maximum.reduceat(np.linalg.norm(away, axis=1), starts)
+        return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), reach)
+
+    def vertex_part(self) -> np.ndarray:
+        """(N,) the part of each vertex; of parts that hold all vertices."""
+        out = np.empty(int(self.count.sum()), np.int64)
+        for part, (first, count) in enumerate(zip(self.first, self.count)):
+            out[self.order[first : first + count]] = part
+        return out
+
+
+@dataclass(eq=False)
+class Moving:
+    """Parts and, frame by frame, where their middles are (T, K, 3), and what the solver gave, each (T, K, width)."""
+
+    parts: Parts
+    places: np.ndarray
+    values: list[np.ndarray]
+
+
+class Placed:
+    """Rotation and scales: values are quaternions (x, y, z, w), whose signs run on from frame to frame, and scales."""
+
+    widths = (4, 3)
+
+    def __init__(self, parts: Parts):
+        self._spread, self._axes = parts.spread, parts.axes
+        largest = parts.spread.max(axis=1)
+        self._flat = parts.spread <= HELD * largest[:, None]
+        self._held = np.where(largest > 0, HELD * largest, 1.0)[:, None, None]
+        self._before = quaternions(parts.axes)
+
+    def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
+        rotation, scale = self.nearest(cross)
+        found = quaternions(rotation)
+        found *= np.where((found * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        self._before = found
+        return rotation * scale[:, None, :], (found, scale)
+
+    def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        scale = np.ones_like(self._spread)
+        safe = np.where(self._flat, 1.0, self._spread)
+        for _ in range(ROUNDS):
+            rotation = _proper(cross * scale[:, None, :] + self._held * self._axes)
+            reached = np.einsum("kij,kij->kj", rotation, cross) / safe
+            better = np.where(self._flat, 1.0, np.maximum(reached, SMALLEST_SCALE))
+            done = np.abs(better - scale).max() < CONVERGED
+            scale = better
+            if done:
+                break
+        self._axes = rotation
+        return rotation, scale
+
+
+class Mapped:
+    """Any affine map: values are its matrix (9 numbers, row by row) from rest to frame, without the translation."""
+
+    widths = (9,)
+
+    def __init__(self, parts: Parts):
+        self._placed, self._axes = Placed(parts), parts.axes
+        self._flat = parts.spread <= 1e-6 * parts.spread.max(axis=1)[:, None]
+        self._spread = np.where(self._flat, 1.0, parts.spread)
+
+    def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray]]:
+        rotation, _ = self._placed.nearest(cross)
+        linear = np.where(self._flat[:, None, :], rotation, cross / self._spread[:, None, :])
+        return linear, ((linear @ self._axes.swapaxes(1, 2)).reshape(-1, 9),)
+
+
+def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[float], None]) -> Moving | None:
+    """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`."""
+    rest = np.asarray(motion.rest, np.float64)
+    order, first, count = _ranges(motion)
+    done: list[tuple[Parts, np.ndarray, list[np.ndarray]]] = []
+    number = 0
+    while len(first):
+        if len(first) + number > most:
+            return None
+        parts = Parts.over(order, first, count, rest)
+        places, values, error = _fitted(motion, parts, solver(parts), rest)
+        good = (error <= allowed) | (count == 1)
+        done.append((Parts.over(order, first[good], count[good], rest), places[:, good], [v[:, good] for v in values])
+                    if good.any() else (parts, places[:, :0], [v[:, :0] for v in values]))
+        number += int(good.sum())
+        first, count = _cut(first[~good], count[~good], error[~good] / allowed if allowed > 0 else None)
+        report(1 - float(count.sum()) / len(rest))
+    return _joined(done, order, rest)
+
+
+def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """An order of the vertices, and ranges of it that are the parts to begin with."""
+    if isinstance(motion, Excerpt):
+        parts = motion.affines(0)
+        return motion.decoder.hierarchy.vertex_source, parts.first_vertex.astype(np.int64), (
+            parts.vertex_count.astype(np.int64))
+    hierarchy = hierarchy_of(motion) if motion.branch_parent is not None else (
+        build_hierarchy(np.zeros(motion.vertex_count, np.int32), np.array([-1]), np.asarray(motion.rest)))
+    return hierarchy.vertex_source, hierarchy.first_vertex.astype(np.int64), hierarchy.stem_count.astype(np.int64)
+
+
+def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Shorter ranges: what bends is off by the square of its length."""
+    wanted = count if excess is None else np.ceil(np.sqrt(np.minimum(excess, 1e12)))
+    pieces = np.clip(wanted, 2, count).astype(np.int64)
+    number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    of = np.repeat(np.arange(len(first)), pieces)
+    starts = number * count[of] // pieces[of]
+    stops = (number + 1) * count[of] // pieces[of]
+    return first[of] + starts, stops - starts
+
+
+def _fitted(motion: Any, parts: Parts, solver: Any,
+            rest: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Places (T, K, 3) and values of all frames, and the largest distance that each part leaves (K,)."""
+    rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
+    starts, own = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
+    local = np.einsum("nij,ni->nj", parts.axes[own], rest[rows] - parts.middle[own])
+    places = np.empty((motion.frame_count, len(parts), 3))
+    values = [np.empty((motion.frame_count, len(parts), width)) for width in solver.widths]
+    error = np.zeros(len(parts))
+    for start, frames in portions(motion, len(rows)):
+        points = frames[:, rows].astype(np.float64)
+        middle = np.add.reduceat(points, starts, axis=1) / parts.count[:, None]
+        points -= middle[:, own]
+        places[start : start + len(frames)] = middle
+        cross = np.empty((len(frames), len(parts), 3, 3))
+        for i in range(3):
+            for j in range(3):
+                cross[:, :, i, j] = np.add.reduceat(points[:, :, i] * local[:, j], starts, axis=1) / parts.count
+        for i in range(len(frames)):
+            linear, found = solver(cross[i])
+            for kept, value in zip(values, found):
+                kept[start + i] = value
+            points[i] -= np.einsum("nij,nj->ni", linear[own], local)
+        square = np.einsum("tni,tni->tn", points, points).max(axis=0)
+        error = np.maximum(error, np.sqrt(np.maximum.reduceat(square, starts)))
+    return places, values, error
+
+
+def portions(motion: Any, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]:
+    """The blocks of a motion, in portions for work on that many of its vertices."""
+    step = max(1, WORK_BYTES // (vertex_count * 24))
+    for start, frames in motion.blocks():
+        for first in range(0, len(frames), step):
+            yield start + first, frames[first : first + step]
+
+
+def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
+    done = [each for each in done if each[1].shape[1]]
+    first, count = (np.concatenate([getattr(parts, name) for parts, _, _ in done]) for name in ("first", "count"))
+    by_place = np.argsort(first)
+    places = np.concatenate([each[1] for each in done], axis=1)[:, by_place]
+    values = [np.concatenate([each[2][i] for each in done], axis=1)[:, by_place] for i in range(len(done[0][2]))]
+    return Moving(Parts.over(order, first[by_place], count[by_place], rest), places, values)
+
+
+def _proper(matrices: np.ndarray) -> np.ndarray:
+    """The rotations nearest to matrices (K, 3, 3)."""
+    u, _, v = np.linalg.svd(matrices)
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+    return u @ v
+
+
+def quaternions(rotations: np.ndarray) -> np.ndarray:
+    """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
+    m = np.moveaxis(rotations, (-2, -1), (0, 1))
+    squares = np.stack([1 + m[0, 0] - m[1, 1] - m[2, 2], 1 - m[0, 0] + m[1, 1] - m[2, 2],
+                        1 - m[0, 0] - m[1, 1] + m[2, 2], 1 + m[0, 0] + m[1, 1] + m[2, 2]], axis=-1)
+    xy, xz, yz = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
+    xw, yw, zw = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    rows = np.stack([np.stack([squares[..., 0], xy, xz, xw], -1), np.stack([xy, squares[..., 1], yz, yw], -1),
+                     np.stack([xz, yz, squares[..., 2], zw], -1), np.stack([xw, yw, zw, squares[..., 3]], -1)], -2)
+    best = squares.argmax(axis=-1)
+    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+
+
+def rotation_matrices(quaternion: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) of quaternions (..., 4), taken to length 1."""
+    x, y, z, w = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
+    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    return np.stack(rows, axis=-1).reshape(*quaternion.shape[:-1], 3, 3)

@@ -1,0 +1,309 @@
+"""The pieces of a GLB file: its structure, its binary chunk, and the shapes of a clip as meshes.
+
+Polygons are drawn as triangles (which polygon a triangle came from is not kept), edges as lines where an object has no
+faces, vertices as points where it has neither. Vertices keep their order; one whose corners have different texture
+coordinates, normals or colours is written once more behind the others of its object. What a vertex of glTF cannot
+have (rows per face or branch, numbers that float32 does not hold) is left out and named. See gltf.py for motion.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec import __version__
+from athcodec.errors import ClipError
+from athcodec.units import METRES, unit_symbol
+
+COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+VERTICES, INDICES = 34962, 34963
+LARGEST_GLB = 2**32 - 1
+UNKNOWN_BOUND = -1.2345678901234567e-300  # as long in JSON as a number gets
+HALF = float(np.sqrt(0.5))
+TURNS = {"y": None, "z": [-HALF, 0.0, 0.0, HALF], "x": [0.0, 0.0, HALF, HALF]}
+NOT_PER_VERTEX = ("part_vertex_counts", "face_vertex_counts", "face_vertex_indices")
+SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": ("NORMAL", (3,)), "colors": ("COLOR_0", (3, 4))}
+
+
+class Glb:
+    """A file on its way: `json` is its structure, arrays are added to its binary chunk."""
+
+    def __init__(self, extras: Mapping[str, Any]):
+        self.json: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": f"athcodec {__version__}", "extras": dict(extras)},
+            "scene": 0, "scenes": [{"nodes": []}], "nodes": [], "meshes": [], "accessors": [], "bufferViews": [],
+        }
+        self._pieces: list[bytes | memoryview] = []
+        self._length = 0
+
+    def node(self, parent: int | None = None, **values: Any) -> int:
+        """A node below another, or of the scene."""
+        self.json["nodes"].append(values)
+        index = len(self.json["nodes"]) - 1
+        above = self.json["scenes"][0]["nodes"] if parent is None else (
+            self.json["nodes"][parent].setdefault("children", []))
+        above.append(index)
+        return index
+
+    def view(self, size: int, **values: Any) -> int:
+        """A buffer view of the next `size` bytes of the binary chunk."""
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": self._length, "byteLength": size} | values)
+        self._length += size
+        if self._length > LARGEST_GLB:
+            raise ClipError(f"GLB: got {self._length} bytes, expected less than 4 GiB: choose fewer frames or levels")
+        return len(self.json["bufferViews"]) - 1
+
+    def accessor(self, view: int, dtype: np.dtype, count: int, width: int, **values: Any) -> int:
+        kind = {"bufferView": view, "componentType": COMPONENTS[dtype.name], "count": count, "type": TYPES[width]}
+        self.json["accessors"].append(kind | values)
+        return len(self.json["accessors"]) - 1
+
+    def array(self, values: np.ndarray, bounds: bool = False, normalized: bool = False, **view: Any) -> int:
+        """An accessor of its own for (count, width) values; those of vertices are padded to whole words."""
+        values = np.ascontiguousarray(values.reshape(len(values), -1))
+        more: dict[str, Any] = {"normalized": True} if normalized else {}
+        if bounds:
+            more |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        count, width = values.shape
+        item = values.itemsize * width
+        if view.get("target") == VERTICES and item % 4:
+            padded = np.zeros((count, item + -item % 4), np.uint8)
+            padded[:, :item] = values.view(np.uint8).reshape(count, item)
+            data, view = padded.tobytes(), view | {"byteStride": padded.shape[1]}
+        else:
+            data = values.tobytes()
+        index = self.view(len(data), **view)
+        self._append(data)
+        return self.accessor(index, values.dtype, count, width, **more)
+
+    def stored(self, values: np.ndarray) -> int:
+        """A buffer view of an array, for accessors of its parts."""
+        index = self.view(values.nbytes)
+        self._append(values.tobytes())
+        return index
+
+    def _append(self, data: bytes) -> None:
+        padding = bytes(-len(data) % 4)
+        self._pieces.append(data + padding)
+        self._length += len(padding)
+
+    def write(self, out: BinaryIO, later: Iterable[bytes] = ()) -> None:
+        """The whole file. `later` are the bytes of the views that were made last, of whole words; accessors' bounds may
+        still be filled in place of UNKNOWN_BOUND while they come."""
+        self.json["buffers"] = [{"byteLength": self._length}]
+        room = len(self._text())
+        room += -room % 4
+        if 28 + room + self._length > LARGEST_GLB:
+            raise ClipError(f"GLB: got {room + self._length} bytes, expected less than 4 GiB: choose fewer frames")
+        out.write(struct.pack("<4sII", b"glTF", 2, 28 + room + self._length))
+        out.write(struct.pack("<II", room, 0x4E4F534A))
+        place = out.tell()
+        out.write(bytes(room))
+        out.write(struct.pack("<II", self._length, 0x004E4942))
+        for piece in self._pieces:
+            out.write(piece)
+        for piece in later:
+            out.write(piece)
+        out.seek(place)
+        out.write(self._text().ljust(room))
+
+    def _text(self) -> bytes:
+        return json.dumps({key: value for key, value in self.json.items() if value or key == "scene"},
+                          separators=(",", ":"), allow_nan=False).encode()
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
+    attributes by their semantic, (n, width)."""
+
+    name: str
+    source: np.ndarray
+    corners: np.ndarray | None
+    attributes: dict[str, np.ndarray]
+
+
+def shapes(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[Shape], list[str]]:
+    """The objects of a clip, and the names of attributes that they cannot have. `more`: by semantic, (N, width)."""
+    faces = motion.polygons
+    triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
+    corner_vertex = np.asarray(faces[1], np.int64) if faces is not None else np.zeros(0, np.int64)
+    per_vertex, per_corner, left_out = _sorted_attributes(motion, len(corner_vertex))
+    per_vertex |= more or {}
+    source, corner_place = _split(corner_vertex, per_corner, motion.vertex_count)
+    values = {key: array[source] for key, array in per_vertex.items()}
+    values |= {key: _from_corners(array, corner_place, len(source)) for key, array in per_corner.items()}
+    edges = np.asarray(motion.edges, np.int64) if motion.edges is not None else np.zeros((0, 2), np.int64)
+    made = []
+    for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
+        rows = np.flatnonzero((source >= start) & (source < stop))
+        place = np.full(len(source), -1)
+        place[rows] = np.arange(len(rows))
+        mine = triangles[(corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)]
+        lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
+        corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
+        made.append(Shape(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
+    return made, left_out
+
+
+def add_mesh(glb: Glb, shape: Shape, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
+             **primitive: Any) -> int:
+    """A mesh of the shape in its rest pose (N, 3)."""
+    semantic = {"POSITION": glb.array(rest[shape.source].astype(np.float32), bounds=True, target=VERTICES)}
+    for key, values in (shape.attributes | dict(attributes or {})).items():
+        is_ratio = key == "COLOR_0" or key.startswith("WEIGHTS_")
+        semantic[key] = glb.array(values, target=VERTICES, normalized=is_ratio and values.dtype.kind == "u")
+    primitive |= {"attributes": semantic, "mode": 0}
+    if shape.corners is not None:
+        dtype = np.uint16 if shape.corners.max() < 65535 else np.uint32
+        primitive["mode"] = 4 if shape.corners.shape[1] == 3 else 1
+        primitive["indices"] = glb.array(shape.corners.astype(dtype).reshape(-1, 1), target=INDICES)
+    glb.json["meshes"].append({"name": shape.name, "primitives": [primitive]})
+    return len(glb.json["meshes"]) - 1
+
+
+def root_transform(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
+    metres = METRES.get(unit_symbol(metadata.get("unit") or "m"), 1.0)
+    turn = TURNS.get(str(metadata.get("up_axis", "y")).lower())
+    return ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})
+
+
+def clock(motion: Any) -> dict[str, Any]:
+    """Frame rate, and number of the first frame in the tool that made the clip; unit and axis of the vertices."""
+    fps = float(motion.metadata.get("fps") or motion.fps)
+    first = motion.metadata.get("start_frame", 0)
+    first = (first if isinstance(first, (int, float)) else 0) + round(float(motion.time[0]) * fps, 6)
+    said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
+    return {"fps": fps, "start_frame": int(first) if float(first).is_integer() else first} | said
+
+
+def branch_extras(motion: Any) -> dict[str, Any]:
+    parent = getattr(motion, "branch_parent", None)
+    return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
+
+
+def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """Fans over the polygons: (F, 3) places among the corners."""
+    counts = np.asarray(counts, np.int64)
+    starts, fans = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    first = np.repeat(starts, fans)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
+    return np.stack([first, second, second + 1], axis=1)
+
+
+def _sorted_attributes(motion: Any, corner_count: int) -> tuple[dict, dict, list[str]]:
+    """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
+    domains = motion.metadata.get("domains")
+    domains = domains if isinstance(domains, dict) else {}
+    arrays = dict(motion.attributes)
+    for name in ("vertex_branch", "stem_index"):
+        if getattr(motion, name, None) is not None:
+            arrays[name] = getattr(motion, name)
+    per_vertex, per_corner, left_out = {}, {}, []
+    for name, array in arrays.items():
+        if name in NOT_PER_VERTEX:
+            continue
+        domain = domains.get(name, "vertex" if array.ndim and len(array) == motion.vertex_count else "")
+        where = {"vertex": (per_vertex, motion.vertex_count), "corner": (per_corner, corner_count)}.get(domain)
+        found = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
+        if found is None or found[0] in where[0]:
+            left_out.append(name)
+        else:
+            where[0][found[0]] = found[1]
+    return per_vertex, per_corner, left_out
+
+
+def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
+    values = array.reshape(len(array), -1)
+    semantic, widths = SEMANTICS.get(name, ("", ()))
+    if semantic and values.shape[1] in widths:
+        fitting = _standard(semantic, values)
+        if fitting is not None:
+            return semantic, fitting
+    if not 1 <= values.shape[1] <= 4:
+        return None
+    fitting = _as_component(values)
+    return None if fitting is None else ("_" + re.sub(r"\W", "_", name, flags=re.ASCII), fitting)
+
+
+def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
+    """As glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
+    if semantic == "COLOR_0" and values.dtype in (np.uint8, np.uint16):
+        return values
+    if values.dtype.kind != "f" or not np.isfinite(values).all():
+        return None
+    if semantic == "COLOR_0" and (values.min() < 0 or values.max() > 1):
+        return None
+    if semantic == "NORMAL":
+        length = np.linalg.norm(values.astype(np.float64), axis=1, keepdims=True)
+        return (values / length).astype(np.float32) if (length > 1e-12).all() else None
+    return values.astype(np.float32)
+
+
+def _as_component(values: np.ndarray) -> np.ndarray | None:
+    """In a type that attributes may have and that holds all values; float64 is rounded. None where there is none."""
+    if values.dtype.kind == "f":
+        with np.errstate(over="ignore"):
+            rounded = values.astype(np.float32)
+        return rounded if np.isfinite(rounded).all() else None
+    if values.dtype.kind == "b":
+        return values.astype(np.uint8)
+    if values.dtype.kind not in "iu":
+        return None
+    low, high = int(values.min()), int(values.max())
+    for dtype in (np.uint8, np.int8, np.uint16, np.int16):
+        if np.iinfo(dtype).min <= low and high <= np.iinfo(dtype).max:
+            return values.astype(dtype)
+    return values.astype(np.float32) if max(-low, high) <= 1 << 24 else None
+
+
+def _split(corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray],
+           vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
+    if not per_corner or not len(corner_vertex):
+        return np.arange(vertex_count), corner_vertex
+    rows = [corner_vertex.astype("<i8").view(np.uint8).reshape(-1, 8)]
+    rows += [np.ascontiguousarray(v).view(np.uint8).reshape(len(corner_vertex), -1) for v in per_corner.values()]
+    table = np.ascontiguousarray(np.concatenate(rows, axis=1))
+    _, first, kind = np.unique(table.view(f"V{table.shape[1]}").ravel(), return_index=True, return_inverse=True)
+    vertex = corner_vertex[first]
+    order = np.lexsort((first, vertex))
+    is_first = np.ones(len(order), bool)
+    is_first[1:] = np.diff(vertex[order]) > 0
+    place = np.empty(len(first), np.int64)
+    place[order[is_first]] = vertex[order[is_first]]
+    further = order[~is_first]
+    place[further] = vertex_count + np.arange(len(further))
+    return np.concatenate([np.arange(vertex_count), vertex[further]]), place[kind.ravel()]
+
+
+def _from_corners(values: np.ndarray, corner_place: np.ndarray, count: int) -> np.ndarray:
+    out = np.zeros((count, values.shape[1]), values.dtype)
+    if values.shape[1] == 3 and values.dtype.kind == "f":
+        out[:, 2] = 1  # a normal of a vertex without faces has length 1 too
+    out[corner_place] = values
+    return out
+
+
+def _objects(motion: Any, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
+    """(name, first vertex, one past the last); one of all where objects do not hold together."""
+    counts, names = motion.attributes.get("part_vertex_counts"), motion.metadata.get("part_names")
+    whole = [(names[0] if isinstance(names, list) and len(names) == 1 else name, 0, motion.vertex_count)]
+    if counts is None or not isinstance(names, list) or len(names) != len(counts) or np.min(counts, initial=1) < 1:
+        return whole
+    stops = np.cumsum(counts)
+    if not len(stops) or stops[-1] != motion.vertex_count:
+        return whole
+    for corners in (triangles, edges):
+        part = np.searchsorted(stops, corners, "right")
+        if (part != part[:, :1]).any():
+            return whole
+    return [(str(each), int(stop - count), int(stop)) for each, count, stop in zip(names, counts, stops)]

@@ -1,0 +1,80 @@
+"""Joints of glTF for a motion: parts (parts.py) with translation, rotation and scale along their own axes.
+
+What hardly moves is held still, so that it needs no keys. The error is measured against the motion, in the precision
+that is written. It writes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.exporters.fitting import Placed, fit, quaternions, rotation_matrices
+
+SLACK = 0.01  # of the allowed error: what moves less stands still
+
+
+@dataclass(eq=False)
+class Joints:
+    """J joints over T frames, as written: all arrays float32.
+
+    vertex_joint (N,); bind (J, 4, 4) from the clip's vertices to each joint; rest and moving poses are (translation,
+    rotation, scale): (J, 3), (J, 4), (J, 3) and (T, J, 3), (T, J, 4), (T, J, 3), quaternions x y z w. max_error: the
+    largest distance of a vertex from the motion, in scene units.
+    """
+
+    vertex_joint: np.ndarray
+    bind: np.ndarray
+    rest: tuple[np.ndarray, np.ndarray, np.ndarray]
+    poses: tuple[np.ndarray, np.ndarray, np.ndarray]
+    max_error: float = 0.0
+
+    def pose(self, rest: np.ndarray, frame: int) -> np.ndarray:
+        """(N, 3) float64: where an engine puts vertices whose rest pose (N, 3) is that of the file."""
+        own = self.vertex_joint
+        bind = self.bind.astype(np.float64)[own]
+        local = np.einsum("nij,nj->ni", bind[:, :3, :3], rest) + bind[:, :3, 3]
+        translation, rotation, scale = (each[frame].astype(np.float64) for each in self.poses)
+        matrices = rotation_matrices(rotation) * scale[:, None, :]
+        return np.einsum("nij,nj->ni", matrices[own], local) + translation[own]
+
+
+def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float], None]) -> Joints | None:
+    """Joints that are at most about `allowed` off; None where that takes more than `most`."""
+    moving = fit(motion, Placed, allowed, most, lambda done: report(0.7 * done))
+    if moving is None:
+        return None
+    parts, poses = moving.parts, [moving.places, *moving.values]
+    still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
+    _hold(poses, still, parts.reach, SLACK * allowed)
+    bind = np.zeros((len(parts), 4, 4))
+    bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
+    bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)
+    bind[:, 3, 3] = 1.0
+    joints = Joints(parts.vertex_part(), bind.astype(np.float32), tuple(a.astype(np.float32) for a in still),
+                    tuple(each.astype(np.float32) for each in poses))
+    joints.max_error = _measured(motion, joints, lambda done: report(0.7 + 0.3 * done))
+    return joints
+
+
+def _measured(motion: Any, joints: Joints, report: Callable[[float], None]) -> float:
+    rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
+    largest = 0.0
+    for start, frames in motion.blocks():
+        for i, frame in enumerate(frames):
+            away = joints.pose(rest, start + i) - frame
+            largest = max(largest, float(np.einsum("ni,ni->n", away, away).max()))
+        report((start + len(frames)) / motion.frame_count)
+    return float(np.sqrt(largest))
+
+
+def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], reach: np.ndarray, slack: float) -> None:
+    """Makes constant, as at rest or else as in the first frame, what moves no vertex by `slack`."""
+    levers = (np.ones_like(reach), 2 * reach, reach)  # half the angle is in a quaternion
+    for values, rest, lever in zip(poses, still, levers):
+        for constant in (rest, values[0].copy()):
+            held = np.linalg.norm(values - constant, axis=-1).max(axis=0) * lever <= slack
+            values[:, held] = constant[held]
