@@ -44,18 +44,18 @@ FORMATS = (
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz"),
     Format("usd", "USD: time-sampled points", (".usd", ".usdc", ".usda", ".usdz"), "athcodec.exporters.usd", "usd",
            ("pxr",)),
-    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf", "gltf", ("pygltflib",)),
+    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf"),
     Format("alembic", "Alembic: samples of points", (".abc",), "athcodec.exporters.alembic", "alembic",
            ("alembic3d",)),
     Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
     Format("mdd", "MDD point cache", (".mdd",), "athcodec.exporters.mdd"),
     Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply"), "athcodec.exporters.sequence"),
-    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.exporters.xdmf", "mesh", ("meshio",)),
-    Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu"), "athcodec.exporters.vtk", "mesh", ("meshio",)),
+    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.exporters.xdmf"),
+    Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu"), "athcodec.exporters.vtk"),
     Format("vat", "vertex animation textures: node matrices", (".vat",), "athcodec.exporters.vat", "vat",
            ("OpenEXR",)),
     Format("openvat", "vertex animation textures: positions, as OpenVAT has them", (".openvat",),
-           "athcodec.exporters.vat", "vat", ("OpenEXR",)),
+           "athcodec.exporters.openvat", "vat", ("OpenEXR",)),
 )
 
 

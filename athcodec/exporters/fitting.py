@@ -22,7 +22,7 @@ from athcodec.excerpt import Excerpt
 from athcodec.hierarchy import build_hierarchy, hierarchy_of
 
 ROUNDS = 8
-CONVERGED = 1e-9
+CONVERGED = 1e-6
 SMALLEST_SCALE = 1e-4
 HELD = 1e-9  # how much, of a part's own extent, the rotation of the frame before counts
 WORK_BYTES = 32 << 20
@@ -40,7 +40,7 @@ def allowed_error(motion: Any) -> float:
 @dataclass(eq=False)
 class Parts:
     """K parts: part k is the vertices order[first[k] : first[k] + count[k]] of the clip. Its `middle` (K, 3), its axes
-    as columns (K, 3, 3), the mean squares along them (K, 3), how far its vertices `reach` from the middle (K,)."""
+    as columns (K, 3, 3), the mean squares along them (K, 3), and how far its vertices `reach` along them."""
 
     order: np.ndarray
     first: np.ndarray
@@ -62,7 +62,8 @@ class Parts:
         square = np.add.reduceat(away[:, :, None] * away[:, None, :], starts) / count[:, None, None]
         spread, axes = np.linalg.eigh(square)
         axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
-        reach = np.maximum.reduceat(np.linalg.norm(away, axis=1), starts)
+        local = np.einsum("nij,ni->nj", np.repeat(axes, count, axis=0), away)
+        reach = np.maximum.reduceat(np.abs(local), starts)
         return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), reach)
 
     def vertex_part(self) -> np.ndarray:

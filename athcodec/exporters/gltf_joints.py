@@ -72,9 +72,18 @@ def _measured(motion: Any, joints: Joints, report: Callable[[float], None]) -> f
 
 
 def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], reach: np.ndarray, slack: float) -> None:
-    """Makes constant, as at rest or else as in the first frame, what moves no vertex by `slack`."""
-    levers = (np.ones_like(reach), 2 * reach, reach)  # half the angle is in a quaternion
-    for values, rest, lever in zip(poses, still, levers):
-        for constant in (rest, values[0].copy()):
-            held = np.linalg.norm(values - constant, axis=-1).max(axis=0) * lever <= slack
+    """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`."""
+    around = np.sqrt((reach**2).sum(axis=1, keepdims=True) - reach**2)  # from each axis
+    moves = (lambda values, constant: values - constant, lambda values, constant: _turns(constant, values) * around,
+             lambda values, constant: (values - constant) * reach)
+    for values, rest, moved in zip(poses, still, moves):
+        for constant in (values[0].copy(), rest):
+            held = np.linalg.norm(moved(values, constant), axis=-1).max(axis=0) <= slack
             values[:, held] = constant[held]
+
+
+def _turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Angles about a part's own axes, (T, K, 3), at most, between quaternions (K, 4) and (T, K, 4)."""
+    turn = (before[..., 3:] * after[..., :3] - after[..., 3:] * before[..., :3]
+            - np.cross(before[..., :3], after[..., :3]))
+    return np.pi * turn

@@ -86,17 +86,17 @@ FORMATS = (
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.sources.npz"),
     Format("usd", "USD: meshes, curves and points, UsdSkel", (".usd", ".usdc", ".usda", ".usdz"),
            "athcodec.sources.usd", "usd", ("pxr",), (b"PXR-USDC", b"#usda")),
-    Format("gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf", "gltf",
-           ("pygltflib",), (b"glTF",)),
+    Format("gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf",
+           magic=(b"glTF",)),
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "athcodec.sources.alembic", "alembic",
            ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), "athcodec.sources.pc2", magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",), "athcodec.sources.mdd"),
     Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply"),
            "athcodec.sources.sequence"),
-    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf", "mesh", ("meshio",)),
-    Format("vtk", "VTU, VTK or PVD series, named by any one of its files", (".vtu", ".vtk", ".pvd"),
-           "athcodec.sources.vtk", "mesh", ("meshio",)),
+    Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf"),
+    Format("vtk", "VTU, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
+           (".vtu", ".vtk", ".pvd"), "athcodec.sources.vtk"),
 )
 
 

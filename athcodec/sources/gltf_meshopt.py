@@ -19,7 +19,7 @@ def unpack(raw: bytes, packed: Mapping) -> bytes:
         import meshoptimizer as library
     except ImportError:
         raise MissingExtra("glTF compressed by EXT_meshopt_compression: needs meshoptimizer: "
-                           "pip install meshoptimizer") from None
+                           'pip install "athcodec[gltf]"') from None
     count, stride = integer(packed, "count", low=1), integer(packed, "byteStride", low=1, stop=257)
     if count * stride > MOST_PER_BYTE * len(raw):
         raise ClipError(f"meshopt: got {count} elements of {stride} bytes in {len(raw)}, expected fewer")

@@ -16,7 +16,7 @@ from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, indices,
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
-RATES = (24.0, 25.0, 30.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
+RATES = (30.0, 24.0, 25.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
 SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart are meant to be interpolated
 
 
@@ -255,7 +255,7 @@ def _exact(rate: float, keys: np.ndarray) -> float:
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)
-    for likely in (float(whole), whole * 1000 / 1001):
-        if abs(measured - likely) <= 2e-4 * likely and on_grid(keys, likely):
+    for likely, off in ((float(whole), 2e-4), (whole * 1000 / 1001, 2e-4), (round(measured, 2), 1e-6)):
+        if abs(measured - likely) <= off * likely and on_grid(keys, likely):
             return likely
     return measured

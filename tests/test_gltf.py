@@ -1,0 +1,600 @@
+"""glTF in and out: files that other libraries write come in as the motion that the specification means, what is written
+is opened by others and keeps within the error that it states, and broken files are refused in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import struct
+
+import numpy as np
+import pygltflib
+import pytest
+import trimesh
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError, MissingExtra
+from athcodec.excerpt import Excerpt
+from athcodec.exporters import gltf as gltf_exporter
+from athcodec.exporters import write
+from athcodec.sources import read
+from plants import plant
+
+COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], np.float32)
+
+
+class Maker:
+    """A glTF file made with pygltflib: arrays become accessors, one buffer view each."""
+
+    def __init__(self):
+        self.gltf = pygltflib.GLTF2(scenes=[pygltflib.Scene(nodes=[])], scene=0)
+        self.data = b""
+
+    def array(self, values, normalized=False, stride=0):
+        values = np.asarray(values)
+        values = values.astype(np.float32) if values.dtype == np.float64 else values
+        rows = values.reshape(len(values), -1)
+        data = np.ascontiguousarray(rows).tobytes()
+        if stride:
+            padded = np.zeros((len(rows), stride), np.uint8)
+            padded[:, : rows.itemsize * rows.shape[1]] = np.frombuffer(data, np.uint8).reshape(len(rows), -1)
+            data = padded.tobytes()
+        return self.accessor(self.view(data, stride), values.dtype, rows.shape, normalized=normalized)
+
+    def view(self, data, stride=0):
+        self.gltf.bufferViews.append(pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(data),
+                                                          byteStride=stride or None))
+        self.data += data + bytes(-len(data) % 4)
+        return len(self.gltf.bufferViews) - 1
+
+    def accessor(self, view, dtype, shape, **more):
+        self.gltf.accessors.append(pygltflib.Accessor(bufferView=view, componentType=COMPONENTS[np.dtype(dtype).name],
+                                                      count=shape[0], type=TYPES[shape[1]], **more))
+        return len(self.gltf.accessors) - 1
+
+    def mesh(self, attributes, name=None, indices=None, mode=4, targets=None, weights=None):
+        indices = None if indices is None else self.array(np.asarray(indices, np.uint16))
+        named = pygltflib.Attributes(**attributes)
+        primitive = pygltflib.Primitive(attributes=named, indices=indices, mode=mode, targets=targets)
+        self.gltf.meshes.append(pygltflib.Mesh(primitives=[primitive], name=name, weights=weights))
+        return len(self.gltf.meshes) - 1
+
+    def node(self, parent=None, **values):
+        self.gltf.nodes.append(pygltflib.Node(**values))
+        index = len(self.gltf.nodes) - 1
+        (self.gltf.scenes[0].nodes if parent is None else self.gltf.nodes[parent].children).append(index)
+        return index
+
+    def animation(self, channels, name=None):
+        """channels: (node, path, times, values, interpolation)."""
+        animation = pygltflib.Animation(name=name, samplers=[], channels=[])
+        for node, path, times, values, interpolation in channels:
+            width = {"rotation": 4, "weights": 1}.get(path, 3)
+            output = self.array(np.asarray(values, np.float32).reshape(-1, width))
+            animation.samplers.append(pygltflib.AnimationSampler(
+                input=self.array(np.asarray(times, np.float32)), output=output, interpolation=interpolation))
+            target = pygltflib.AnimationChannelTarget(node=node, path=path)
+            animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+        self.gltf.animations.append(animation)
+
+    def save(self, path):
+        self.gltf.buffers = [pygltflib.Buffer(byteLength=len(self.data))]
+        self.gltf.set_binary_blob(self.data)
+        self.gltf._path = path.parent
+        if path.suffix == ".gltf":
+            self.gltf.convert_buffers(pygltflib.BufferFormat.BINFILE if "bin" in path.stem else
+                                      pygltflib.BufferFormat.DATAURI)
+        self.gltf.save(str(path))
+        return path
+
+
+def moving_cube(channels, **node):
+    made = Maker()
+    mesh = made.mesh({"POSITION": made.array(CUBE)}, "cube", mode=0)
+    made.node(mesh=mesh, **node)
+    if channels:
+        made.animation(channels)
+    return made
+
+
+def frames_of(path, **options):
+    with read(path, **options) as clip:
+        return clip.block(0, clip.frame_count), clip
+
+
+def about(axis, angle):
+    """Quaternion and matrix of a turn."""
+    axis = np.asarray(axis, float) / np.linalg.norm(axis)
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return [*(np.sin(angle / 2) * axis), np.cos(angle / 2)], (
+        np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+
+
+# ---- reading ----
+
+
+def test_what_trimesh_writes_is_read_where_trimesh_puts_it(tmp_path):
+    scene, box = trimesh.Scene(), trimesh.creation.box((1, 2, 3))
+    turn = trimesh.transformations.euler_matrix(0.3, 0.5, 0.7)
+    turn[:3, 3] = 4, 5, 6
+    scene.add_geometry(box, node_name="one", geom_name="box")
+    scene.add_geometry(box, node_name="two", geom_name="box", transform=turn)
+    scene.add_geometry(trimesh.creation.icosphere(1), node_name="ball", geom_name="ball", parent_node_name="two")
+    scene.export(str(tmp_path / "a.glb"))
+    positions, clip = frames_of(tmp_path / "a.glb")
+    assert sorted(clip.metadata["part_names"]) == ["ball", "one", "two"] and clip.frame_count == 1
+    loaded = trimesh.load(str(tmp_path / "a.glb"))
+    stops = np.cumsum(clip.attributes["part_vertex_counts"])
+    for name, stop, count in zip(clip.metadata["part_names"], stops, clip.attributes["part_vertex_counts"]):
+        matrix, geometry = loaded.graph[name]
+        mesh = loaded.geometry[geometry].copy()
+        mesh.apply_transform(matrix)
+        assert np.allclose(positions[0, stop - count : stop], mesh.vertices, atol=1e-6)
+        mine = clip.faces[(clip.faces[:, 0] < stop) & (clip.faces[:, 0] >= stop - count)] - (stop - count)
+        assert np.array_equal(mine, mesh.faces)
+    assert clip.skin.joint_parent.tolist().count(-1) == 2  # "ball" hangs on "two"
+
+
+def test_keys_are_interpolated_as_the_specification_says(tmp_path):
+    (q0, _), (q1, _) = about([0, 0, 1], 0.0), about([0, 0, 1], 2.0)
+    cubic = [[[0, 0, 0], [0, 0, 0], [3, 0, 0]], [[0, 0, 0], [1, 0, 0], [0, 0, 0]]]
+    channels = {
+        "LINEAR": (0, "rotation", [0, 1], [q0, [-v for v in q1]], "LINEAR"),
+        "STEP": (0, "translation", [0, 0.5, 1], [[0, 0, 0], [5, 0, 0], [7, 0, 0]], "STEP"),
+        "CUBICSPLINE": (0, "translation", [0, 1], np.array(cubic), "CUBICSPLINE"),
+    }
+    t = np.arange(11) / 10
+    found = {name: frames_of(moving_cube([channel]).save(tmp_path / f"{name}.glb"), fps=10)[0]
+             for name, channel in channels.items()}
+    turned = np.stack([CUBE @ about([0, 0, 1], 2 * each)[1].T for each in t])
+    assert np.allclose(found["LINEAR"], turned, atol=1e-6)
+    assert np.allclose(found["STEP"][:, 0, 0], np.select([t < 0.5, t < 1], [0, 5], 7))
+    spline = (t**3 - 2 * t**2 + t) * 3 + 3 * t**2 - 2 * t**3
+    assert np.allclose(found["CUBICSPLINE"][:, 0, 0], spline, atol=1e-6)
+
+
+def test_skins_move_vertices_by_their_weights_and_ignore_their_own_node(tmp_path):
+    made = Maker()
+    joints = np.tile(np.array([[0, 1, 0, 0]], np.uint8), (8, 1))
+    share = np.linspace(0, 255, 8).astype(np.uint8)
+    weights = np.stack([255 - share, share, 0 * share, 0 * share], axis=1)
+    mesh = made.mesh({"POSITION": made.array(CUBE), "JOINTS_0": made.array(joints),
+                      "WEIGHTS_0": made.array(weights, normalized=True)}, "skinned", mode=0)
+    first = made.node(name="root", translation=[1.0, 0.0, 0.0])
+    second = made.node(first, name="tip", translation=[0.0, 2.0, 0.0])
+    bind = np.stack([np.eye(4), np.eye(4)])
+    bind[1, 3, 1] = -2  # column by column
+    made.gltf.skins.append(pygltflib.Skin(joints=[first, second], inverseBindMatrices=made.array(bind.reshape(2, 16))))
+    made.node(mesh=mesh, skin=0, translation=[100.0, 0.0, 0.0])
+    q, matrix = about([0, 0, 1], np.pi / 2)
+    made.animation([(second, "rotation", [0, 1], [[0, 0, 0, 1], q], "LINEAR")])
+    positions, clip = frames_of(made.save(tmp_path / "a.glb"), fps=1)
+    w = share[:, None] / 255
+    turned = (CUBE - [0, 2, 0]) @ matrix.T + [1, 2, 0]
+    assert np.allclose(positions[1], (1 - w) * (CUBE + [1, 0, 0]) + w * turned, atol=1e-6)
+    assert np.allclose(clip.rest, CUBE + [1, 0, 0])
+    assert clip.skin.joint_parent.tolist() == [-1, 0] and tuple(clip.skin.names) == ("root", "tip")
+    assert np.array_equal(clip.skin.vertex_joint, (share > 127).astype(int))
+
+
+def test_morph_targets_are_added_also_sparse_ones(tmp_path):
+    made = Maker()
+    dense = made.array(np.full((8, 3), 0.25))
+    made.gltf.accessors.append(pygltflib.Accessor(
+        componentType=5126, count=8, type="VEC3", bufferView=None, sparse=pygltflib.Sparse(
+            count=2, indices=pygltflib.AccessorSparseIndices(
+                bufferView=made.view(np.array([1, 6], np.uint8).tobytes()), componentType=5121),
+            values=pygltflib.AccessorSparseValues(
+                bufferView=made.view(np.array([[1, 2, 3], [4, 5, 6]], np.float32).tobytes())))))
+    mesh = made.mesh({"POSITION": made.array(CUBE)}, mode=0, weights=[0.0, 0.5],
+                     targets=[pygltflib.Attributes(POSITION=dense), pygltflib.Attributes(POSITION=dense + 1)])
+    node = made.node(mesh=mesh)
+    made.animation([(node, "weights", [0, 1], [0.0, 1.0, 4.0, 0.0], "LINEAR")])
+    positions, clip = frames_of(made.save(tmp_path / "a.glb"), fps=2)
+    few = np.zeros((8, 3))
+    few[1], few[6] = (1, 2, 3), (4, 5, 6)
+    expected = [CUBE + a * 0.25 + b * few for a, b in ((0, 1), (2, 0.5), (4, 0))]
+    assert np.allclose(positions, expected, atol=1e-6)
+    assert np.allclose(clip.rest, CUBE + 0.5 * few)
+
+
+def test_quantised_and_strided_positions_mean_the_same(tmp_path):
+    made = Maker()
+    made.gltf.extensionsUsed = made.gltf.extensionsRequired = ["KHR_mesh_quantization"]
+    whole = np.round(CUBE / 3 * 65535).astype(np.uint16)
+    for values in (made.array(whole, normalized=True, stride=8), made.array(CUBE, stride=20),
+                   made.array(np.round(CUBE).astype(np.int8), stride=4)):
+        made.node(mesh=made.mesh({"POSITION": values}, mode=0), scale=[3.0] * 3 if values == 0 else None)
+    positions, clip = frames_of(made.save(tmp_path / "a.glb"))
+    assert np.allclose(positions[0].reshape(3, 8, 3), CUBE, atol=1e-4) and len(clip.metadata["part_names"]) == 3
+
+
+@pytest.mark.parametrize("mode, corners, rows", [
+    (1, [0, 1, 2, 3], [[0, 1], [2, 3]]), (2, [0, 1, 2], [[0, 1], [1, 2], [2, 0]]), (3, [0, 1, 2], [[0, 1], [1, 2]]),
+    (4, [0, 1, 2, 3, 4, 5], [[0, 1, 2], [3, 4, 5]]), (5, [0, 1, 2, 3, 4], [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
+    (5, [0, 1, 2, 2, 3, 4], [[0, 1, 2], [2, 4, 3]]), (6, [0, 1, 2, 3], [[1, 2, 0], [2, 3, 0]]),
+])
+def test_every_kind_of_primitive_becomes_faces_or_edges(tmp_path, mode, corners, rows):
+    made = Maker()
+    made.node(mesh=made.mesh({"POSITION": made.array(CUBE)}, indices=corners, mode=mode))
+    _, clip = frames_of(made.save(tmp_path / "a.glb"))
+    found, other = (clip.edges, clip.faces) if mode < 4 else (clip.faces, clip.edges)
+    assert found.tolist() == rows and other is None
+    assert clip.metadata["part_kinds"] == ["curves" if mode < 4 else "mesh"]
+
+
+def test_attributes_keep_their_names_and_numbers(tmp_path):
+    made = Maker()
+    ids, colors = np.arange(8, dtype=np.uint16) * 500, np.array([[255, 0, 51]] * 8, np.uint8)
+    first = made.mesh({"POSITION": made.array(CUBE), "TEXCOORD_0": made.array(CUBE[:, :2]),
+                       "COLOR_0": made.array(colors, normalized=True, stride=4),
+                       "_BRANCH_ID": made.array(ids, stride=4), "_radius": made.array(CUBE[:, 1]),
+                       "NORMAL": made.array(np.tile([0.0, 0, 1], (8, 1)))}, mode=0)
+    made.node(mesh=first, rotation=about([1, 0, 0], np.pi / 2)[0])
+    made.node(mesh=made.mesh({"POSITION": made.array(CUBE)}, mode=0))
+    _, clip = frames_of(made.save(tmp_path / "a.glb"))
+    found = clip.attributes
+    assert np.array_equal(found["uv"], np.concatenate([CUBE[:, :2], 0 * CUBE[:, :2]]))
+    assert np.allclose(found["colors"], np.concatenate([colors / 255, np.ones((8, 3))]))
+    assert found["branch_id"].dtype == np.uint16 and found["branch_id"].tolist() == [*ids, *[0] * 8]
+    assert np.array_equal(found["radius"][:8], CUBE[:, 1]) and np.isnan(found["radius"][8:]).all()
+    assert np.allclose(found["normals"][:8], [0, -1, 0], atol=1e-6)
+    made.animation([(0, "translation", [0, 1], np.zeros((2, 3)), "LINEAR")])
+    assert "normals" not in frames_of(made.save(tmp_path / "b.glb"))[1].attributes
+
+
+@pytest.mark.parametrize("fps, times", [
+    (24, np.arange(20) / 24), (30, np.arange(2, 40) / 30), (60, np.arange(7) / 60), (25, np.arange(90) / 25),
+    (24000 / 1001, np.arange(200) * 1001 / 24000), (30000 / 1001, np.arange(64) * 1001 / 30000),
+    (24, np.delete(np.arange(100), [3, 4, 50, 51, 52]) / 24), (12.5, np.arange(20) / 12.5),
+])
+def test_sampled_keys_come_back_one_per_frame(tmp_path, fps, times):
+    values = np.zeros((len(times), 3), np.float32)
+    values[:, 0] = np.arange(len(times)) ** 2
+    path = moving_cube([(0, "translation", times, values, "STEP")]).save(tmp_path / "a.glb")
+    positions, clip = frames_of(path)
+    places = np.round((times - times[0]) * fps).astype(int)
+    assert clip.metadata["fps"] == pytest.approx(fps, rel=1e-12) and clip.frame_count == places[-1] + 1
+    assert clip.metadata["start_frame"] == round(times[0] * fps)
+    assert np.allclose(clip.time, np.arange(len(clip.time)) / fps, rtol=1e-12)
+    assert np.array_equal(positions[places, 0, 0], values[:, 0])
+
+
+def test_sparse_keys_are_sampled_at_30_or_as_asked(tmp_path):
+    path = moving_cube([(0, "translation", [0, 1.2345, 3], np.zeros((3, 3)), "LINEAR")]).save(tmp_path / "a.glb")
+    assert frames_of(path)[1].metadata["fps"] == 30 and frames_of(path)[1].frame_count == 91
+    with read(path, fps=24000 / 1001) as clip:
+        assert clip.metadata["fps"] == 24000 / 1001 and clip.frame_count == 72
+    with pytest.raises(ClipError, match="expected at most"):
+        read(path, fps=1e9)
+
+
+def test_animations_of_different_nodes_run_together_and_takes_do_not(tmp_path):
+    made = moving_cube([(0, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]], "LINEAR")], name="a")
+    made.gltf.animations[0].name = "walk"
+    made.node(mesh=0, name="b")
+    made.animation([(1, "translation", [0, 1], [[0, 0, 0], [0, 1, 0]], "LINEAR")], "wave")
+    made.animation([(0, "translation", [0, 1], [[0, 0, 0], [0, 0, 9]], "LINEAR")], "jump")
+    path = made.save(tmp_path / "a.glb")
+    positions, clip = frames_of(path, fps=1)
+    assert clip.metadata["animations"] == ["walk", "wave"]
+    assert np.allclose(positions[1] - positions[0], np.repeat([[1, 0, 0], [0, 1, 0]], 8, axis=0))
+    jumped, clip = frames_of(path, fps=1, only=["animation:ju*", "a"])
+    assert clip.vertex_count == 8 and clip.metadata["part_names"] == ["a"]
+    assert np.allclose(jumped[1] - jumped[0], [0, 0, 9])
+    for only, message in ((["leaf*"], "expected names such as"), (["animation:run"], "expected one of .*walk")):
+        with pytest.raises(ClipError, match=message):
+            read(path, only=only)
+
+
+@pytest.mark.parametrize("name", ["a.glb", "bin.gltf", "data.gltf"])
+def test_buffers_may_be_inside_beside_or_in_the_text(tmp_path, name):
+    positions, _ = frames_of(moving_cube(None).save(tmp_path / name))
+    assert np.array_equal(positions[0], CUBE)
+
+
+def glb(structure, binary=b""):
+    text = json.dumps(structure).encode()
+    text += b" " * (-len(text) % 4)
+    binary += bytes(-len(binary) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    chunks += struct.pack("<II", len(binary), 0x004E4942) + binary if binary else b""
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def cube_json(**changes):
+    parts = {
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 96}], "buffers": [{"byteLength": 96}],
+    }
+    return parts | changes
+
+
+ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"}
+REFUSED = {
+    "version 1": ({"asset": {"version": "1.0"}}, "version"),
+    "no meshes": ({"nodes": [{}]}, "expected at least one"),
+    "a cycle": ({"nodes": [{"mesh": 0, "children": [1]}, {"children": [0]}]}, "node"),
+    "a child twice": ({"nodes": [{"children": [1, 1]}, {"mesh": 0}]}, "node 0 has child 1"),
+    "a node beyond": ({"scenes": [{"nodes": [7]}]}, "node 7"),
+    "too many": ({"accessors": [ACCESSOR | {"count": 2**20}]}, "fits into"),
+    "too many zeros": ({"accessors": [{"componentType": 5126, "count": 2**20, "type": "VEC3"}]}, "without bytes"),
+    "too many vertices": ({"accessors": [ACCESSOR | {"count": 2**50}]}, "vertices, expected at most"),
+    "a view too long": ({"bufferViews": [{"buffer": 0, "byteLength": 2**50}],
+                         "accessors": [ACCESSOR | {"count": 9000}]}, "buffer of 96"),
+    "a type": ({"accessors": [ACCESSOR | {"type": "VEC9"}]}, "VEC9"),
+    "a fraction": ({"accessors": [ACCESSOR | {"count": 7.5}]}, "7.5"),
+    "no number": ({"nodes": [{"mesh": "0"}]}, "'0'"),
+    "a buffer elsewhere": ({"buffers": [{"byteLength": 96, "uri": "../../secret.bin"}]}, "beside the glTF"),
+    "a buffer on the net": ({"buffers": [{"byteLength": 96, "uri": "https://a.b/c.bin"}]}, "beside the glTF"),
+    "no base64": ({"buffers": [{"byteLength": 96, "uri": "data:;base64,$$"}]}, "base64"),
+    "draco": ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "KHR_draco_mesh_compression"),
+    "instancing": ({"nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}]}, "a node per instance"),
+    "joints missing": ({"nodes": [{"mesh": 0, "skin": 0}], "skins": [{"joints": [0]}]}, "JOINTS_0"),
+    "nesting": ({"extras": json.loads("[" * 900 + "]" * 900)}, None),
+}
+
+
+@pytest.mark.parametrize("changes, message", REFUSED.values(), ids=REFUSED)
+def test_structures_that_lie_are_refused_by_name(tmp_path, changes, message):
+    path = tmp_path / "a.glb"
+    path.write_bytes(glb(cube_json(**changes), CUBE.tobytes()))
+    if message is None:
+        assert np.array_equal(frames_of(path)[0][0], CUBE)
+        return
+    with pytest.raises(ClipError, match=message) as caught:
+        read(path)
+    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+
+
+def rich_file(path):
+    """Skin, morphs, lines, colours, several animations."""
+    made = Maker()
+    joints, weights = np.zeros((8, 4), np.uint8), np.tile([[0.5, 0.5, 0, 0]], (8, 1))
+    joints[:, 1] = 1
+    made.node(name="root")
+    made.node(0, translation=[0.0, 1.0, 0.0])
+    bind = made.array(np.stack([np.eye(4)] * 2).reshape(2, 16))
+    made.gltf.skins.append(pygltflib.Skin(joints=[0, 1], inverseBindMatrices=bind))
+    target = pygltflib.Attributes(POSITION=made.array(CUBE))
+    mesh = made.mesh({"POSITION": made.array(CUBE), "JOINTS_0": made.array(joints), "WEIGHTS_0": made.array(weights)},
+                     indices=np.arange(6), targets=[target])
+    made.node(mesh=mesh, skin=0)
+    made.node(mesh=made.mesh({"POSITION": made.array(CUBE), "COLOR_0": made.array(CUBE / 3)}, indices=[0, 1], mode=1))
+    t = np.arange(5) / 24
+    made.animation([(1, "rotation", t, np.tile([0.0, 0, 0, 1], (5, 1)), "LINEAR"),
+                    (2, "weights", t, np.linspace(0, 1, 5), "STEP")])
+    return made.save(path)
+
+
+def tried(path):
+    """Reads all of it, whatever it is."""
+    try:
+        with read(path, "gltf") as clip:
+            for _ in clip.blocks():
+                pass
+    except (ClipError, MissingExtra, OSError) as error:
+        assert "\n" not in str(error)
+        return False
+    return True
+
+
+def test_cut_or_changed_files_are_refused_and_nothing_else(tmp_path):
+    whole = rich_file(tmp_path / "a.glb").read_bytes()
+    bad, rng = tmp_path / "bad.glb", np.random.default_rng(1)
+    assert tried(tmp_path / "a.glb")
+    for size in np.unique(np.linspace(0, len(whole) - 1, 120).astype(int)):
+        bad.write_bytes(whole[:size])
+        assert not tried(bad)
+    for _ in range(400):
+        data = bytearray(whole)
+        for place in rng.integers(0, len(data), rng.integers(1, 6)):
+            data[place] = rng.choice([rng.integers(0, 256), ord("9"), ord("-"), ord("0")])
+        bad.write_bytes(data)
+        tried(bad)
+
+
+def test_a_file_that_changes_while_it_is_read_is_noticed(tmp_path):
+    path = moving_cube([(0, "translation", [0, 1], np.zeros((2, 3)), "LINEAR")]).save(tmp_path / "a.glb")
+    with read(path) as clip, pytest.raises(ClipError, match="changed while it was read"):
+        with clip.watched(), open(path, "ab") as file:
+            file.write(b"more")
+
+
+# ---- writing ----
+
+
+def with_faces(clip, **metadata):
+    """Triangles along the branches, attributes of all kinds."""
+    rows = np.arange(clip.vertex_count - 2)
+    kept = clip.vertex_branch[rows] == clip.vertex_branch[rows + 2]
+    faces = np.stack([rows, rows + 1, rows + 2], axis=1)[kept]
+    attributes = {"radius": np.linspace(1, 2, clip.vertex_count), "species": np.arange(clip.vertex_count) % 300,
+                  "uv": clip.rest[:, :2].astype(np.float32), "colors": np.full((clip.vertex_count, 4), 0.5, np.float32),
+                  "normals": np.tile(np.float32([0, 0, 1]), (clip.vertex_count, 1)), "per_branch": np.arange(3.0)}
+    return dataclasses.replace(clip, faces=faces, attributes=attributes, rest=clip.rest.astype(np.float32),
+                               metadata={"unit": "m", "up_axis": "y", "fps": 30, "start_frame": 0} | metadata)
+
+
+@pytest.fixture(scope="module")
+def leafy():
+    return with_faces(plant(seed=3, branches=14, longest=9, frames=40, amount=0.3, rough=0.0))
+
+
+@pytest.fixture(scope="module")
+def leafy_ath(leafy, tmp_path_factory):
+    path = tmp_path_factory.mktemp("leafy") / "a.ath"
+    athcodec.encode(leafy, path, rel_error=1e-4)
+    return path
+
+
+def accessor_of(gltf, index):
+    """An accessor as pygltflib's structure says, (count, width)."""
+    accessor = gltf.accessors[index]
+    view = gltf.bufferViews[accessor.bufferView]
+    dtype = np.dtype({number: name for name, number in COMPONENTS.items()}[accessor.componentType])
+    width = {name: number for number, name in TYPES.items()}[accessor.type]
+    start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+    stride = view.byteStride or dtype.itemsize * width
+    return np.ndarray((accessor.count, width), dtype, gltf.binary_blob(), start, (stride, dtype.itemsize)).copy()
+
+
+def skinned_by_hand(gltf, frame):
+    """Frame of a file of joints, evaluated from pygltflib's structure by the text of the specification; (N, 3)."""
+    joints = gltf.skins[0].joints
+    poses = {node: {"translation": gltf.nodes[node].translation, "rotation": gltf.nodes[node].rotation,
+                    "scale": gltf.nodes[node].scale or [1, 1, 1]} for node in joints}
+    for channel in gltf.animations[0].channels if gltf.animations else ():
+        keys = accessor_of(gltf, gltf.animations[0].samplers[channel.sampler].output)
+        poses[channel.target.node][channel.target.path] = keys[min(frame, len(keys) - 1)]
+    root = gltf.nodes[gltf.skins[0].skeleton]
+    matrices = np.zeros((len(joints), 4, 4))
+    above = transform(root.translation or [0, 0, 0], root.rotation or [0, 0, 0, 1], root.scale or [1, 1, 1])
+    bind = accessor_of(gltf, gltf.skins[0].inverseBindMatrices).reshape(-1, 4, 4).swapaxes(1, 2)
+    for i, node in enumerate(joints):
+        matrices[i] = above @ transform(**poses[node]) @ bind[i]
+    primitive = gltf.meshes[0].primitives[0]
+    own = accessor_of(gltf, primitive.attributes.JOINTS_0)[:, 0]
+    points = accessor_of(gltf, primitive.attributes.POSITION)
+    return np.einsum("nij,nj->ni", matrices[own][:, :3, :3], points) + matrices[own][:, :3, 3]
+
+
+def transform(translation, rotation, scale):
+    angle = 2 * np.arctan2(np.linalg.norm(rotation[:3]), rotation[3])
+    matrix = np.eye(4)
+    matrix[:3, :3] = (about(rotation[:3], angle)[1] if angle else np.eye(3)) * np.asarray(scale)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def facts_of(path):
+    return pygltflib.GLTF2().load(str(path)).asset.extras
+
+
+def far(a, b):
+    return float(np.linalg.norm(np.asarray(a, float) - b, axis=-1).max())
+
+
+def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
+    with athcodec.open(leafy_ath) as decoder:
+        for depth in range(decoder.level_count):
+            excerpt = Excerpt(decoder, depth)
+            path = tmp_path / f"{depth}.glb"
+            write(excerpt, path, animation="joints")
+            facts = facts_of(path)["athcodec"]
+            shown = excerpt.block(0, excerpt.frame_count)
+            gltf = pygltflib.GLTF2().load(str(path))
+            worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(excerpt.frame_count))
+            assert worst == pytest.approx(facts["max_error"], rel=1e-3, abs=1e-6)
+            assert worst <= 1.1 * max(excerpt.max_error, 1e-5 * np.linalg.norm(np.ptp(excerpt.rest, axis=0)))
+            assert facts["depth"] == depth and facts["joints"] >= decoder.depths[depth].nodes
+
+
+def test_from_a_source_through_ath_and_glb_within_the_bound(leafy, leafy_ath, tmp_path):
+    with athcodec.open(leafy_ath) as decoder:
+        bound = decoder.max_error_bound
+        for animation, more in (("joints", 1.1 * bound), ("morphs", 1e-6), ("auto", 1.1 * bound)):
+            write(Excerpt(decoder), tmp_path / "a.glb", animation=animation)
+            positions, clip = frames_of(tmp_path / "a.glb")
+            assert far(positions, leafy.block(0, 40)) <= bound + more
+            assert clip.time == pytest.approx(leafy.time - leafy.time[0], abs=1e-9)
+
+
+def test_what_does_not_move_survives(leafy, tmp_path):
+    for animation in ("joints", "morphs"):
+        write(leafy, tmp_path / "a.glb", animation=animation)
+        with read(tmp_path / "a.glb", rest="auto") as clip:
+            assert np.array_equal(clip.faces, leafy.faces)
+            assert np.array_equal(clip.vertex_branch, leafy.vertex_branch)
+            assert np.array_equal(clip.branch_parent, leafy.branch_parent)
+            assert far(clip.rest, leafy.rest) < 1e-5
+            for name in ("radius", "species", "uv", "colors"):
+                assert np.array_equal(clip.attributes[name], leafy.attributes[name].astype(clip.attributes[name].dtype))
+        assert facts_of(tmp_path / "a.glb")["athcodec"]["left_out"] == ["per_branch"]
+
+
+def test_axes_and_units_are_turned_by_a_node_and_vertices_keep_their_numbers(tmp_path):
+    clip = with_faces(plant(seed=1, frames=5), unit="cm", up_axis="z")
+    positions = clip.block(0, 5)
+    expected = np.stack([positions[..., 0], positions[..., 2], -positions[..., 1]], axis=-1) / 100
+    for animation, error in (("joints", 2e-4), ("morphs", 1e-8)):
+        write(clip, tmp_path / "a.glb", animation=animation)
+        gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+        first = accessor_of(gltf, gltf.meshes[0].primitives[0].attributes.POSITION)
+        assert np.array_equal(first, clip.rest.astype(np.float32))
+        found, back = frames_of(tmp_path / "a.glb")
+        assert far(found, expected) < error * np.ptp(expected)
+        assert (back.metadata["unit"], back.metadata["up_axis"]) == ("m", "y")
+
+
+@pytest.mark.parametrize("fps", [24, 24000 / 1001, 29.97, 60, 12.5])
+def test_frames_keep_their_numbers_and_times(fps, tmp_path):
+    clip = plant(seed=2, frames=30)
+    clip = dataclasses.replace(clip, time=5.0 / fps + np.arange(30) / fps, rest=clip.rest.astype(np.float32),
+                               metadata={"fps": fps, "start_frame": 100})
+    for animation in ("joints", "morphs"):
+        write(clip, tmp_path / "a.glb", animation=animation)
+        with read(tmp_path / "a.glb") as back:
+            assert back.metadata["fps"] == fps and back.metadata["start_frame"] == 105
+            assert back.time == pytest.approx(clip.time - clip.time[0], abs=1e-9) and back.frame_count == 30
+
+
+def test_objects_stay_apart_and_corners_split_only_where_they_differ(tmp_path):
+    rest = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0]], np.float32)
+    counts, indices = np.array([4, 3]), np.array([0, 1, 2, 3, 0, 2, 3])
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0], [1, 1], [9, 9]], np.float32)
+    clip = MotionClip(
+        positions=rest + np.arange(3, dtype=np.float32)[:, None, None], time=np.arange(3) / 24, rest=rest,
+        edges=np.array([[4, 5]]), attributes={"face_vertex_counts": counts, "face_vertex_indices": indices, "uv": uv,
+                                              "part_vertex_counts": np.array([4, 2])},
+        metadata={"part_names": ["leaf", "twig"], "domains": {"uv": "corner"}})
+    write(clip, tmp_path / "a.glb", animation="morphs")
+    positions, back = frames_of(tmp_path / "a.glb")
+    assert back.metadata["part_names"] == ["leaf", "twig"] and back.metadata["part_kinds"] == ["mesh", "curves"]
+    assert back.attributes["part_vertex_counts"].tolist() == [5, 2]  # corner 3 has two places in the texture
+    assert np.array_equal(positions[:, [0, 1, 2, 3, 5, 6]], clip.block(0, 3))
+    assert back.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 2, 4]] and back.edges.tolist() == [[5, 6]]
+    assert back.attributes["uv"][:5].tolist() == [[0, 0], [1, 0], [1, 1], [0, 1], [9, 9]]
+
+
+def test_more_than_255_joints_need_wider_numbers(tmp_path):
+    clip = plant(seed=8, branches=400, longest=3, frames=4)
+    write(clip, tmp_path / "a.glb", animation="joints")
+    assert len(pygltflib.GLTF2().load(str(tmp_path / "a.glb")).skins[0].joints) >= 400
+    assert far(frames_of(tmp_path / "a.glb")[0], clip.block(0, 4)) < 2e-4 * np.linalg.norm(np.ptp(clip.rest, axis=0))
+
+
+def test_what_stands_still_needs_no_keys(tmp_path):
+    clip = plant(seed=4, frames=20)
+    rest = clip.rest.astype(np.float32)
+    still = dataclasses.replace(clip, positions=np.repeat(rest[None], 20, axis=0), rest=rest)
+    write(still, tmp_path / "still.glb", animation="joints")
+    assert not pygltflib.GLTF2().load(str(tmp_path / "still.glb")).animations
+    moved = dataclasses.replace(still, positions=still.positions + np.float32(3))
+    write(moved, tmp_path / "moved.glb", animation="joints")
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "moved.glb"))
+    assert {channel.target.path for channel in gltf.animations[0].channels} == {"translation"}
+    assert all(gltf.accessors[sampler.output].count == 1 for sampler in gltf.animations[0].samplers)
+
+
+def test_absurd_sizes_are_refused_and_leave_nothing(leafy, tmp_path, monkeypatch):
+    monkeypatch.setattr(gltf_exporter, "MORPH_BYTES", 1000)
+    monkeypatch.setattr(gltf_exporter, "MOST_JOINTS", 5)
+    for animation, message in (("morphs", "choose joints"), ("joints", "expected fewer"), ("auto", "choose joints")):
+        with pytest.raises(ClipError, match=message):
+            write(leafy, tmp_path / "a.glb", animation=animation)
+    assert os.listdir(tmp_path) == []
+
+
+def test_one_frame_and_one_vertex_are_a_clip_too(tmp_path):
+    clip = MotionClip(positions=np.ones((1, 1, 3), np.float32), time=np.zeros(1))
+    for animation in ("joints", "morphs", "auto"):
+        write(clip, tmp_path / "a.glb", animation=animation)
+        assert np.array_equal(frames_of(tmp_path / "a.glb")[0], clip.block(0, 1))

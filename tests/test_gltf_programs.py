@@ -1,0 +1,142 @@
+"""glTF among the programs that people use: three.js and glTF-Transform write files that come in as three.js plays them,
+and what is written passes Khronos' validator without a word and is played by three.js within the error it states.
+Needs Node and npm; the packages are installed once, into pytest's cache. Run with -m programs."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.excerpt import Excerpt
+from athcodec.exporters import write
+from athcodec.sources import read
+from test_gltf import far, leafy, leafy_ath  # noqa: F401, the fixtures too
+
+pytestmark = pytest.mark.programs
+SCRIPTS = Path(__file__).resolve().parent / "node"
+PACKAGES = ["three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@gltf-transform/core@4.5.1",
+            "@gltf-transform/extensions@4.5.1", "@gltf-transform/functions@4.5.1", "meshoptimizer@1.3.0"]
+
+
+@pytest.fixture(scope="session")
+def node(request):
+    """Runs a script of the folder `node` with the packages beside it, and gives what it prints."""
+    folder = Path(request.config.cache.mkdir("gltf_programs"))
+    wanted = folder / "packages.json"
+    if not wanted.exists() or json.loads(wanted.read_text()) != PACKAGES:
+        (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
+        subprocess.run(["npm", "install", "--no-audit", "--no-fund", *PACKAGES], cwd=folder, check=True,
+                       capture_output=True)
+        wanted.write_text(json.dumps(PACKAGES))
+
+    def run(script, *words):
+        shutil.copy(SCRIPTS / script, folder)
+        done = subprocess.run(["node", folder / script, *map(str, words)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+@pytest.fixture
+def played(node, tmp_path):
+    """(T, N, 3) where three.js has the vertices of a GLB at some times."""
+
+    def play(path, times):
+        (tmp_path / "times.json").write_text(json.dumps([float(t) for t in times]))
+        facts = json.loads(node("play.mjs", path, tmp_path / "times.json", tmp_path / "out.bin"))
+        return np.fromfile(tmp_path / "out.bin", "<f4").reshape(len(times), facts["vertices"], 3)
+
+    return play
+
+
+@pytest.fixture
+def three_file(node, tmp_path):
+    """Skin, morph targets, steps, splines, instances; 25 frames at 24 per second."""
+    node("write_three.mjs", tmp_path / "three.glb")
+    return tmp_path / "three.glb"
+
+
+def assert_valid(node, path):
+    found = json.loads(node("validate.mjs", path))
+    further = [each for each in found["messages"] if not (each.startswith("UNUSED_OBJECT") and "TEXCOORD" in each)]
+    assert (found["errors"], found["warnings"], further) == (0, 0, [])  # nothing is drawn with the textures' places
+
+
+@pytest.mark.parametrize("fps", [None, 30, 100])
+def test_what_three_writes_moves_as_three_plays_it(three_file, played, fps):
+    with read(three_file, fps=fps) as clip:
+        positions = clip.block(0, clip.frame_count)
+        assert clip.metadata["fps"] == (fps or 24) and clip.metadata["part_names"] == ["stem", "leaf", "twin"]
+        assert clip.skin.joint_parent.tolist() == [-1, 0, 1, 2, 3, -1, -1]
+        assert far(positions, played(three_file, clip.time)) < 1e-5
+
+
+@pytest.mark.parametrize("form, error", [("quantize", 1e-5), ("sparse", 1e-5), ("meshopt", 1e-3)])
+def test_other_forms_by_gltf_transform_move_as_three_plays_them(three_file, node, played, tmp_path, form, error):
+    # Quantised rotations are not quite of length 1, which three.js does not mend.
+    node("transform.mjs", three_file, tmp_path / "form.glb", form)
+    with read(tmp_path / "form.glb") as clip:
+        assert far(clip.block(0, 25), played(tmp_path / "form.glb", clip.time)) < error
+
+
+def test_files_beside_each_other_by_gltf_transform_are_the_same_clip(three_file, node, tmp_path):
+    node("transform.mjs", three_file, tmp_path / "a.gltf", "separate")
+    assert (tmp_path / "a.bin").exists()
+    with read(three_file) as one, read(tmp_path / "a.gltf") as other:
+        assert np.array_equal(one.block(0, 25), other.block(0, 25)) and np.array_equal(one.faces, other.faces)
+
+
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(animation, leafy_ath, node, played,  # noqa: F811
+                                                                             tmp_path):
+    path = tmp_path / "a.glb"
+    with athcodec.open(leafy_ath) as decoder:
+        for depth in range(decoder.level_count):
+            excerpt = Excerpt(decoder, depth, range(4, 30))
+            write(excerpt, path, animation=animation)
+            assert_valid(node, path)
+            stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+            shown = played(path, excerpt.time - excerpt.time[0])
+            assert far(shown, excerpt.block(0, 26)) <= stated + 1e-5
+
+
+def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, played, tmp_path):
+    with read(three_file) as clip:
+        flat = read_as_one_branch(clip)
+        athcodec.encode(flat, tmp_path / "a.ath", rel_error=1e-4)
+    before = played(three_file, np.arange(25) / 24)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        write(Excerpt(decoder), tmp_path / "b.glb", animation="morphs")
+        assert_valid(node, tmp_path / "b.glb")
+        assert far(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.max_error_bound + 1e-5
+
+
+def read_as_one_branch(clip):
+    return dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]),
+                               rest=clip.rest.astype(clip.rest_dtype))
+
+
+def structure(path):
+    data = path.read_bytes()
+    return data[20 : 20 + int.from_bytes(data[12:16], "little")]
+
+
+def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):  # noqa: F811
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        write(sample, tmp_path / "lines.glb", animation="joints")
+        write(dataclasses.replace(sample, edges=None, rest=sample.rest.astype(np.float32)), tmp_path / "points.glb")
+    counts = np.array([leafy.vertex_count])
+    objects = dataclasses.replace(leafy, attributes=leafy.attributes | {"part_vertex_counts": counts},
+                                  metadata=leafy.metadata | {"part_names": ["bush"], "unit": "cm", "up_axis": "z"},
+                                  rest=leafy.rest.astype(np.float32))
+    write(objects, tmp_path / "objects.glb", animation="joints")
+    for name in ("lines", "points", "objects"):
+        assert_valid(node, tmp_path / f"{name}.glb")
