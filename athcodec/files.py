@@ -147,6 +147,27 @@ def new_files(path: str | os.PathLike[str]) -> Iterator[str]:
             os.close(lock)
 
 
+@contextmanager
+def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
+    """A folder that becomes `path` when the block ends, whole; nothing is left behind when it raises. Nothing that
+    exists is replaced. Raises OSError."""
+    path = check_target(path)
+    if os.path.lexists(path):
+        raise FileExistsError(f"{path}: exists, expected the name of a new folder")
+    remove_leftovers(path)
+    directory, name = os.path.split(path)
+    folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+    os.mkdir(folder)
+    lock = _locked_folder(folder)
+    try:
+        yield folder
+        os.rename(folder, path)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
 def _locked_folder(folder: str) -> int:
     if fcntl is None:
         return -1

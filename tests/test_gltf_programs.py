@@ -18,6 +18,7 @@ from athcodec.excerpt import Excerpt
 from athcodec.exporters import write
 from athcodec.sources import read
 from test_gltf import far, leafy, leafy_ath  # noqa: F401, the fixtures too
+from test_vat import exr
 
 pytestmark = pytest.mark.programs
 SCRIPTS = Path(__file__).resolve().parent / "node"
@@ -140,3 +141,17 @@ def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path): 
     write(objects, tmp_path / "objects.glb", animation="joints")
     for name in ("lines", "points", "objects"):
         assert_valid(node, tmp_path / f"{name}.glb")
+
+
+@pytest.mark.parametrize("half", [True, False])
+def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath, node, tmp_path, half):  # noqa: F811
+    with athcodec.open(leafy_ath) as decoder:
+        write(Excerpt(decoder), tmp_path / "a.vat", half=half)
+        write(Excerpt(decoder), tmp_path / "a.openvat")
+    for glb in (tmp_path / "a.vat" / "a.glb", tmp_path / "a.openvat" / "a_vat.glb"):
+        assert_valid(node, glb)
+    for name in ("a_matrices_0.exr", "a_pivots.exr"):
+        size = json.loads(node("exr.mjs", tmp_path / "a.vat" / name, tmp_path / "out.bin"))
+        texels = np.fromfile(tmp_path / "out.bin", "<f4").reshape(size["height"], size["width"], 4)[::-1]
+        pixels = exr(tmp_path / "a.vat" / name)
+        assert np.array_equal(texels[..., : pixels.shape[2]], pixels)

@@ -89,6 +89,8 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
     root = glb.node(name="plant", **root_transform(motion.metadata))
     for shape in found:
+        if "TEXCOORD_1" in shape.attributes:  # the second set may not be without the first
+            shape.attributes.setdefault("TEXCOORD_0", np.zeros((len(shape.source), 2), np.float32))
         glb.node(root, name=shape.name, mesh=add_mesh(glb, shape, np.asarray(motion.rest)))
     with open(path, "wb") as out:
         glb.write(out)

@@ -1,0 +1,129 @@
+"""Writes vertex animation textures of node matrices: a folder of EXR textures, a JSON file and the rest pose as GLB.
+
+A node has three texels per frame. Nodes are the parts of a level; stems that bend are cut until a map of each is no
+further off than the level itself (parts.py), so textures are small at any depth. The error is measured on what is
+written, rounding included, and stated in the JSON and by write_clip. The layout is in vat.md. Textures are made in
+memory, as image files are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.exporters import WriteOptions
+from athcodec.exporters.gltf import write_rest
+from athcodec.exporters.gltf_build import branch_extras
+from athcodec.exporters.fitting import Mapped, Moving, allowed_error, fit
+from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
+from athcodec.files import new_folder
+
+PER_ROW = WIDEST // 3
+MOST_NODES = PER_ROW * WIDEST
+FLOAT16_MAX = 65504.0
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
+               report: Callable[[float], None]) -> dict[str, Any]:
+    """Write a MotionClip or an Excerpt to the new folder `path`; returns what the JSON says. options.half: half
+    precision in place of float.
+
+    Raises ClipError where there are more nodes than a texture takes, or motion that half precision cannot hold,
+    FileExistsError where `path` exists.
+    """
+    moving = fit(motion, Mapped, allowed_error(motion), MOST_NODES, lambda done: report(0.6 * done))
+    if moving is None:
+        raise ClipError(f"vat: got more than {MOST_NODES} nodes, expected fewer: choose a lower depth")
+    rows = _rows(moving, np.float16 if options.half else np.float32)
+    name = Path(fspath(path)).stem or "clip"
+    with new_folder(path) as folder:
+        facts = _write(motion, moving, rows, folder, name, report)
+    report(1.0)
+    return facts
+
+
+def _write(motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str,
+           report: Callable[[float], None]) -> dict[str, Any]:
+    pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
+    grid = _Grid(len(pivots), motion.frame_count)
+    textures = []
+    for texture, pixels in grid.textures(rows, name):
+        write_exr(os.path.join(folder, texture["file"]), {"RGBA": pixels})
+        textures.append(texture)
+    write_exr(os.path.join(folder, f"{name}_pivots.exr"), {"RGB": grid.pivots(pivots)})
+    error, low, high = _measured(motion, rows, pivots, vertex_node, lambda done: report(0.6 + 0.4 * done))
+    facts = {"format": "athcodec-vat", "version": 1} | facts_of(motion) | {
+        "nodes": len(pivots), "precision": "half" if rows.dtype == np.float16 else "float",
+        "width": grid.width, "height": grid.height, "nodes_per_row": grid.per_row,
+        "rows_per_frame": grid.rows_per_frame, "max_error": error, "bounds": {"min": low, "max": high},
+        "textures": textures, "pivots": f"{name}_pivots.exr", "mesh": f"{name}.glb",
+    }
+    dtype = np.uint16 if len(pivots) <= 65536 else np.float32
+    more = {"_NODE": vertex_node.astype(dtype)[:, None], "TEXCOORD_1": grid.places(vertex_node)}
+    write_rest(motion, os.path.join(folder, f"{name}.glb"), name, more, branch_extras(motion))
+    write_json(os.path.join(folder, f"{name}.json"), facts)
+    return facts
+
+
+def _rows(moving: Moving, dtype: type) -> np.ndarray:
+    """(T, K, 3, 4): what the map of a node adds to the rest pose, seen from the node's middle."""
+    rows = np.empty((*moving.places.shape, 4), dtype)
+    linear = moving.values[0].reshape(*moving.places.shape, 3) - np.eye(3)
+    offset = moving.places - moving.parts.middle.astype(np.float32)
+    largest = max(float(np.abs(linear).max()), float(np.abs(offset).max()))
+    if dtype == np.float16 and largest > FLOAT16_MAX:
+        raise ClipError(f"vat: got motion by {largest:g} units, expected at most {FLOAT16_MAX:g} in half precision: "
+                        "choose another unit")
+    rows[..., :3], rows[..., 3] = linear, offset
+    return rows
+
+
+class _Grid:
+    """Where the texels of nodes and frames are."""
+
+    def __init__(self, nodes: int, frames: int):
+        self.per_row = min(nodes, PER_ROW)
+        self.rows_per_frame = -(-nodes // self.per_row)
+        self.width = 3 * self.per_row
+        self.frames = min(frames, WIDEST // self.rows_per_frame)  # of one texture
+        self.height = self.frames * self.rows_per_frame
+
+    def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+        """(what the JSON says of it, (height, width, 4)) each; texels without a node are 0."""
+        for number, start in enumerate(range(0, len(rows), self.frames)):
+            mine = rows[start : start + self.frames]
+            texels = np.zeros((self.frames, self.rows_per_frame * self.per_row, 3, 4), rows.dtype)
+            texels[: len(mine), : rows.shape[1]] = mine
+            facts = {"file": f"{name}_matrices_{number}.exr", "first_frame": start, "frames": len(mine)}
+            yield facts, texels.reshape(self.height, self.width, 4)
+
+    def pivots(self, pivots: np.ndarray) -> np.ndarray:
+        texels = np.zeros((self.rows_per_frame * self.per_row, 3), np.float32)
+        texels[: len(pivots)] = pivots
+        return texels.reshape(self.rows_per_frame, self.per_row, 3)
+
+    def places(self, vertex_node: np.ndarray) -> np.ndarray:
+        """(N, 2): the middle of the first texel of each vertex's node in frame 0, from 0 to 1."""
+        x, y = 3 * (vertex_node % self.per_row) + 0.5, vertex_node // self.per_row + 0.5
+        return np.stack([x / self.width, y / self.height], axis=1).astype(np.float32)
+
+
+def _measured(motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray,
+              report: Callable[[float], None]) -> tuple[float, list[float], list[float]]:
+    """The largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
+    rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
+    away = np.concatenate([rest - pivots[vertex_node], np.ones((len(rest), 1))], axis=1)
+    largest, low, high = 0.0, np.full(3, np.inf), np.full(3, -np.inf)
+    for start, frames in motion.blocks():
+        for i, frame in enumerate(frames):
+            shown = rest + np.einsum("nij,nj->ni", rows[start + i].astype(np.float64)[vertex_node], away)
+            low, high = np.minimum(low, shown.min(axis=0)), np.maximum(high, shown.max(axis=0))
+            largest = max(largest, float(((shown - frame) ** 2).sum(axis=1).max()))
+        report((start + len(frames)) / motion.frame_count)
+    return float(np.sqrt(largest)), low.tolist(), high.tolist()
