@@ -22,9 +22,10 @@ from athcodec.excerpt import Excerpt
 from athcodec.hierarchy import build_hierarchy, hierarchy_of
 
 ROUNDS = 8
-CONVERGED = 1e-6
+CONVERGED = 1e-5
 SMALLEST_SCALE = 1e-4
 HELD = 1e-9  # how much, of a part's own extent, the rotation of the frame before counts
+ROUGHLY = 8  # one frame in so many is looked at first
 WORK_BYTES = 32 << 20
 FINEST = 1e-5  # of the clip's size: nothing finer is asked for
 OF_LEVEL = 1.0  # what a transform may add to the error of the level, as a multiple of it
@@ -93,7 +94,7 @@ class Placed:
         largest = parts.spread.max(axis=1)
         self._flat = parts.spread <= HELD * largest[:, None]
         self._held = np.where(largest > 0, HELD * largest, 1.0)[:, None, None]
-        self._before = quaternions(parts.axes)
+        self._before, self._scale = quaternions(parts.axes), np.ones_like(parts.spread)
 
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
@@ -104,7 +105,7 @@ class Placed:
         return rotation * scale[:, None, :], (found, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        scale = np.ones_like(self._spread)
+        scale = self._scale  # of the frame before, which is near
         safe = np.where(self._flat, 1.0, self._spread)
         for _ in range(ROUNDS):
             rotation = _proper(cross * scale[:, None, :] + self._held * self._axes)
@@ -114,7 +115,7 @@ class Placed:
             scale = better
             if done:
                 break
-        self._axes = rotation
+        self._axes, self._scale = rotation, scale
         return rotation, scale
 
 
@@ -138,17 +139,21 @@ def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[
     """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`."""
     rest = np.asarray(motion.rest, np.float64)
     order, first, count = _ranges(motion)
-    done: list[tuple[Parts, np.ndarray, list[np.ndarray]]] = []
+    done: list[tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]] = []
     number = 0
     while len(first):
         if len(first) + number > most:
             return None
         parts = Parts.over(order, first, count, rest)
-        places, values, error = _fitted(motion, parts, solver(parts), rest)
+        error = _fitted(motion, parts, solver(parts), rest, ROUGHLY)[2]  # most that fail do so in one of a few frames
         good = (error <= allowed) | (count == 1)
-        done.append((Parts.over(order, first[good], count[good], rest), places[:, good], [v[:, good] for v in values])
-                    if good.any() else (parts, places[:, :0], [v[:, :0] for v in values]))
-        number += int(good.sum())
+        if good.any():
+            kept = Parts.over(order, first[good], count[good], rest)
+            places, values, error[good] = _fitted(motion, kept, solver(kept), rest)
+            held = (error[good] <= allowed) | (kept.count == 1)
+            done.append((kept.first[held], kept.count[held], places[:, held], [each[:, held] for each in values]))
+            good[good] = held
+            number += int(held.sum())
         first, count = _cut(first[~good], count[~good], error[~good] / allowed if allowed > 0 else None)
         report(1 - float(count.sum()) / len(rest))
     return _joined(done, order, rest)
@@ -176,9 +181,10 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
     return first[of] + starts, stops - starts
 
 
-def _fitted(motion: Any, parts: Parts, solver: Any,
-            rest: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Places (T, K, 3) and values of all frames, and the largest distance that each part leaves (K,)."""
+def _fitted(motion: Any, parts: Parts, solver: Any, rest: np.ndarray,
+            step: int = 1) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
+    that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
     starts, own = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
     local = np.einsum("nij,ni->nj", parts.axes[own], rest[rows] - parts.middle[own])
@@ -186,18 +192,21 @@ def _fitted(motion: Any, parts: Parts, solver: Any,
     values = [np.empty((motion.frame_count, len(parts), width)) for width in solver.widths]
     error = np.zeros(len(parts))
     for start, frames in portions(motion, len(rows)):
-        points = frames[:, rows].astype(np.float64)
+        numbers = np.arange(start + -start % step, start + len(frames), step)
+        if not len(numbers):
+            continue
+        points = frames[numbers - start][:, rows].astype(np.float64)
         middle = np.add.reduceat(points, starts, axis=1) / parts.count[:, None]
         points -= middle[:, own]
-        places[start : start + len(frames)] = middle
-        cross = np.empty((len(frames), len(parts), 3, 3))
+        places[numbers] = middle
+        cross = np.empty((len(numbers), len(parts), 3, 3))
         for i in range(3):
             for j in range(3):
                 cross[:, :, i, j] = np.add.reduceat(points[:, :, i] * local[:, j], starts, axis=1) / parts.count
-        for i in range(len(frames)):
+        for i, number in enumerate(numbers):
             linear, found = solver(cross[i])
             for kept, value in zip(values, found):
-                kept[start + i] = value
+                kept[number] = value
             points[i] -= np.einsum("nij,nj->ni", linear[own], local)
         square = np.einsum("tni,tni->tn", points, points).max(axis=0)
         error = np.maximum(error, np.sqrt(np.maximum.reduceat(square, starts)))
@@ -213,11 +222,10 @@ def portions(motion: Any, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]
 
 
 def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
-    done = [each for each in done if each[1].shape[1]]
-    first, count = (np.concatenate([getattr(parts, name) for parts, _, _ in done]) for name in ("first", "count"))
+    first, count = (np.concatenate([each[i] for each in done]) for i in range(2))
     by_place = np.argsort(first)
-    places = np.concatenate([each[1] for each in done], axis=1)[:, by_place]
-    values = [np.concatenate([each[2][i] for each in done], axis=1)[:, by_place] for i in range(len(done[0][2]))]
+    places = np.concatenate([each[2] for each in done], axis=1)[:, by_place]
+    values = [np.concatenate([each[3][i] for each in done], axis=1)[:, by_place] for i in range(len(done[0][3]))]
     return Moving(Parts.over(order, first[by_place], count[by_place], rest), places, values)
 
 

@@ -272,7 +272,7 @@ class _Motion:
         """(k, N, 3) float32; None: the pose without animation, k = 1."""
         out = np.empty((1 if times is None else len(times), self.count, 3), np.float32)
         largest = max(part.count for part in self._parts)
-        step = max(1, WORK_BYTES // (48 * largest + 256 * len(self.nodes)))
+        step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.nodes)))
         with np.errstate(all="ignore"):
             for start in range(0, len(out), step):
                 now = None if times is None else times[start : start + step]

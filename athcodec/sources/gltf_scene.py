@@ -22,7 +22,7 @@ SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One animated property: times (K,), values (K, W), or (K, 3, W) with tangents for CUBICSPLINE."""
+    """What is animated by the same keys: times (K,), values (K, ...), with tangents (K, 3, ...) for CUBICSPLINE."""
 
     times: np.ndarray
     values: np.ndarray
@@ -30,7 +30,7 @@ class Track:
     is_rotation: bool
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(k, W) float64."""
+        """(k, ...) float64."""
         after = np.searchsorted(self.times, times, "right")
         last = len(self.times) - 1
         left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
@@ -38,9 +38,11 @@ class Track:
             return self.values[left].astype(np.float64)
         step = self.times[right] - self.times[left]
         part = np.divide(times - self.times[left], step, out=np.zeros(len(times)), where=step > 0)
-        part = np.clip(part, 0, 1)[:, None]
-        if self.interpolation == "CUBICSPLINE":
-            return self._spline(left, right, step[:, None], part)
+        is_spline = self.interpolation == "CUBICSPLINE"
+        shape = (-1,) + (1,) * (self.values.ndim - 1 - is_spline)
+        part = np.clip(part, 0, 1).reshape(shape)
+        if is_spline:
+            return self._spline(left, right, step.reshape(shape), part)
         a, b = self.values[left].astype(np.float64), self.values[right].astype(np.float64)
         return slerp(a, b, part) if self.is_rotation else a + (b - a) * part
 
@@ -53,8 +55,8 @@ class Track:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """From quaternions a to b (k, 4), the shorter way, by `part` (k, 1)."""
-    cosine = (a * b).sum(axis=1, keepdims=True)
+    """From quaternions a to b (..., 4), the shorter way, by `part`."""
+    cosine = (a * b).sum(axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)
@@ -88,9 +90,11 @@ class Scene:
         self.parent = self._parents()
         self.order = self._reached()
         self.played = self._together() if play is None else play
-        self.tracks: dict[tuple[int, str], Track] = {}
+        self._times: dict[int, np.ndarray] = {}
+        self._tracks: dict[tuple[int, str], Track] = {}
         for index in self.played:
             self._add_animation(index)
+        self._groups = self._grouped()
 
     def name(self, node: int) -> str:
         name = self.nodes[node].get("name")
@@ -169,14 +173,17 @@ class Scene:
             if "matrix" in self.nodes[node] and path in TRS:
                 raise ClipError(f"animation {index}: moves node {node}, which has a matrix, expected translation, "
                                 "rotation and scale")
-            self.tracks[node, path] = self._track(samplers[sampler], path, f"animation {index}, sampler {sampler}")
+            self._tracks[node, path] = self._track(samplers[sampler], path, f"animation {index}, sampler {sampler}")
 
     def _track(self, sampler: dict, path: str, where: str) -> Track:
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
             raise ClipError(f"{where}: got interpolation {brief(interpolation)}, expected one of "
                             f"{', '.join(INTERPOLATIONS)}")
-        times = self.file.floats(integer(sampler, "input"))[:, 0].astype(np.float64)
+        key = integer(sampler, "input")
+        if key not in self._times:
+            self._times[key] = self.file.floats(key)[:, 0].astype(np.float64)
+        times = self._times[key]
         if not np.isfinite(times).all() or (np.diff(times) < 0).any():
             raise ClipError(f"{where}: got key times that run backward or are not finite, expected ascending seconds")
         values = self.file.floats(integer(sampler, "output"))
@@ -188,17 +195,32 @@ class Scene:
         shape = (len(times), 3, width) if each == 3 else (len(times), width)
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
+    def _grouped(self) -> list[tuple[str, list[int], Track]]:
+        """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once. Weights of
+        morph targets remain in _tracks."""
+        alike: dict[tuple, list[int]] = {}
+        for (node, path), track in self._tracks.items():
+            if path in TRS:
+                alike.setdefault((path, track.interpolation, id(track.times)), []).append(node)
+        groups = []
+        for (path, interpolation, _), nodes in alike.items():
+            tracks = [self._tracks.pop((node, path)) for node in nodes]
+            values = np.stack([track.values for track in tracks], axis=-2)
+            groups.append((path, nodes, Track(tracks[0].times, values, interpolation, path == "rotation")))
+        return groups
+
     @cached_property
     def keys(self) -> np.ndarray:
         """The times of all keys, ascending, each once."""
-        tables = {id(track.times): track.times for track in self.tracks.values()}
+        tracks = [*self._tracks.values(), *(track for _, _, track in self._groups)]
+        tables = {id(track.times): track.times for track in tracks}
         return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
 
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
         """(k, targets) of a node's mesh; times None: without animation, k = 1."""
-        track = self.tracks.get((node, "weights"))
+        track = self._tracks.get((node, "weights"))
         if track is None or times is None:
             return default[None]
         found = track.at(times)
@@ -207,29 +229,34 @@ class Scene:
         return found
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
-        """(k, 4, 4), or (1, 4, 4) of those that stand still, from each node to the world; `nodes` are `ancestors`.
+        """(k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k = 1."""
+        place = {node: i for i, node in enumerate(nodes)}
+        found = self._locals(place, times)
+        above = np.array([place.get(int(self.parent[node]), -1) for node in nodes])
+        level = np.zeros(len(nodes), np.int64)
+        for i in np.flatnonzero(above >= 0):  # parents stand first
+            level[i] = level[above[i]] + 1
+        for depth in range(1, int(level.max(initial=0)) + 1):
+            mine = np.flatnonzero(level == depth)
+            found[:, mine] = found[:, above[mine]] @ found[:, mine]
+        return {node: found[:, i] for node, i in place.items()}
 
-        times None: the pose without animation.
-        """
-        found: dict[int, np.ndarray] = {}
-        for node in nodes:
-            local, parent = self._local(node, times), int(self.parent[node])
-            found[node] = found[parent] @ local if parent in found else local
+    def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
+        """(k, nodes, 4, 4): from each node to its parent."""
+        frames = 1 if times is None else len(times)
+        parts = {path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
+                 for path, default in TRS.items()}
+        for path, nodes, track in self._groups if times is not None else ():
+            inside = [i for i, node in enumerate(nodes) if node in place]
+            parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]
+        found = np.zeros((frames, len(place), 4, 4))
+        found[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
+        found[..., :3, 3] = parts["translation"]
+        found[..., 3, 3] = 1.0
+        for node, i in place.items():
+            if "matrix" in self.nodes[node]:
+                found[:, i] = vector(self.nodes[node], "matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
         return found
-
-    def _local(self, node: int, times: np.ndarray | None) -> np.ndarray:
-        values = self.nodes[node]
-        if "matrix" in values:
-            return vector(values, "matrix", np.eye(4).ravel().tolist()).reshape(1, 4, 4).swapaxes(1, 2)
-        found = {}
-        for path, default in TRS.items():
-            track = self.tracks.get((node, path)) if times is not None else None
-            found[path] = vector(values, path, default)[None] if track is None else track.at(times)
-        matrix = np.zeros((max(len(each) for each in found.values()), 4, 4))
-        matrix[:, :3, :3] = rotation_matrices(found["rotation"]) * found["scale"][:, None, :]
-        matrix[:, :3, 3] = found["translation"]
-        matrix[:, 3, 3] = 1.0
-        return matrix
 
 
 def key_rate(keys: np.ndarray) -> float | None:
