@@ -125,9 +125,10 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def new_files(path: str | os.PathLike[str]) -> Iterator[str]:
+def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]:
     """A folder for files that belong together. When the block ends they move beside `path`, the one of that name last,
-    in place of older ones; nothing is left behind when it raises. Raises OSError."""
+    in place of older ones; nothing is left behind when it raises. One of them must have that name, unless `named` is
+    False. Raises OSError."""
     path = check_target(path)
     remove_leftovers(path)
     directory, name = os.path.split(path)
@@ -137,7 +138,7 @@ def new_files(path: str | os.PathLike[str]) -> Iterator[str]:
     try:
         yield folder
         made = sorted(os.listdir(folder), key=lambda each: (each == name, each))
-        if name not in made:
+        if named and name not in made:
             raise FileNotFoundError(f"{path}: the writer has made no such file")
         for each in made:
             os.replace(os.path.join(folder, each), os.path.join(directory, each))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import os
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -24,6 +25,7 @@ from athcodec.sources.frames import Frames
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
+NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,11 @@ def read(path: str | PathLike[str], format: str | None = None, *, unit: str | No
         raise
 
 
+def is_pattern(path: str | PathLike[str]) -> bool:
+    """Whether a path is no file and stands for numbered ones, with # or %04d in its name."""
+    return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
+
+
 def format_named(name: str) -> Format:
     for each in FORMATS:
         if each.name == name:
@@ -132,8 +139,11 @@ def format_named(name: str) -> Format:
 
 def find_format(path: str | PathLike[str]) -> Format:
     """The format of a file, by its first bytes or else its suffix. Raises ClipError, OSError."""
-    with open(path, "rb") as file:
-        head = file.read(HEAD_BYTES)
+    if is_pattern(path):
+        head = b"#"
+    else:
+        with open(path, "rb") as file:
+            head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
     for each in FORMATS:

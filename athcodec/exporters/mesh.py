@@ -1,0 +1,228 @@
+"""Meshes as OBJ and PLY text and bytes: what moves is written per frame, all else is put together once.
+
+OBJ has v per frame; texture coordinates, polygons, lines, objects, groups and materials' names behind it. PLY (binary,
+little endian) has the vertices with what each has (colours, uv, any plain number), polygons and edges. Coordinates come
+back bit for bit: nine digits for float32, seventeen for float64. Left out: normals, attributes that the format has no
+place for, metadata but the names of objects.
+"""
+
+from __future__ import annotations
+
+from typing import Any, BinaryIO
+
+import numpy as np
+
+COORDINATE_FORMATS = {4: "v %.9g %.9g %.9g\n", 8: "v %.16e %.16e %.16e\n"}
+BLOCK_ROWS = 1 << 14
+_PLY_NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint", "f4": "float",
+              "f8": "double"}
+_PLY_COLORS = ("red", "green", "blue", "alpha")
+
+
+def domain_of(motion: Any, name: str) -> str:
+    """"vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
+    domains = motion.metadata.get("domains")
+    said = domains.get(name) if isinstance(domains, dict) else None
+    values = motion.attributes[name]
+    return said or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
+
+
+def has_mesh(motion: Any) -> bool:
+    """Whether there are faces or edges to write."""
+    return _count_polygons(motion) > 0 or (motion.edges is not None and len(motion.edges) > 0)
+
+
+def part_spans(motion: Any) -> list[tuple[str, int, int]]:
+    """(name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
+    names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
+    whole = isinstance(names, list) and counts is not None and len(counts) == len(names)
+    if not whole or int(np.sum(counts)) != motion.vertex_count or np.min(counts, initial=0) < 0:
+        name = names[0] if isinstance(names, list) and len(names) == 1 else "plant"
+        return [(_one_line(name), 0, motion.vertex_count)]
+    ends = np.cumsum(counts, dtype=np.int64)
+    return [(_one_line(name), int(end - count), int(end)) for name, end, count in zip(names, ends, counts)]
+
+
+def _one_line(name: object) -> str:
+    return " ".join(str(name).split()) or "plant"
+
+
+def _count_polygons(motion: Any) -> int:
+    return 0 if motion.polygons is None else len(motion.polygons[0])
+
+
+def _corner_uv(motion: Any) -> tuple[np.ndarray | None, bool]:
+    """Texture coordinates of two numbers, and whether they are per corner; None: there are none."""
+    uv = motion.attributes.get("uv")
+    if uv is None or uv.ndim != 2 or uv.shape[1] != 2 or uv.dtype.kind != "f":
+        return None, False
+    domain = domain_of(motion, "uv")
+    if domain == "corner" and motion.polygons is not None and len(uv) == len(motion.polygons[1]):
+        return uv, True
+    return (uv, False) if domain == "vertex" and len(uv) == motion.vertex_count else (None, False)
+
+
+class ObjWriter:
+    """OBJ files of one clip; write(file, points) for each."""
+
+    suffix = ".obj"
+
+    def __init__(self, motion: Any):
+        self._tail = "".join(_obj_tail(motion)).encode()
+        colors = motion.attributes.get("colors")
+        fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f" \
+            and domain_of(motion, "colors") == "vertex"
+        self._colors = colors if fits else None
+
+    def write(self, file: BinaryIO, points: np.ndarray) -> None:
+        form = COORDINATE_FORMATS[points.dtype.itemsize]
+        if self._colors is not None:
+            form = form[:-1] + " %.9g %.9g %.9g\n"
+        for start in range(0, len(points), BLOCK_ROWS):
+            rows = points[start: start + BLOCK_ROWS].astype(np.float64)
+            if self._colors is not None:
+                rows = np.concatenate([rows, self._colors[start: start + BLOCK_ROWS]], axis=1)
+            file.write((form * len(rows) % tuple(rows.reshape(-1).tolist())).encode())
+        file.write(self._tail)
+
+
+def _obj_tail(motion: Any) -> list[str]:
+    """All lines behind those of v."""
+    uv, per_corner = _corner_uv(motion)
+    lines = [] if uv is None else [f"vt {u:.9g} {v:.9g}\n" for u, v in uv.tolist()]
+    faces = _obj_faces(motion, uv is not None, per_corner)
+    ends = [] if motion.edges is None else (np.asarray(motion.edges, np.int64) + 1).tolist()
+    edges = [f"l {a} {b}\n" for a, b in ends]
+    spans = part_spans(motion)
+    stops = np.array([stop for _, _, stop in spans])
+    face_parts = _parts_of(stops, _first_corners(motion))
+    edge_parts = _parts_of(stops, None if motion.edges is None else np.asarray(motion.edges, np.int64)[:, 0])
+    if face_parts is None or edge_parts is None:
+        return [*lines, *faces, *edges]
+    for number, (name, start, stop) in enumerate(spans):
+        lines.append(f"o {name}\n")
+        mine = [*(faces[slice(*np.searchsorted(face_parts, [number, number + 1]))]),
+                *(edges[slice(*np.searchsorted(edge_parts, [number, number + 1]))])]
+        lines += mine or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
+    return lines
+
+
+def _first_corners(motion: Any) -> np.ndarray | None:
+    if not _count_polygons(motion):
+        return None
+    counts, corners = motion.polygons
+    starts = np.cumsum(counts, dtype=np.int64) - counts
+    return np.asarray(corners, np.int64)[np.minimum(starts, len(corners) - 1)]
+
+
+def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
+    """The part of each vertex; None where they do not come in the order of the parts."""
+    parts = np.searchsorted(stops, [] if vertices is None else vertices, side="right")
+    return parts if (np.diff(parts) >= 0).all() else None
+
+
+def _obj_faces(motion: Any, has_uv: bool, per_corner: bool) -> list[str]:
+    """A line per face, behind the lines of the group and the material that it is the first of."""
+    if not _count_polygons(motion):
+        return []
+    counts, corners = motion.polygons
+    corners = (np.asarray(corners, np.int64) + 1).tolist()
+    words = [f"{vertex}/{place if per_corner else vertex}" if has_uv else f"{vertex}"
+             for place, vertex in enumerate(corners, 1)]
+    ends = np.cumsum(counts, dtype=np.int64).tolist()
+    lines = [f"f {' '.join(words[end - count: end])}\n" for end, count in zip(ends, np.asarray(counts).tolist())]
+    _switch_names(motion, lines, "face_material", "material_names", "usemtl")
+    _switch_names(motion, lines, "face_group", "group_names", "g")
+    return lines
+
+
+def _switch_names(motion: Any, lines: list[str], attribute: str, names_key: str, word: str) -> None:
+    labels, names = motion.attributes.get(attribute), motion.metadata.get(names_key)
+    if labels is None or not isinstance(names, list) or labels.shape != (len(lines),) or labels.dtype.kind not in "iu":
+        return
+    for face in np.flatnonzero(np.diff(labels, prepend=-1)):
+        if 0 <= labels[face] < len(names):
+            lines[face] = f"{word} {_one_line(names[labels[face]])}\n{lines[face]}"
+
+
+class PlyWriter:
+    """Binary PLY files of one clip; write(file, points) for each."""
+
+    suffix = ".ply"
+
+    def __init__(self, motion: Any):
+        columns = _ply_columns(motion)
+        coordinate = "<f4" if motion.dtype.itemsize == 4 else "<f8"
+        fields = [(axis, coordinate) for axis in "xyz"]
+        fields += [(name, f"<{values.dtype.str[1:]}") for name, values in columns.items()]
+        self._rows = np.zeros(motion.vertex_count, fields)
+        for name, values in columns.items():
+            self._rows[name] = values
+        face_header, faces = _ply_faces(motion)
+        edge_count = 0 if motion.edges is None else len(motion.edges)
+        edge_header = ["element edge %d" % edge_count, "property int vertex1", "property int vertex2"]
+        self._tail = faces + (np.asarray(motion.edges, "<i4").tobytes() if edge_count else b"")
+        lines = ["ply", "format binary_little_endian 1.0", f"element vertex {motion.vertex_count}",
+                 *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
+                 *face_header, *(edge_header if edge_count else []), "end_header"]
+        self._header = ("\n".join(lines) + "\n").encode()
+
+    def write(self, file: BinaryIO, points: np.ndarray) -> None:
+        for axis, name in enumerate("xyz"):
+            self._rows[name] = points[:, axis]
+        file.write(self._header)
+        file.write(self._rows.tobytes())
+        file.write(self._tail)
+
+
+def _ply_columns(motion: Any) -> dict[str, np.ndarray]:
+    """The numbers that every vertex has beside its position, one column each."""
+    columns: dict[str, np.ndarray] = {}
+    for name, values in motion.attributes.items():
+        if domain_of(motion, name) != "vertex" or len(values) != motion.vertex_count or name == "normals":
+            continue
+        if name == "uv" and values.ndim == 2 and values.shape[1] == 2:
+            names = ("s", "t")
+        elif name == "colors" and values.ndim == 2 and values.shape[1] in (3, 4):
+            names = _PLY_COLORS[: values.shape[1]]
+        elif values.ndim == 1 and name.isascii() and name.isprintable() and not set(name) & set(" \t"):
+            names = (name,)
+        else:
+            continue
+        if values.dtype.str[1:] in _PLY_NAMES and not set(names) & {"x", "y", "z", *columns}:
+            columns |= dict(zip(names, values.reshape(len(values), -1).T))
+    return columns
+
+
+def _ply_faces(motion: Any) -> tuple[list[str], bytes]:
+    count = _count_polygons(motion)
+    if not count:
+        return [], b""
+    counts, corners = motion.polygons
+    uv, per_corner = _corner_uv(motion)
+    counted = "uint" if max(counts) > 127 else "uchar"
+    header = [f"element face {count}", f"property list {counted} int vertex_indices"]
+    if per_corner:
+        header.append(f"property list {counted} float texcoord")
+    corners, number = np.asarray(corners, "<i4"), "<u4" if counted == "uint" else "u1"
+    ends = np.cumsum(counts, dtype=np.int64)
+    if (np.asarray(counts) == counts[0]).all():
+        return header, _ply_rows(corners, uv if per_corner else None, int(counts[0]), number)
+    return header, b"".join(
+        _ply_rows(corners[end - size: end], uv[end - size: end] if per_corner else None, int(size), number)
+        for size, end in zip(np.asarray(counts).tolist(), ends.tolist()))
+
+
+def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:
+    """Faces of `size` corners each."""
+    fields = [("count", number), ("corners", "<i4", (size,))]
+    if uv is not None:
+        fields += [("numbers", number), ("uv", "<f4", (2 * size,))]
+    rows = np.zeros(len(corners) // size if size else 1, fields)
+    rows["count"], rows["corners"] = size, corners.reshape(-1, size) if size else 0
+    if uv is not None:
+        rows["numbers"], rows["uv"] = 2 * size, uv.reshape(-1, 2 * size) if size else 0
+    return rows.tobytes()
+
+
+WRITERS = {writer.suffix: writer for writer in (ObjWriter, PlyWriter)}

@@ -1,0 +1,94 @@
+"""Writes PC2 point caches, and beside them, where there are faces or edges, the mesh that they move as OBJ.
+
+A cache holds float32 positions and a start frame, at one step from frame to frame: clips whose times are uneven are
+refused (MDD has a time per frame). Blender takes both files: import the OBJ with "Y forward, Z up", so that its axes stay
+as they are, then add a Mesh Cache modifier. A mesh that is there already stays as it is where its vertices,
+faces and edges are those of the clip, so that materials in it are kept; another one is never replaced.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.exporters import WriteOptions
+from athcodec.exporters.mesh import ObjWriter, has_mesh
+from athcodec.exporters.timing import frame_numbers
+from athcodec.files import check_target, new_files
+from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.pc2 import HEADER, MAGIC
+
+STEP_TOLERANCE = 1e-4
+LARGEST_COUNT = 2**31 - 1
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+    """Write the cache and its mesh. Raises ClipError where the times are uneven or there is another mesh beside it,
+    OSError where nothing can be written."""
+    header = HEADER.pack(MAGIC, 1, *_counted(motion, *_start_and_step(motion)))
+    write_cache(motion, path, header, "<f4", report)
+
+
+def _counted(motion: Any, start: float, step: float) -> tuple[int, float, float, int]:
+    check_counts(motion)
+    return motion.vertex_count, start, step, motion.frame_count
+
+
+def check_counts(motion: Any) -> None:
+    if max(motion.vertex_count, motion.frame_count) > LARGEST_COUNT:
+        raise ClipError(f"got {motion.frame_count} frames of {motion.vertex_count} vertices, expected fewer than 2^31")
+
+
+def _start_and_step(motion: Any) -> tuple[float, float]:
+    numbers = frame_numbers(motion)
+    if len(numbers) < 2:
+        return float(numbers[0]), 1.0
+    step = float(numbers[-1] - numbers[0]) / (len(numbers) - 1)
+    off = np.abs(numbers - numbers[0] - step * np.arange(len(numbers)))
+    if off.max() > STEP_TOLERANCE * max(1.0, step):
+        raise ClipError(f"time: frame {int(off.argmax())} is {off.max():.3g} frames off, expected even steps: a PC2 "
+                        "cache has no others; mdd has a time per frame")
+    return float(numbers[0]), float(round(step, 6))
+
+
+def write_cache(motion: Any, path: str | PathLike[str], header: bytes, dtype: str,
+                report: Callable[[float], None]) -> None:
+    """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there."""
+    mesh_name = _mesh_to_write(motion, Path(check_target(path)))
+    with new_files(path) as folder:
+        if mesh_name:
+            with open(os.path.join(folder, mesh_name), "wb") as file:
+                ObjWriter(motion).write(file, np.asarray(motion.rest, motion.dtype))
+        with open(os.path.join(folder, Path(check_target(path)).name), "wb") as file:
+            file.write(header)
+            _write_frames(motion, file, dtype, report)
+
+
+def _write_frames(motion: Any, file: BinaryIO, dtype: str, report: Callable[[float], None]) -> None:
+    for start, frames in motion.blocks():
+        file.write(np.ascontiguousarray(frames, dtype))
+        report((start + len(frames)) / motion.frame_count)
+
+
+def _mesh_to_write(motion: Any, target: Path) -> str:
+    """The name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
+    if not has_mesh(motion):
+        return ""
+    mesh_path = target.with_suffix(".obj")
+    if not mesh_path.exists():
+        return mesh_path.name
+    mine = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
+    different = "got no OBJ mesh"
+    with suppress(ClipError):
+        different = mine.same_topology(read_mesh(mesh_path))
+    if different:
+        raise ClipError(f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "
+                        "the cache's own mesh goes there")
+    return ""

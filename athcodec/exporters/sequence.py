@@ -1,0 +1,78 @@
+"""Writes a motion as numbered OBJ or PLY files: tree.obj becomes tree_0001.obj, tree_0002.obj ...
+
+The numbers are those of the frames in the tool that the clip comes from; where its times fall between frames, or before
+frame 0, files are numbered from 1 on and their times are lost. A path that is numbered itself (tree_0001.obj,
+tree_####.obj, tree_%04d.obj) says how the numbers look. A single frame is written to tree.obj itself. All files appear
+together; files of that name with other numbers are an error, because they would be read as frames of the same motion.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from athcodec.errors import ClipError
+from athcodec.exporters import WriteOptions
+from athcodec.exporters.mesh import WRITERS
+from athcodec.exporters.timing import frame_numbers
+from athcodec.files import check_target, new_files
+from athcodec.sources import NUMBER_PATTERN
+from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
+
+DIGITS = 4
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+    """Write all files. Raises ClipError where there are others of the same numbering, OSError where nothing can be
+    written."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in WRITERS:
+        raise ClipError(f"{fspath(path)}: got the suffix {suffix!r}, expected one of {', '.join(WRITERS)}")
+    names = file_names(motion, path)
+    writer = WRITERS[suffix](motion)
+    with new_files(path, named=False) as folder:
+        for start, frames in motion.blocks():
+            for frame, points in enumerate(frames, start):
+                with open(os.path.join(folder, names[frame]), "wb") as file:
+                    writer.write(file, points)
+                report((frame + 1) / motion.frame_count)
+
+
+def file_names(motion: Any, path: str | PathLike[str]) -> list[str]:
+    """The name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
+    path = Path(check_target(path))
+    numbering = _numbering(path)
+    if numbering is None:
+        if motion.frame_count == 1:
+            return [path.name]
+        numbering = Numbering(path.parent, f"{path.stem}_", DIGITS, path.suffix)
+    numbers = file_numbers(motion)
+    further = sorted(numbering.files().keys() - set(numbers))
+    if further:
+        raise ClipError(f"{fspath(numbering.path(further[0]))}: is there already and no frame of the clip, which has "
+                        f"{numbers[0]} to {numbers[-1]}; remove such files or choose another name")
+    return [numbering.path(number).name for number in numbers]
+
+
+def file_numbers(motion: Any) -> list[int]:
+    """Numbers of the frames, or 1, 2 ... where they are not whole, twice the same or below 0."""
+    numbers = np.round(frame_numbers(motion), 3)
+    usable = (numbers == np.floor(numbers)).all() and numbers.min() >= 0 and numbers.max() <= LARGEST_NUMBER
+    if usable and (np.diff(numbers) > 0).all():
+        return [int(number) for number in numbers]
+    return list(range(1, motion.frame_count + 1))
+
+
+def _numbering(path: Path) -> Numbering | None:
+    """How the files are to be called, where the path says so: by # or %04d, or by digits with a zero before them."""
+    pattern = NUMBER_PATTERN.fullmatch(path.name)
+    if pattern is not None:
+        prefix, marks, width, suffix = pattern.groups()
+        return Numbering(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+    return numbering_of(path) if re.search(r"(^|\D)0\d*$", path.stem) else None

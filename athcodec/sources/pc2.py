@@ -1,0 +1,109 @@
+"""Reads PC2 point caches (3ds Max, Blender ...): 32 bytes of header, then the frames as float32, little endian.
+
+PC2 says at which frame the cache starts and how many frames there are from sample to sample, but no rate: that is
+options.fps. Without it frames come DEFAULT_FPS (30) a second, and the clip states a rate only where samples are not one
+frame apart. The faces come from a mesh beside it (see cached_mesh). Coordinates are taken as they are: Blender's own
+OBJ export turns its axes unless told not to, its point caches have the axes of the object.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
+from athcodec.sources import ReadOptions, read
+from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.raw import raw_frames, read_exactly, watch
+from athcodec.sources.timing import numbered_times
+
+MAGIC = b"POINTCACHE2\0"
+HEADER = struct.Struct("<12siiffi")
+MESH_SUFFIXES = (".obj", ".ply")
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """Open the clip in the point cache `path`. Raises ClipError where it is none, or where the mesh has another number
+    of vertices; OSError where a file cannot be opened."""
+    return open_cache(path, options, _read_header)
+
+
+def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
+    fields = HEADER.unpack(read_exactly(file, HEADER.size, "header"))
+    magic, version, vertex_count, first, step, frame_count = fields
+    if magic != MAGIC:
+        raise ClipError(f"got {magic[:4]!r} ..., expected a PC2 point cache")
+    if version != 1:
+        raise ClipError(f"version: got {version}, expected 1")
+    if not (math.isfinite(first) and math.isfinite(step) and (step > 0 or frame_count == 1)):
+        raise ClipError(f"header: got the start {first} and {step} frames per sample, expected a step above 0")
+    check_size(file, frame_count, vertex_count, HEADER.size)
+    time, metadata = numbered_times(float(first) + float(step) * np.arange(frame_count), options.fps)
+    return {"positions": raw_frames(file, HEADER.size, frame_count, vertex_count, "<f4"), "time": time,
+            "metadata": metadata}
+
+
+def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes: int) -> None:
+    """ClipError unless a cache has frames and vertices, and as many bytes as that takes."""
+    if frame_count < 1 or vertex_count < 1:
+        raise ClipError(f"header: got {frame_count} frames of {vertex_count} vertices, expected at least one of one")
+    size, expected = os.fstat(file.fileno()).st_size, header_bytes + 12 * frame_count * vertex_count
+    if size != expected:
+        raise ClipError(f"got {size} bytes, expected {expected} for {frame_count} frames of {vertex_count} vertices")
+
+
+def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any) -> MotionClip:
+    """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
+    positions, time and metadata."""
+    file = open(path, "rb", buffering=0)
+    try:
+        fields = read_header(file, options)
+        mesh = cached_mesh(path, options, fields["positions"].shape[1])
+        metadata = mesh.metadata | fields.pop("metadata")
+        return MotionClip(**fields, metadata=metadata, faces=mesh.faces, edges=mesh.edges, attributes=mesh.attributes,
+                          rest_pose="mean" if options.rest == "mean" else "first", resource=file,
+                          unchanged=watch(file))
+    except ClipError as error:
+        file.close()
+        raise ClipError(f"{fspath(path)}: {error}") from None
+    except BaseException:
+        file.close()
+        raise
+
+
+def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: int) -> Mesh:
+    """The mesh whose vertices a cache moves: options.mesh, else the OBJ or PLY file of the cache's name beside it, else
+    points alone. OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used:
+    they may be in other units or axes."""
+    found = options.mesh or _mesh_beside(Path(path))
+    if found is None:
+        metadata = {"part_names": [Path(path).stem], "part_kinds": ["points"],
+                    "domains": {"part_vertex_counts": "constant"}}
+        attributes = {"part_vertex_counts": np.array([vertex_count], np.int32)}
+        return Mesh(np.empty((vertex_count, 3)), attributes=attributes, metadata=metadata)
+    if Path(found).suffix.lower() in MESH_SUFFIXES:
+        mesh = read_mesh(found)
+    else:
+        with read(found, only=options.only) as clip:
+            metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
+            mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata)
+    if len(mesh.points) != vertex_count:
+        raise ClipError(f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the "
+                        "cache")
+    mesh.attributes = {name: values for name, values in mesh.attributes.items()
+                       if name not in options.skip and name != "normals"}
+    return mesh
+
+
+def _mesh_beside(path: Path) -> Path | None:
+    for suffix in (*MESH_SUFFIXES, *(suffix.upper() for suffix in MESH_SUFFIXES)):
+        if path.with_suffix(suffix).is_file():
+            return path.with_suffix(suffix)
+    return None

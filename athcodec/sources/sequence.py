@@ -1,0 +1,215 @@
+"""Reads numbered OBJ or PLY files as the frames of one motion: tree_0001.obj, tree_0002.obj ...
+
+Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames:
+where some are missing, time goes on all the same. Frames come options.fps a second, DEFAULT_FPS (30) without it. A file
+without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and all
+else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices (Blender's
+PLY does where texture coordinates are to be written) split those of all frames alike.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+
+import numpy as np
+
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
+from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
+from athcodec.sources.frames import Frames
+from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
+from athcodec.sources.timing import numbered_times
+
+_NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
+_ELEMENTS = frozenset((b"f ", b"f\t", b"l ", b"l\t"))
+LARGEST_NUMBER = 10**9
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """How the files of a sequence are called: prefix, the number with at least `width` digits, suffix."""
+
+    folder: Path
+    prefix: str
+    width: int
+    suffix: str
+
+    def path(self, number: int) -> Path:
+        return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
+
+    def files(self) -> dict[int, Path]:
+        """The files that are there, by their numbers, in that order."""
+        found = {}
+        for name in os.listdir(self.folder):
+            digits = name[len(self.prefix): len(name) - len(self.suffix)]
+            if digits.isascii() and digits.isdigit() and len(digits) <= len(str(LARGEST_NUMBER)):
+                if name == self.path(int(digits)).name:
+                    found[int(digits)] = self.folder / name
+        return dict(sorted(found.items()))
+
+
+def numbering_of(path: str | PathLike[str]) -> Numbering | None:
+    """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
+    path = Path(path)
+    pattern = NUMBER_PATTERN.fullmatch(path.name) if is_pattern(path) else None
+    if pattern:
+        prefix, marks, width, suffix = pattern.groups()
+        return Numbering(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+    numbered = _NUMBERED.fullmatch(path.stem)
+    if not numbered:
+        return None
+    prefix, digits = numbered.groups()
+    if digits.startswith("0"):
+        return Numbering(path.parent, prefix, len(digits), path.suffix)
+    padded = _padded_widths(path, prefix, len(digits))
+    return Numbering(path.parent, prefix, max(padded, default=1), path.suffix)
+
+
+def _padded_widths(path: Path, prefix: str, longest: int) -> list[int]:
+    """How long the numbers with zeros before them are, of files called like `path`."""
+    form = re.compile(re.escape(prefix) + r"(0\d+)" + re.escape(path.suffix), re.DOTALL)
+    found = [form.fullmatch(name) for name in os.listdir(path.parent)]
+    return [len(match[1]) for match in found if match and len(match[1]) <= longest]
+
+
+def sequence_files(path: str | PathLike[str]) -> dict[int | None, Path]:
+    """The files of the sequence by number; {None: path} for a single file without a number. Raises ClipError where a
+    pattern matches none, OSError where the folder or the named file is not there."""
+    numbering = numbering_of(path)
+    if numbering is None:
+        return {None: Path(path)}
+    files = numbering.files()
+    if is_pattern(path):
+        if not files:
+            raise ClipError(f"{fspath(path)}: got no such files, expected some like {numbering.path(1).name}")
+    elif Path(path) not in files.values():
+        return {None: Path(path)}
+    return files
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """The clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
+    read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
+    files = sequence_files(path)
+    reader = FileFrames(list(files.values()), parse_mesh, _fast_reader)
+    time, metadata = np.zeros(1), {}
+    if None not in files:
+        time, metadata = numbered_times(np.array(list(files)), options.fps)
+    mesh = reader.mesh
+    mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
+    attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
+    try:
+        return MotionClip(reader.frames, time, faces=mesh.faces, edges=mesh.edges, attributes=attributes,
+                          metadata=mesh.metadata | metadata, rest_pose="mean" if options.rest == "mean" else "first",
+                          unchanged=reader.unchanged)
+    except ClipError as error:
+        raise ClipError(f"{fspath(path)}: {error}") from None
+
+
+def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str]) -> list[str]:
+    """The names of parts, where they are only the file's own that of the sequence."""
+    numbering = numbering_of(path)
+    if list(names) != [first.stem] or numbering is None:
+        return list(names)
+    return [numbering.prefix.rstrip("_-. ") or first.stem]
+
+
+class FileFrames:
+    """Frames of which each is a file of its own, read whole.
+
+    paths          in the order of time
+    parse          (bytes, path) -> Mesh
+    fast_reader    (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or
+                   None where it cannot tell that all else is as in the first
+    """
+
+    def __init__(self, paths: Sequence[Path], parse: Callable[[bytes, Path], Mesh],
+                 fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]]):
+        self.paths, self._parse = list(paths), parse
+        self._stamps = [_stamp(path) for path in self.paths]
+        data = self.paths[0].read_bytes()
+        self.mesh = parse(data, self.paths[0])
+        self._fast = fast_reader(data, self.mesh)
+        self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype)
+
+    def unchanged(self) -> bool:
+        """Whether no file has been written to since this was made."""
+        try:
+            return [_stamp(path) for path in self.paths] == self._stamps
+        except OSError:
+            return False
+
+    def _read(self, start: int, stop: int) -> np.ndarray:
+        block = np.empty((stop - start, *self.frames.shape[1:]), self.frames.dtype)
+        for frame in range(start, stop):
+            with np.errstate(over="ignore"):
+                block[frame - start] = self._points(frame)
+        return block
+
+    def _points(self, frame: int) -> np.ndarray:
+        path = self.paths[frame]
+        data = path.read_bytes()
+        try:
+            points = self._fast(data)
+        except (ClipError, ValueError, IndexError, OverflowError):
+            points = None  # the careful way says what is wrong
+        if points is not None and points.shape == self.mesh.points.shape:
+            return points
+        mesh = self._parse(data, path)
+        different = self.mesh.same_topology(mesh)
+        if different:
+            raise ClipError(f"frame {frame}, {path.name}: {different} as in {self.paths[0].name}; topology that "
+                            "changes cannot be coded")
+        return mesh.points
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    now = os.stat(path)
+    return now.st_size, now.st_mtime_ns
+
+
+def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
+    if data.startswith((b"ply\n", b"ply\r")):
+        return _fast_ply(data)
+    return _fast_obj(data, mesh)
+
+
+def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
+    dtype, elements = mesh.points.dtype, _obj_elements(obj_lines(data))
+    if any(b"-" in line for line in elements):
+        return lambda data: None  # relative numbers: which vertices they mean depends on the lines around them
+
+    def points(data: bytes) -> np.ndarray | None:
+        lines = obj_lines(data)
+        if _obj_elements(lines) != elements:
+            return None
+        return obj_points([line.split()[1:] for line in lines if line[:2] in (b"v ", b"v\t")], dtype)[0]
+
+    return points
+
+
+def _obj_elements(lines: Sequence[bytes]) -> list[bytes]:
+    """The lines that say which vertices belong together."""
+    return [line for line in lines if line[:2] in _ELEMENTS]
+
+
+def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
+    header = ply_header(data)
+    vertex = header.elements[0]
+    if not header.order or vertex.name != "vertex" or vertex.lists:
+        return lambda data: None
+    dtype = vertex.row(header.order, {})
+    head, end = data[: header.length], header.length + vertex.count * dtype.itemsize
+    tail = data[end:]
+
+    def points(data: bytes) -> np.ndarray | None:
+        if data[: len(head)] != head or data[end:] != tail:
+            return None
+        return ply_points(np.frombuffer(data, dtype, vertex.count, len(head)))
+
+    return points

@@ -1,0 +1,63 @@
+"""Times of formats that number their frames and say nothing of seconds, and of those that say only seconds.
+
+Where a file has no rate and none is given, frames come DEFAULT_FPS a second, and the clip states no rate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from athcodec.clip import DEFAULT_FPS
+
+DROP_FRAME = 1000 / 1001
+
+
+def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
+    """(T,) seconds from 0 of frames with these numbers in the tool that made them, and the metadata that says so.
+
+    Without a given rate the metadata has one only where the numbers do not follow one another: they could not be found
+    again from the times.
+    """
+    numbers = np.asarray(numbers, np.float64)
+    rate = fps or DEFAULT_FPS
+    metadata: dict[str, Any] = {"start_frame": whole(numbers[0])}
+    if fps is not None or (np.diff(numbers) != 1).any():
+        metadata["fps"] = float(rate)
+    return (numbers - numbers[0]) / rate, metadata
+
+
+def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
+    """(T,) seconds from 0 of frames whose times a file has as float32 or float64, and the metadata of their rate.
+
+    Where all times are whole multiples of a usual rate's step, but for the rounding of their own type, that rate is
+    meant: the clip then has it, and the times without the rounding. With a rate,
+    a first time that is not 0 gives "start_frame".
+    """
+    stored = np.asarray(stored)
+    times = stored.astype(np.float64)
+    for rate in [fps] if fps is not None else _usual_rates(times):
+        numbers = np.round(times * rate)
+        if np.array_equal((numbers / rate).astype(stored.dtype), stored):
+            return (numbers - numbers[0]) / rate, {"fps": float(rate)} | _start(numbers[0])
+    metadata = {} if fps is None else {"fps": float(fps)} | _start(round(float(times[0] * fps), 3))
+    return times - times[0], metadata
+
+
+def whole(number: float) -> int | float:
+    """The number, an int where it is whole."""
+    return int(number) if number == int(number) else float(number)
+
+
+def _start(number: float) -> dict[str, Any]:
+    return {"start_frame": whole(number)} if np.isfinite(number) and number else {}
+
+
+def _usual_rates(times: np.ndarray) -> list[float]:
+    if len(times) < 2 or not np.isfinite(times).all() or not times[1] > times[0]:
+        return []
+    step = np.median(np.diff(times))
+    nearest = np.round(1 / step) if step > 0 else 0
+    drop = np.round(1 / step / DROP_FRAME) if step > 0 else 0
+    return [float(nearest), *([float(drop) * DROP_FRAME] if drop in (24, 30, 60, 120) else [])] if nearest > 0 else []

@@ -1,0 +1,108 @@
+"""Small clips with meshes for tests of formats, and damaged copies of files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
+
+POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 2], [0, 3, 0], [0, 4, 0], [0.25, 5, 0.125]])
+
+
+def swaying(rest: np.ndarray, frames: int, dtype: object = np.float32) -> np.ndarray:
+    """(T, N, 3): moves more the higher up, by numbers with all their digits."""
+    rest = np.asarray(rest, np.float64)
+    amount = 0.1 * np.sin(np.arange(frames) / 3)[:, None] * rest[:, 1] ** 2 / 7
+    return (rest + amount[..., None] * np.array([1, 0.1, 0.3])).astype(dtype)
+
+
+def mixed_clip(frames: int = 6, dtype: object = np.float32, fps: float = 24.0, start: int = 1) -> MotionClip:
+    """A pyramid of a square and triangles, with texture coordinates per corner, and a line of three vertices."""
+    counts, corners = [4, 3, 3, 3, 3], [0, 1, 2, 3, 0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]
+    attributes = {"face_vertex_counts": np.array(counts, np.int32), "face_vertex_indices": np.array(corners, np.int32),
+                  "part_vertex_counts": np.array([5, 3], np.int32),
+                  "uv": np.random.default_rng(1).random((len(corners), 2)).astype(np.float32)}
+    domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "uv": "corner",
+               "part_vertex_counts": "constant"}
+    metadata = {"fps": fps, "start_frame": start, "part_names": ["leaf", "twig"], "part_kinds": ["mesh", "curves"],
+                "domains": domains}
+    return MotionClip(swaying(POINTS, frames, dtype), np.arange(frames) / fps, edges=np.array([[5, 6], [6, 7]]),
+                      attributes=attributes, metadata=metadata)
+
+
+def quad_clip(frames: int = 6, dtype: object = np.float32, rings: int = 6) -> MotionClip:
+    """A tube of quads, one object."""
+    angle = np.linspace(0, 2 * np.pi, 5)[:-1]
+    rest = np.array([[np.cos(a), 0.7 * ring, np.sin(a)] for ring in range(rings) for a in angle])
+    faces = np.array([[4 * r + i, 4 * r + (i + 1) % 4, 4 * r + 4 + (i + 1) % 4, 4 * r + 4 + i]
+                      for r in range(rings - 1) for i in range(4)], np.int32)
+    return MotionClip(swaying(rest, frames, dtype), np.arange(frames) / 24, faces=faces,
+                      attributes={"part_vertex_counts": np.array([len(rest)], np.int32)},
+                      metadata={"fps": 24.0, "start_frame": 1, "part_names": ["tube"], "part_kinds": ["mesh"],
+                                "domains": {"part_vertex_counts": "constant"}})
+
+
+def assert_same_motion(got: MotionClip, wanted: MotionClip, tolerance: float = 0.0) -> None:
+    """Positions and times; exactly, bit for bit, where there is no tolerance."""
+    assert (got.frame_count, got.vertex_count) == (wanted.frame_count, wanted.vertex_count)
+    a, b = got.block(0, got.frame_count), wanted.block(0, wanted.frame_count)
+    if tolerance:
+        assert np.abs(a.astype(float) - b).max() <= tolerance
+    else:
+        assert a.dtype == b.dtype and np.array_equal(a, b)
+    assert np.allclose(got.time - got.time[0], wanted.time - wanted.time[0], rtol=0, atol=1e-9)
+
+
+def assert_same_mesh(got: MotionClip, wanted: MotionClip) -> None:
+    assert (got.polygons is None) == (wanted.polygons is None) and (got.edges is None) == (wanted.edges is None)
+    if wanted.polygons is not None:
+        assert all(map(np.array_equal, got.polygons, wanted.polygons))
+    if wanted.edges is not None:
+        assert np.array_equal(got.edges, wanted.edges)
+
+
+def on_one_branch(clip: MotionClip) -> MotionClip:
+    """The clip as the encoder takes it."""
+    return dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]),
+                               rest=clip.rest.astype(clip.rest_dtype))
+
+
+def coded(clip: MotionClip, folder: Path, rel_error: float = 1e-4) -> Path:
+    path = folder / "coded.ath"
+    athcodec.encode(on_one_branch(clip), path, rel_error=rel_error)
+    return path
+
+
+def damaged(data: bytes, seed: int = 0, cuts: int = 25, changes: int = 40) -> Iterator[bytes]:
+    """The bytes cut at many places, and with some of them changed at random."""
+    rng = np.random.default_rng(seed)
+    for length in {0, 1, 3, len(data) - 1, *rng.integers(0, len(data), cuts).tolist()}:
+        yield data[:length]
+    for _ in range(changes):
+        changed = bytearray(data)
+        head = min(len(data), 600) if rng.random() < 0.6 else len(data)
+        for place in rng.integers(0, head, rng.integers(1, 4)):
+            changed[place] = rng.integers(0, 256)
+        yield bytes(changed)
+
+
+def survives_damage(path: Path, read: Callable[[], MotionClip], seed: int = 0, **how_often: int) -> int:
+    """Reads damaged copies in place of the file; how many were refused. Anything but ClipError and OSError fails."""
+    whole, refused = path.read_bytes(), 0
+    for data in damaged(whole, seed, **how_often):
+        path.write_bytes(data)
+        try:
+            with read() as clip:
+                for _ in clip.blocks():
+                    pass
+        except (ClipError, OSError) as error:
+            assert "\n" not in str(error)
+            refused += 1
+    path.write_bytes(whole)
+    return refused

@@ -1,0 +1,41 @@
+"""Other programs for tests marked `programs`: found by an environment variable, or installed where that is not set."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import venv
+from functools import cache
+from pathlib import Path
+
+CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "athcodec-tests"
+
+
+@cache
+def blender_python() -> str:
+    """A Python that has bpy: that of ATHCODEC_BLENDER, else one in a virtual environment made here."""
+    return os.environ.get("ATHCODEC_BLENDER") or _environment("bpy", "bpy")
+
+
+@cache
+def vtk_python() -> str:
+    """A Python that has vtk and pyvista: that of ATHCODEC_VTK, else one in a virtual environment made here."""
+    return os.environ.get("ATHCODEC_VTK") or _environment("vtk", "vtk", "pyvista")
+
+
+def run_script(python: str, script: str, *arguments: object) -> str:
+    """What the script prints; its errors with a failed run."""
+    done = subprocess.run([python, "-c", script, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stdout
+
+
+def _environment(name: str, *packages: str) -> str:
+    folder = CACHE / f"{name}-{sys.version_info.major}.{sys.version_info.minor}"
+    python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if not (folder / "installed").exists():
+        venv.create(folder, with_pip=True, clear=True)
+        subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
+        (folder / "installed").touch()
+    return str(python)

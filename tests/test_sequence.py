@@ -1,0 +1,255 @@
+"""Numbered OBJ and PLY files: names and numbers, what is kept, what other libraries make of them, broken files."""
+
+from __future__ import annotations
+
+import os
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError
+from athcodec.excerpt import Excerpt
+from athcodec.sources.mesh import parse_mesh
+from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
+
+TRIANGLE = "v 0 0 {}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def obj(text: str):
+    return parse_mesh(text.encode(), "leaf.obj")
+
+
+def write_triangles(folder, names):
+    for z, name in enumerate(names):
+        (folder / name).write_text(TRIANGLE.format(z))
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("make", [mixed_clip, quad_clip])
+def test_a_motion_comes_back_bit_for_bit(tmp_path, suffix, dtype, make):
+    clip = make(dtype=dtype)
+    athcodec.write(clip, tmp_path / f"tree{suffix}")
+    assert sorted(os.listdir(tmp_path)) == [f"tree_000{i}{suffix}" for i in range(1, 7)]
+    with athcodec.read(tmp_path / f"tree_0003{suffix}", fps=24) as again:
+        assert_same_motion(again, clip)
+        assert_same_mesh(again, clip)
+        assert again.metadata["fps"] == 24 and again.metadata["start_frame"] == 1
+        if "uv" in clip.attributes:
+            assert np.array_equal(again.attributes["uv"], clip.attributes["uv"])
+            assert again.metadata["domains"]["uv"] == "corner"
+        if suffix == ".obj" and make is mixed_clip:
+            assert again.metadata == clip.metadata
+            assert again.attributes["part_vertex_counts"].tolist() == [5, 3]
+
+
+def test_what_vertices_have_beside_a_position_comes_back_from_ply(tmp_path):
+    clip, count = quad_clip(), 24
+    more = {"colors": np.arange(3 * count, dtype=np.uint8).reshape(-1, 3), "radius": np.linspace(0, 1, count),
+            "branch": np.arange(count, dtype=np.int32), "uv": np.ones((count, 2), np.float32)}
+    clip.attributes |= more
+    athcodec.write(clip, tmp_path / "tree.ply")
+    with athcodec.read(tmp_path / "tree_0001.ply") as again:
+        for name, values in more.items():
+            assert np.array_equal(again.attributes[name], values) and again.attributes[name].dtype == values.dtype
+
+
+@pytest.mark.parametrize("named", ["t_2.obj", "t_10.obj", "t_#.obj", "t_%d.obj"])
+def test_numbers_without_zeros_and_with_gaps_are_frames(tmp_path, named):
+    write_triangles(tmp_path, ["t_2.obj", "t_3.obj", "t_10.obj", "t_x.obj", "u_4.obj", "t_0004.obj.bak"])
+    with athcodec.read(tmp_path / named, fps=10) as clip:
+        assert clip.metadata["start_frame"] == 2 and np.allclose(clip.time, [0, 0.1, 0.8])
+        assert clip.block(0, 3)[:, 0, 2].tolist() == [0, 1, 2]
+        athcodec.write(clip, tmp_path / "v.obj")
+    assert sorted(path.name for path in tmp_path.glob("v*")) == ["v_0002.obj", "v_0003.obj", "v_0010.obj"]
+
+
+def test_numbers_that_outgrow_their_zeros_go_on(tmp_path):
+    write_triangles(tmp_path, ["a099.obj", "a100.obj", "a1000.obj", "a7.obj"])
+    for named in ("a099.obj", "a100.obj", "a###.obj", "a%03d.obj", "a1000.obj"):
+        with athcodec.read(tmp_path / named, fps=1) as clip:
+            assert clip.time.tolist() == [0, 1, 901]
+
+
+def test_a_single_file_is_a_single_frame(tmp_path):
+    write_triangles(tmp_path, ["leaf.obj", "leaf_0001.obj"])
+    with athcodec.read(tmp_path / "leaf.obj") as clip:
+        assert clip.frame_count == 1 and "start_frame" not in clip.metadata
+        athcodec.write(clip, tmp_path / "copy.obj")
+    assert (tmp_path / "copy.obj").exists()
+
+
+def test_changing_topology_is_refused_with_the_frame(tmp_path):
+    for text, message in (("v 0 0 1\nv 1 0 0\nv 0 1 0\nf 1 3 2\n", "got other faces"),
+                          (TRIANGLE.format(1) + "v 1 1 1\n", "got 4 vertices, expected 3"),
+                          (TRIANGLE.format(1) + "l 1 2\n", "got further edges"),
+                          ("v 0 0 1\nv 1 0 0\nv 0 1 0\n", "got no faces")):
+        write_triangles(tmp_path, [f"a_{i}.obj" for i in range(4)])
+        (tmp_path / "a_2.obj").write_text(text)
+        with athcodec.read(tmp_path / "a_0.obj") as clip:
+            with pytest.raises(ClipError, match=rf"frame 2, a_2\.obj: {message}"):
+                list(clip.blocks())
+
+
+def test_normals_and_names_that_change_from_file_to_file_are_no_topology(tmp_path):
+    for i in range(3):
+        (tmp_path / f"a_{i}.obj").write_text(
+            f"mtllib a_{i}.mtl\no leaf{i}\nv 0 0 {i}\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n" + "vn 1 0 0\n" * i
+            + f"f 1//{i + 1} 2//1 3//1\n")
+    with athcodec.read(tmp_path / "a_1.obj") as clip:
+        assert clip.block(0, 3)[:, 0, 2].tolist() == [0, 1, 2] and clip.faces.tolist() == [[0, 1, 2]]
+
+
+def test_obj_as_people_write_it():
+    mesh = obj("# a leaf\r\nv  0 0 0 1 0 0\r\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\nvt 1 1\n"
+               "usemtl green\nf -4/1/1 -3/2/1 \\\n -2/3/1\nusemtl bark\nf 1 3 4\nl 1 2 3\np 4\ns off\ncstype bezier\n")
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.edges.tolist() == [[0, 1], [1, 2]]
+    assert mesh.attributes["colors"].tolist()[3] == [1, 1, 1] and mesh.points.dtype == np.float32
+    assert mesh.attributes["uv"].tolist() == [[0, 0], [1, 0], [1, 1], [0, 0], [0, 0], [0, 0]]
+    assert mesh.attributes["face_material"].tolist() == [0, 1]
+    assert mesh.metadata["material_names"] == ["green", "bark"] and mesh.metadata["part_names"] == ["leaf"]
+
+
+def test_objects_and_groups_are_parts_where_their_vertices_lie_together():
+    squares = "v 0 0 0\nv 1 0 0\nv 0 1 0\n{}v 0 0 1\nv 1 0 1\nv 0 1 1\n{}"
+    for word in ("o", "g"):
+        mesh = obj(f"{word} leaf one\n" + squares.format(f"f 1 2 3\n{word} twig\n", "f 4 5 6\n"))
+        assert mesh.metadata["part_names"] == ["leaf one", "twig"]
+        assert mesh.attributes["part_vertex_counts"].tolist() == [3, 3]
+    behind = obj(squares.format("", "g leaf\nf 1 2 3\ng twig\nl 4 5 6\n"))
+    assert behind.metadata["part_kinds"] == ["mesh", "curves"]
+    shared = obj(squares.format("", "g a\nf 1 2 6\ng b\nf 3 4 5\n"))
+    assert shared.metadata["part_names"] == ["leaf"] and shared.attributes["face_group"].tolist() == [0, 1]
+    assert shared.metadata["group_names"] == ["a", "b"]
+
+
+def test_digits_beyond_float32_are_kept():
+    assert obj("v 123456.7890123 0 0\n").points[0, 0] == 123456.7890123
+    assert obj("v 0.000123456000 -1.25e-10 12.3456780\n").points.dtype == np.float32
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_ply_files_of_other_libraries_are_read(tmp_path, form):
+    clip = mixed_clip()
+    cells = [("quad", [[0, 1, 2, 3]]), ("triangle", clip.polygons[1][4:].reshape(-1, 3))]
+    for frame, points in enumerate(clip.block(0, 6)):
+        meshio.write(tmp_path / f"m_{frame}.ply", meshio.Mesh(points, cells), binary=form != "ascii")
+    with athcodec.read(tmp_path / "m_0.ply", fps=24) as again:
+        assert_same_motion(again, clip)
+        assert all(map(np.array_equal, again.polygons, clip.polygons))
+    triangles = trimesh.Trimesh(clip.block(5, 6)[0], [[0, 1, 4], [1, 2, 4]], process=False)
+    triangles.export(tmp_path / "t.ply", encoding="ascii" if form == "ascii" else "binary", vertex_normal=True)
+    with athcodec.read(tmp_path / "t.ply") as again:
+        assert np.allclose(again.block(0, 1)[0], clip.block(5, 6)[0], rtol=0, atol=1e-7)
+        assert again.faces.tolist() == [[0, 1, 4], [1, 2, 4]] and "nx" not in again.attributes
+
+
+def test_obj_files_of_other_libraries_are_read(tmp_path):
+    clip = quad_clip()
+    for frame, points in enumerate(clip.block(0, 6)):
+        meshio.write(tmp_path / f"m{frame:03}.obj", meshio.Mesh(points, [("quad", clip.faces)]))
+    with athcodec.read(tmp_path / "m###.obj", fps=24) as again:
+        assert_same_motion(again, clip, 1e-6)
+        assert np.array_equal(again.faces, clip.faces)
+    triangles = trimesh.Trimesh(clip.block(0, 1)[0], clip.faces[:, :3], process=False)
+    triangles.export(tmp_path / "t.obj", include_normals=True)
+    with athcodec.read(tmp_path / "t.obj") as again:
+        assert np.array_equal(again.faces, clip.faces[:, :3]) and np.allclose(again.block(0, 1)[0], triangles.vertices)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_other_libraries_read_what_is_written(tmp_path, suffix):
+    clip = quad_clip()
+    athcodec.write(clip, tmp_path / f"tree{suffix}")
+    for frame, wanted in enumerate(clip.block(0, 6), 1):
+        path = tmp_path / f"tree_000{frame}{suffix}"
+        theirs = meshio.read(path)
+        assert np.array_equal(theirs.points.astype(np.float32), wanted)
+        assert np.array_equal(theirs.cells_dict["quad"], clip.faces)
+        loaded = trimesh.load(path, process=False, maintain_order=True)
+        assert np.allclose(loaded.vertices, wanted, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_end_to_end_the_bound_holds(tmp_path, suffix):
+    clip = quad_clip(frames=20)
+    with athcodec.open(coded(clip, tmp_path)) as decoder:
+        athcodec.write(Excerpt(decoder), tmp_path / f"out{suffix}")
+        bound = decoder.max_error_bound
+    with athcodec.read(tmp_path / f"out_0001{suffix}") as again:
+        off = np.linalg.norm(again.block(0, 20).astype(float) - clip.block(0, 20), axis=2)
+        assert off.max() <= bound and np.array_equal(again.faces, clip.faces)
+
+
+def test_a_path_may_say_how_files_are_numbered(tmp_path):
+    for path, first in (("a.##.obj", "a.01.obj"), ("b%03d.ply", "b001.ply"), ("c_00.obj", "c_01.obj")):
+        athcodec.write(quad_clip(frames=2), tmp_path / path)
+        assert first in os.listdir(tmp_path)
+
+
+def test_times_between_frames_number_the_files_from_one(tmp_path):
+    clip = MotionClip(quad_clip(frames=3).block(0, 3), np.array([0, 0.1, 0.35]))
+    athcodec.write(clip, tmp_path / "a.obj")
+    assert sorted(os.listdir(tmp_path)) == ["a_0001.obj", "a_0002.obj", "a_0003.obj"]
+
+
+def test_files_of_another_motion_are_not_mixed_in(tmp_path):
+    athcodec.write(quad_clip(frames=5), tmp_path / "a.obj")
+    before = {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)}
+    with pytest.raises(ClipError, match=r"a_0004\.obj: is there already and no frame of the clip"):
+        athcodec.write(quad_clip(frames=3, dtype=np.float64), tmp_path / "a.obj")
+    assert {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)} == before
+    athcodec.write(quad_clip(frames=6), tmp_path / "a.obj")
+    assert len(os.listdir(tmp_path)) == 6
+
+
+def test_a_failed_write_leaves_nothing(tmp_path):
+    positions = np.array(quad_clip().positions)
+    positions[5, 0, 0] = np.nan
+    with pytest.raises(ClipError, match="frame 5"):
+        athcodec.write(MotionClip(positions, np.arange(6.0)), tmp_path / "a.obj")
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["tree_0001.obj", "tree_0003.obj", "tree_0001.ply", "tree_0003.ply"])
+def test_damage_is_an_error_and_nothing_worse(tmp_path, name):
+    athcodec.write(mixed_clip(frames=4), tmp_path / f"tree{name[-4:]}")
+    assert survives_damage(tmp_path / name, lambda: athcodec.read(tmp_path / f"tree_0002{name[-4:]}")) > 15
+
+
+PLY = "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n{}end_header\n"
+FACES = "element face {}\nproperty list int int vertex_indices\n"
+REFUSED = {
+    "no vertices": ("a.obj", "f 1 2 3\n", "got no vertices"),
+    "no such vertex": ("a.obj", "v 0 0 0\nf 1 2 3\n", "faces: got the number 1"),
+    "vertex 0": ("a.obj", "v 0 0 0\nf 0 0 0\n", "got the number 0"),
+    "two coordinates": ("a.obj", "v 0 0\n", "fewer than three"),
+    "no number": ("a.obj", "v 0 0 x\n", "could not convert"),
+    "too large": ("a.obj", "v 0 0 1e40\n", "frame 0, vertex 0"),
+    "no PLY": ("a.ply", "v 0 0 0\n", "expected a PLY file"),
+    "no end": ("a.ply", "ply\nformat ascii 1.0\n", "no end of the header"),
+    "vertices to come": ("a.ply", PLY.format("ascii", 10**12, ""), "end of the file"),
+    "binary to come": ("a.ply", PLY.format("binary_big_endian", 10**15, ""), "end of the file"),
+    "lists to come": ("a.ply", PLY.format("ascii", 1, FACES.format(1)) + "0 0 0\n2000000000 1 2 3", "got a list of"),
+    "negative list": ("a.ply", PLY.format("ascii", 1, FACES.format(1)) + "0 0 0\n-1 1 2 3", "got a list of -1"),
+    "another type": ("a.ply", PLY.format("ascii", 1, "property quad w\n") + "0 0 0 0\n", "expected a type of PLY"),
+}
+
+
+@pytest.mark.parametrize("name, text, message", REFUSED.values(), ids=REFUSED)
+def test_a_broken_file_is_refused_and_named(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ClipError, match=message) as caught:
+        athcodec.read(tmp_path / name)
+    assert str(tmp_path / name) in str(caught.value)
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(ClipError, match="got no such files, expected some like a_0001.obj"):
+        athcodec.read(tmp_path / "a_####.obj")
+    with pytest.raises(FileNotFoundError):
+        athcodec.read(tmp_path / "a_0001.obj")
