@@ -1,8 +1,8 @@
 """Writes PC2 point caches, and beside them, where there are faces or edges, the mesh that they move as OBJ.
 
 A cache holds float32 positions and a start frame, at one step from frame to frame: clips whose times are uneven are
-refused (MDD has a time per frame). Blender takes both files: import the OBJ with "Y forward, Z up", so that its axes stay
-as they are, then add a Mesh Cache modifier. A mesh that is there already stays as it is where its vertices,
+refused (MDD has a time per frame). Blender takes both files: import the OBJ with "Y forward, Z up", so that its axes
+stay as they are, then add a Mesh Cache modifier. A mesh that is there already stays as it is where its vertices,
 faces and edges are those of the clip, so that materials in it are kept; another one is never replaced.
 """
 

@@ -1,0 +1,65 @@
+"""Writes a NumPy archive (.npz) with the names of athcodec's HDF5 schema, frame block by frame block.
+
+numpy.load opens it without pickles; metadata are JSON text in the array `metadata`. Without gzip the positions lie in it
+as they are, so that they can be read in any order. The same clip gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from athcodec.clip import RESERVED_NAMES
+from athcodec.errors import ClipError
+from athcodec.exporters import WriteOptions
+from athcodec.files import new_file
+from athcodec.hierarchy import branch_orders
+from athcodec.sources.npz import METADATA
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+    """Write the archive. Raises ClipError where an attribute's name is taken, OSError where nothing can be written."""
+    arrays = _arrays(motion)
+    packing = zipfile.ZIP_DEFLATED if options.gzip else zipfile.ZIP_STORED
+    with new_file(path) as file, zipfile.ZipFile(file, "w") as archive:
+        for name, values in arrays.items():
+            with _member(archive, name, packing) as member:
+                np.lib.format.write_array(member, values, allow_pickle=False)
+        with _member(archive, "positions", packing) as member:
+            _write_positions(motion, member, report)
+
+
+def _member(archive: zipfile.ZipFile, name: str, packing: int) -> Any:
+    info = zipfile.ZipInfo(f"{name}.npy")
+    info.compress_type, info.external_attr = packing, 0o644 << 16
+    return archive.open(info, "w", force_zip64=True)
+
+
+def _write_positions(motion: Any, member: Any, report: Callable[[float], None]) -> None:
+    shape, dtype = (motion.frame_count, motion.vertex_count, 3), motion.dtype.newbyteorder("<")
+    np.lib.format.write_array_header_1_0(
+        member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape})
+    for start, frames in motion.blocks():
+        member.write(np.ascontiguousarray(frames, dtype).data.cast("B"))
+        report((start + len(frames)) / motion.frame_count)
+
+
+def _arrays(motion: Any) -> dict[str, np.ndarray]:
+    taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
+    if taken:
+        raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    rest = np.asarray(motion.rest)
+    arrays = {"time": motion.time, "rest": rest.astype(getattr(motion, "rest_dtype", rest.dtype))}
+    if motion.branch_parent is not None:
+        arrays["branch_order"] = branch_orders(motion.branch_parent)
+    for name in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
+        arrays[name] = getattr(motion, name)
+    arrays |= motion.attributes
+    if motion.metadata:
+        arrays[METADATA] = np.array(json.dumps(motion.metadata))
+    return {name: np.asarray(values) for name, values in arrays.items() if values is not None}

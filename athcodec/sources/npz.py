@@ -1,0 +1,217 @@
+"""Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py) into a MotionClip.
+
+Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked as
+they are asked for: forward without a detour, backward from the start again. Every other array is static and survives by
+its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON text, and the
+scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike, fspath
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec.clip import RESERVED_NAMES, MotionClip, check_finite, check_float_dtype, frame_rate
+from athcodec.errors import ClipError
+from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.sources import ReadOptions
+from athcodec.sources.frames import Frames
+from athcodec.sources.raw import raw_frames, read_exactly, watch
+
+MAX_ARRAY_BYTES = 1 << 30
+SCALARS = ("fps", "start_frame", "unit", "up_axis")
+METADATA = "metadata"
+SKIP_BYTES = 1 << 20
+_LOCAL_HEADER = struct.Struct("<4s22xHH")
+_BROKEN = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, KeyError, RuntimeError,
+           NotImplementedError, struct.error, MemoryError, OverflowError, TypeError, SyntaxError)
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """Open the clip in the archive `path`. Raises ClipError where it is no archive or its arrays are no usable clip,
+    OSError where it cannot be opened."""
+    file = open(path, "rb", buffering=0)
+    try:
+        return _read(file, options)
+    except _BROKEN as error:
+        file.close()
+        raise ClipError(f"{fspath(path)}: {error}") from None
+    except BaseException:
+        file.close()
+        raise
+
+
+@contextmanager
+def _naming(name: str) -> Iterator[None]:
+    """Errors of the block say which array they are about."""
+    try:
+        yield
+    except ClipError:
+        raise
+    except _BROKEN as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise ClipError(f"{name}: the array cannot be read: {text}") from None
+
+
+def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
+    archive = zipfile.ZipFile(file)
+    members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()
+               if info.filename.endswith(".npy")}
+    if "positions" not in members:
+        raise ClipError("positions: got no such array, expected (frames, vertices, 3)")
+    with _naming("positions"):
+        positions = _Positions(file, archive, members.pop("positions")).frames()
+    arrays = {name: _array(archive, name, info) for name, info in members.items()
+              if name in RESERVED_NAMES or name not in options.skip}
+    metadata = _metadata(arrays)
+    clip = MotionClip(
+        positions,
+        arrays.pop("time") if "time" in arrays else np.arange(len(positions)) / frame_rate(metadata),
+        rest=arrays.get("rest") if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        edges=arrays.get("edges"),
+        faces=arrays.get("faces"),
+        attributes={name: values for name, values in arrays.items() if name not in RESERVED_NAMES},
+        metadata=metadata, resource=file, unchanged=watch(file),
+        **_branches(arrays, positions, metadata, options),
+    )
+    order = clip.attributes.get("branch_order")
+    if order is not None and clip.has_branches and np.array_equal(order, branch_orders(clip.branch_parent)):
+        del clip.attributes["branch_order"]
+    return clip
+
+
+def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.ndarray:
+    if info.file_size > MAX_ARRAY_BYTES:
+        raise ClipError(f"{name}: got {info.file_size} bytes, expected a static array of at most {MAX_ARRAY_BYTES}; or "
+                        "skip it")
+    with _naming(name), archive.open(info) as member:
+        values = np.lib.format.read_array(member, allow_pickle=False)
+        if member.read(1):
+            raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
+    return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
+
+
+def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Taken out of the arrays."""
+    metadata = {}
+    for name in SCALARS:
+        if name in arrays and arrays[name].ndim == 0 and arrays[name].dtype.kind in "biufUS":
+            metadata[name] = _text(arrays.pop(name).item())
+    if METADATA in arrays:
+        try:
+            found = json.loads(_text(arrays.pop(METADATA).reshape(()).item()))
+        except (ValueError, TypeError) as error:
+            raise ClipError(f"{METADATA}: got no JSON text, expected one: {error}") from None
+        if not isinstance(found, dict):
+            raise ClipError(f"{METADATA}: got a {type(found).__name__}, expected a JSON object")
+        metadata |= found
+    return metadata
+
+
+def _text(value: Any) -> Any:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+
+
+def _branches(arrays: dict[str, np.ndarray], positions: Any, metadata: dict[str, Any],
+              options: ReadOptions) -> dict[str, np.ndarray | None]:
+    found = {name: arrays.get(name) for name in ("vertex_branch", "branch_parent", "stem_index")}
+    known = [found[name] is not None for name in ("vertex_branch", "branch_parent")]
+    if any(known) or arrays.get("edges") is None:
+        return found if any(known) else {}
+    rest = arrays.get("rest")
+    if rest is None or np.shape(rest) != positions.shape[1:]:
+        rest = np.asarray(positions[0:1])[0]
+        check_finite(rest[None])
+    names = ("vertex_branch", "branch_parent", "stem_index")
+    up_axis = metadata.get("up_axis", "y")
+    return dict(zip(names, branches_from_edges(arrays["edges"], len(rest), rest, options.root, up_axis), strict=True))
+
+
+class _Positions:
+    """The member with the positions: where it lies, or how it is unpacked."""
+
+    def __init__(self, file: BinaryIO, archive: zipfile.ZipFile, info: zipfile.ZipInfo):
+        self._file, self._archive, self._info = file, archive, info
+        with archive.open(info) as member:
+            shape, self._fortran, self.dtype = _header(member)
+            self._header_bytes = member.tell()
+        if len(shape) != 3 or shape[2] != 3 or min(shape) < 1:
+            raise ClipError(f"positions: got shape {shape}, expected (frames, vertices, 3)")
+        check_float_dtype("positions", self.dtype)
+        self.shape = tuple(int(size) for size in shape)
+        size = self.shape[0] * self.shape[1] * 3 * self.dtype.itemsize
+        if self._header_bytes + size != info.file_size:
+            raise ClipError(f"positions: got {info.file_size - self._header_bytes} bytes, expected {size} for {shape}")
+        self._member: Any = None
+        self._next = 0
+
+    def frames(self) -> Any:
+        if self._info.compress_type != zipfile.ZIP_STORED:
+            if self._fortran:
+                raise ClipError("positions: got a compressed array in Fortran order, expected C order: frame by frame")
+            return Frames(self._unpack, *self.shape[:2], self.dtype.newbyteorder("="))
+        if self._info.flag_bits & 1:
+            raise ClipError("positions: got an encrypted array, expected a plain one")
+        offset = self._offset()
+        if self._fortran:
+            return np.memmap(self._file.name, self.dtype, "r", offset, self.shape, "F")
+        return raw_frames(self._file, offset, *self.shape[:2], self.dtype)
+
+    def _offset(self) -> int:
+        """Where the numbers begin in the file: each member has a header of its own length before it."""
+        at = self._info.header_offset
+        self._file.seek(at)
+        magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, "positions"))
+        if magic != b"PK\3\4":
+            raise ClipError("positions: got no header of a member, expected one")
+        start = at + _LOCAL_HEADER.size + name_bytes + extra_bytes
+        self._file.seek(0, 2)
+        if start + self._info.file_size > self._file.tell():
+            raise ClipError("positions: got the end of the file, expected the array")
+        return start + self._header_bytes
+
+    def _unpack(self, start: int, stop: int) -> np.ndarray:
+        if self._file.closed:
+            raise ClipError("got a closed file, expected an open one")
+        frame_bytes = self.shape[1] * 3 * self.dtype.itemsize
+        with _naming("positions"):
+            if self._member is None or start < self._next:
+                self._member, self._next = self._archive.open(self._info), 0
+                self._skip(self._header_bytes)
+            self._skip((start - self._next) * frame_bytes)
+            self._next = self.shape[0] + 1  # until it is known to be right
+            data = bytearray()
+            while len(data) < (stop - start) * frame_bytes:
+                data += self._some((stop - start) * frame_bytes - len(data))
+            self._next = stop
+        block = np.frombuffer(data, self.dtype).reshape(stop - start, *self.shape[1:])
+        return block.astype(self.dtype.newbyteorder("="), copy=False)
+
+    def _skip(self, size: int) -> None:
+        while size:
+            size -= len(self._some(min(size, SKIP_BYTES)))
+
+    def _some(self, size: int) -> bytes:
+        got = self._member.read(size)
+        if not got:
+            raise ClipError("positions: got the end of the array, expected frames")
+        return got
+
+
+def _header(member: Any) -> tuple[tuple[int, ...], bool, np.dtype]:
+    version = np.lib.format.read_magic(member)
+    if version == (1, 0):
+        return np.lib.format.read_array_header_1_0(member)
+    if version == (2, 0):
+        return np.lib.format.read_array_header_2_0(member)
+    raise ClipError(f"positions: got version {version} of NumPy's format, expected (1, 0) or (2, 0)")
