@@ -1,7 +1,7 @@
 """Writes a NumPy archive (.npz) with the names of athcodec's HDF5 schema, frame block by frame block.
 
-numpy.load opens it without pickles; metadata are JSON text in the array `metadata`. Without gzip the positions lie in it
-as they are, so that they can be read in any order. The same clip gives the same bytes.
+`numpy.load` opens it without pickles; metadata are JSON text in the array `metadata`. Without gzip the positions lie in
+it as they are, so that they can be read in any order. The same clip gives the same bytes.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py) into a MotionClip.
 
-Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked as
-they are asked for: forward without a detour, backward from the start again. Every other array is static and survives by
-its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON text, and the
-scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
+Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
+as they are asked for: forward without a detour, backward from the start again. Every other array is static and
+survives by its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON
+text, and the scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
 """
 
 from __future__ import annotations

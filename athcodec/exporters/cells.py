@@ -1,0 +1,71 @@
+"""The cells of a finite-element mesh that a clip's faces, edges and attributes stand for; see sources/cells.py.
+
+Where the clip has volume cells as attributes (cells_tetra ...) they are written, and not the faces of their outside. A
+clip without faces, edges and volumes becomes a point cell per vertex.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.exporters.mesh import domain_of
+from athcodec.sources.cells import NODES, VTK_NUMBERS
+
+
+@dataclass
+class Cells:
+    """VTK's numbers of the types (C,), where the nodes of each end (C,), and the nodes; all int64. domain: which data
+    have a row per cell, "" for none."""
+
+    types: np.ndarray
+    stops: np.ndarray
+    nodes: np.ndarray
+    domain: str
+
+
+def cells_of(motion: Any) -> Cells:
+    kinds, counts, nodes, domains = [], [], [], []
+    volumes = {name.removeprefix("cells_"): values for name, values in motion.attributes.items()
+               if name.startswith("cells_") and values.ndim == 2 and values.shape[1:] == (NODES.get(name[6:]),)}
+    if motion.edges is not None and len(motion.edges):
+        _add(kinds, counts, nodes, "line", np.asarray(motion.edges))
+        domains.append("edge")
+    if motion.polygons is not None and len(motion.polygons[0]) and not volumes:
+        sizes, corners = motion.polygons
+        kinds.append(np.select([sizes == 3, sizes == 4], [VTK_NUMBERS["triangle"], VTK_NUMBERS["quad"]],
+                               VTK_NUMBERS["polygon"]))
+        counts.append(sizes)
+        nodes.append(corners)
+        domains.append("face")
+    for kind, values in volumes.items():
+        _add(kinds, counts, nodes, kind, values)
+    domains += ["cell"] * bool(volumes)
+    if not kinds:
+        _add(kinds, counts, nodes, "vertex", np.arange(motion.vertex_count)[:, None])
+    types, counts, nodes = (np.concatenate(parts).astype(np.int64) for parts in (kinds, counts, nodes))
+    return Cells(types, np.cumsum(counts), nodes, domains[0] if len(domains) == 1 else "")
+
+
+def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) -> None:
+    kinds.append(np.full(len(values), VTK_NUMBERS[kind]))
+    counts.append(np.full(len(values), values.shape[1]))
+    nodes.append(values.reshape(-1))
+
+
+def cell_and_point_data(motion: Any, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """(per point, per cell): the attributes with a row of numbers for each, at most nine."""
+    per_point, per_cell = {}, {}
+    for name, values in motion.attributes.items():
+        fits = values.ndim in (1, 2) and values.dtype.kind in "fiu" and values.dtype.itemsize in (1, 2, 4, 8)
+        if not fits or (values.ndim == 2 and not 1 <= values.shape[1] <= 9) or values.dtype == np.float16:
+            continue
+        domain = domain_of(motion, name)
+        if domain == "vertex" and len(values) == motion.vertex_count:
+            per_point[name] = values
+        elif domain and domain == cells.domain and len(values) == len(cells.types):
+            per_cell[name] = values
+    per_cell.pop("face_vertex_counts", None)
+    return per_point, per_cell

@@ -1,0 +1,101 @@
+"""Writes a series of VTU files, and a .pvd that lists them with their times: ParaView opens that.
+
+Each file has the moved points, all cells, and the attributes per vertex, and those per cell where all cells are of one
+kind. Files are numbered as sequence.py does. Both tree.pvd and tree.vtu give tree_0001.vtu ... and tree.pvd; a single
+frame written to tree.vtu is that file alone. Numbers are as in the clip, packed by zlib with gzip.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import zlib
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any, BinaryIO
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from athcodec.exporters import WriteOptions
+from athcodec.exporters.cells import cell_and_point_data, cells_of
+from athcodec.exporters.sequence import file_names
+from athcodec.files import check_target, new_files
+
+_HEAD = ('<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+         'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n')
+
+
+def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
+    """Write all files. Raises ClipError where there are others of the same numbering, OSError where nothing can be
+    written."""
+    target = Path(check_target(path))
+    names = file_names(motion, target.with_suffix(".vtu"))
+    index = "" if names == [target.name] else f"{_stem(target)}.pvd"
+    if names == [target.with_suffix(".vtu").name] and index:
+        names = [f"{target.stem}_0001.vtu"]
+    writer = _VtuWriter(motion, options.gzip)
+    with new_files(target, named=False) as folder:
+        for start, frames in motion.blocks():
+            for frame, points in enumerate(frames, start):
+                with open(os.path.join(folder, names[frame]), "wb") as file:
+                    writer.write(file, points)
+                report((frame + 1) / motion.frame_count)
+        if index:
+            Path(folder, index).write_text(_index(motion, names), "utf-8")
+
+
+def _stem(target: Path) -> str:
+    """Of the index: the name of the series without what stands for its numbers."""
+    if target.suffix.lower() == ".pvd":
+        return target.stem
+    bare = target.stem.rstrip("0123456789").partition("#")[0].partition("%")[0].rstrip("_-. ")
+    return bare or target.stem
+
+
+def _index(motion: Any, names: list[str]) -> str:
+    lines = [f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>\n'
+             for time, name in zip(np.asarray(motion.time).tolist(), names, strict=True)]
+    return ('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n<Collection>\n'
+            + "".join(lines) + "</Collection>\n</VTKFile>\n")
+
+
+class _VtuWriter:
+    """VTU files of one clip; write(file, points) for each. What does not move is put together once."""
+
+    def __init__(self, motion: Any, packed: bool):
+        cells = cells_of(motion)
+        self._packed = packed
+        compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
+        self._head = _HEAD.format(compressor, motion.vertex_count, len(cells.types)).encode()
+        per_point, per_cell = cell_and_point_data(motion, cells)
+        described = {"connectivity": cells.nodes, "offsets": cells.stops, "types": cells.types.astype(np.uint8)}
+        parts = [b"</Points>\n", *self._section("Cells", described), *self._section("PointData", per_point),
+                 *self._section("CellData", per_cell), b"</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"]
+        self._tail = b"".join(parts)
+
+    def write(self, file: BinaryIO, points: np.ndarray) -> None:
+        file.write(self._head)
+        file.write(self._array("Points", points))
+        file.write(self._tail)
+
+    def _section(self, tag: str, arrays: dict[str, np.ndarray]) -> list[bytes]:
+        return [f"<{tag}>\n".encode(), *(self._array(name, values) for name, values in arrays.items()),
+                f"</{tag}>\n".encode()]
+
+    def _array(self, name: str, values: np.ndarray) -> bytes:
+        kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
+        width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+        raw = np.ascontiguousarray(values, values.dtype.newbyteorder("<")).tobytes()
+        opened = f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="binary">'
+        return opened.encode() + self._encoded(raw) + b"</DataArray>\n"
+
+    def _encoded(self, raw: bytes) -> bytes:
+        if not self._packed:
+            return base64.b64encode(np.uint64(len(raw)).tobytes() + raw)
+        if not raw:
+            return base64.b64encode(np.zeros(3, "<u8").tobytes())
+        packed = zlib.compress(raw)
+        counts = np.array([1, len(raw), 0, len(packed)], "<u8")
+        return base64.b64encode(counts.tobytes()) + base64.b64encode(packed)

@@ -1,0 +1,333 @@
+"""Reads VTK results: .vtu files listed with their times in a .pvd, or numbered .vtu or .vtk files.
+
+Numbered files are found from any one of them, or by a pattern, as sequence.py says; frames then come options.fps a
+second, DEFAULT_FPS (30) without it, and a .pvd beside them that lists the file gives the times instead. See fields.py
+for what becomes the motion and cells.py for the cells. VTU: text, base64 and appended data, plain or compressed by zlib
+or LZMA, one piece. Legacy .vtk files, unstructured grids only, are read by meshio. A file is read whole, one at a time;
+whether data other than the displacement change in time is seen from the first, second, middle and last of them.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import lzma
+import os
+import re
+import zlib
+from collections.abc import Callable, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from athcodec.clip import MotionClip
+from athcodec.errors import ClipError, MissingExtra
+from athcodec.sources import ReadOptions
+from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
+from athcodec.sources.fields import clip_of_steps
+from athcodec.sources.sequence import sequence_files
+from athcodec.sources.timing import numbered_times, times_in_seconds
+from athcodec.sources.xdmf import parse_xml
+
+_TYPES = {"Float32": "f4", "Float64": "f8", "Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8", "UInt8": "u1",
+          "UInt16": "u2", "UInt32": "u4", "UInt64": "u8"}
+_UNPACKERS: dict[str, Callable[[], Any]] = {"vtkZLibDataCompressor": zlib.decompressobj,
+                                            "vtkLZMADataCompressor": lzma.LZMADecompressor}
+MAX_BLOCK_BYTES = 1 << 30
+_BROKEN = (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError, zlib.error, lzma.LZMAError,
+           binascii.Error, ElementTree.ParseError)
+
+
+def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
+    """Open the clip in the series that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
+    read, has other cells than the first; MissingExtra for .vtk without meshio; OSError where one cannot be opened."""
+    try:
+        files, time, metadata = _files(Path(path), options)
+        steps = _Steps(files)
+        name = re.sub(r"[_.\-]*\d+$", "", files[0].stem) or files[0].stem
+        return clip_of_steps(steps, time, metadata, name, options, steps.static(), unchanged=steps.unchanged)
+    except _BROKEN as error:
+        text = " ".join(str(error).split())
+        raise ClipError(text if text.startswith(fspath(path)) else f"{fspath(path)}: {text}") from None
+
+
+def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
+    """The files in the order of time, and their times."""
+    if path.suffix.lower() == ".pvd":
+        return _listed(path, options.fps)
+    index = _index_of(path)
+    if index is not None:
+        return _listed(index, options.fps)
+    files = sequence_files(path)
+    if None in files:
+        return list(files.values()), np.zeros(1), {}
+    return [*files.values()], *numbered_times(np.array(list(files)), options.fps)
+
+
+def _index_of(path: Path) -> Path | None:
+    """A .pvd beside a file that lists it."""
+    for index in sorted(path.parent.glob("*.pvd")):
+        if path.is_file() and index.stat().st_size < 1 << 28 and path.name.encode() in index.read_bytes():
+            if path in [file for file, _ in _datasets(index)]:
+                return index
+    return None
+
+
+def _datasets(index: Path) -> list[tuple[Path, float]]:
+    root = parse_xml(index.read_bytes(), "VTKFile")
+    found = [(index.parent / element.get("file", ""), float(element.get("timestep", "nan")), element.get("part", "0"))
+             for element in root.iter("DataSet")]
+    if not found:
+        raise ClipError(f"{index}: got no DataSet, expected some files")
+    if len({part for *_, part in found}) > 1:
+        raise ClipError(f"{index}: got several parts in a time step, expected one: they have to be merged first")
+    return [(file, time) for file, time, _ in found]
+
+
+def _listed(index: Path, fps: float | None) -> tuple[list[Path], np.ndarray, dict[str, Any]]:
+    files = [file for file, _ in _datasets(index)]
+    stored = np.array([time for _, time in _datasets(index)])
+    if len(stored) == 1 and not np.isfinite(stored).all():
+        stored = np.zeros(1)
+    time, metadata = times_in_seconds(stored, fps)
+    numbers = [re.search(r"(\d+)$", file.stem) for file in files]
+    if "fps" in metadata and all(numbers):
+        counted = np.array([float(number[1]) for number in numbers])
+        if np.allclose(counted - counted[0], time * metadata["fps"], rtol=0, atol=1e-6):
+            metadata["start_frame"] = int(counted[0])
+    return files, time, metadata
+
+
+class _Steps:
+    """See fields.Steps."""
+
+    def __init__(self, files: Sequence[Path]):
+        self._files = list(files)
+        self._stamps = [_stamp(path) for path in self._files]
+        self._now: tuple[int, _Grid] | None = None
+        first = self._grid(0)
+        self._cells = first.cells
+        self.topology = topology_of(blocks_of(*first.cells, VTK_NAMES), len(first.points))
+        others = [self._grid(step) for step in {len(files) - 1, len(files) // 2, 1} if 0 < step < len(files)]
+        for name, values in first.cell_data.items():
+            if all(np.array_equal(other.cell_data.get(name), values) for other in others):
+                self.topology.add_cell_data(name, values)
+        self._static = {name: values for name, values in first.point_data.items()
+                        if all(np.array_equal(other.point_data.get(name), values) for other in others)}
+        self._fields = list(first.point_data)
+
+    def unchanged(self) -> bool:
+        """Whether no file has been written to since this was made."""
+        try:
+            return [_stamp(path) for path in self._files] == self._stamps
+        except OSError:
+            return False
+
+    def static(self) -> dict[str, np.ndarray]:
+        return self._static
+
+    def fixed_points(self) -> bool:
+        return len(self._files) == 1
+
+    def points(self, step: int) -> np.ndarray:
+        return self._grid(step).points
+
+    def fields(self) -> list[str]:
+        return self._fields
+
+    def field(self, step: int, name: str) -> np.ndarray:
+        if name not in self._grid(step).point_data:
+            raise ClipError(f"{self._files[step]}: got no field {name!r}, expected one as in the first file")
+        return self._grid(step).point_data[name]
+
+    def check(self, step: int) -> None:
+        if not all(map(np.array_equal, self._grid(step).cells, self._cells)):
+            raise ClipError(f"frame {step}, {self._files[step].name}: got other cells than in {self._files[0].name}; "
+                            "topology that changes cannot be coded")
+
+    def _grid(self, step: int) -> _Grid:
+        if self._now is None or self._now[0] != step:
+            self._now = step, _read_grid(self._files[step])
+        return self._now[1]
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    now = os.stat(path)
+    return now.st_size, now.st_mtime_ns
+
+
+class _Grid:
+    """points (N, 3), data per point and cell, and cells: types, and where their nodes start and stop in a list."""
+
+    def __init__(self, points: np.ndarray, cells: tuple[np.ndarray, ...], point_data: dict, cell_data: dict):
+        self.points, self.cells = points, cells
+        self.point_data = {name: values for name, values in point_data.items() if len(values) == len(points) and name}
+        self.cell_data = {name: values for name, values in cell_data.items() if len(values) == len(cells[0]) and name}
+
+
+def _read_grid(path: Path) -> _Grid:
+    try:
+        if path.suffix.lower() == ".vtk":
+            return _legacy_grid(path)
+        return _Vtu(path.read_bytes()).grid()
+    except _BROKEN as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise ClipError(f"{path}: {text}") from None
+
+
+def _legacy_grid(path: Path) -> _Grid:
+    try:
+        from meshio import vtk
+    except ImportError:
+        raise MissingExtra('VTK files: need meshio: pip install "athcodec[mesh]"') from None
+    try:
+        mesh = vtk.read(path)
+    except OSError:
+        raise
+    except Exception as error:  # a library that trusts its files fails in any way
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise ClipError(f"{path}: the VTK file cannot be read: {text[:200]}") from None
+    counts = [np.full(len(block.data), np.shape(block.data)[1] if len(block.data) else 0) for block in mesh.cells]
+    kinds = [np.full(len(block.data), VTK_NUMBERS.get(block.type, 0)) for block in mesh.cells]
+    stops = np.cumsum(np.concatenate([np.zeros(0, int), *counts]))
+    starts = stops - np.concatenate([np.zeros(0, int), *counts])
+    nodes = np.concatenate([np.zeros(0, np.int64), *(np.asarray(block.data).reshape(-1) for block in mesh.cells)])
+    cells = np.concatenate([np.zeros(0, int), *kinds]), starts, stops, nodes
+    cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
+    return _Grid(mesh.points, cells, {name: np.asarray(values) for name, values in mesh.point_data.items()}, cell_data)
+
+
+class _Vtu:
+    """The arrays of one VTU file."""
+
+    def __init__(self, data: bytes):
+        data, self._appended = _without_raw(data)
+        self._root = parse_xml(data, "VTKFile")
+        if self._root.get("type") != "UnstructuredGrid":
+            raise ClipError(f"got a VTK file of the type {self._root.get('type')!r}, expected UnstructuredGrid")
+        order = ">" if self._root.get("byte_order") == "BigEndian" else "<"
+        self._order = order
+        self._count = np.dtype(_TYPES[self._root.get("header_type", "UInt32")]).newbyteorder(order)
+        name = self._root.get("compressor")
+        if name and name not in _UNPACKERS:
+            raise ClipError(f"got data packed by {name[:40]!r}, expected one of {', '.join(_UNPACKERS)}")
+        self._unpack = _UNPACKERS.get(name or "")
+
+    def grid(self) -> _Grid:
+        pieces = self._root.findall("UnstructuredGrid/Piece")
+        if len(pieces) != 1:
+            raise ClipError(f"got {len(pieces)} pieces, expected one")
+        piece = pieces[0]
+        points = piece.find("Points/DataArray")
+        if points is None:
+            raise ClipError("got no points, expected some")
+        cells = {element.get("Name"): element for element in piece.findall("Cells/DataArray")}
+        stops = self._integers(cells["offsets"]) if "offsets" in cells else np.zeros(0, np.int64)
+        types = self._integers(cells["types"]) if "types" in cells else np.zeros(0, np.int64)
+        nodes = self._integers(cells["connectivity"]) if "connectivity" in cells else np.zeros(0, np.int64)
+        starts = np.concatenate([[0], stops[:-1]]).astype(np.int64) if len(stops) else stops
+        if len(types) != len(stops) or (starts > stops).any() or (len(stops) and stops[-1] > len(nodes)) or \
+                (len(starts) and starts.min() < 0):
+            raise ClipError("cells: got offsets that do not fit types and nodes")
+        found = self._array(points).reshape(-1, int(points.get("NumberOfComponents") or 3))
+        said = piece.get("NumberOfPoints")
+        if said is not None and int(said) != len(found):
+            raise ClipError(f"points: got {len(found)}, expected {int(said)}")
+        return _Grid(found, (types, starts, stops, nodes), self._arrays(piece, "PointData"),
+                     self._arrays(piece, "CellData"))
+
+    def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
+        found = {}
+        for element in piece.findall(f"{tag}/DataArray"):
+            if element.get("type") in _TYPES:
+                width, values = int(element.get("NumberOfComponents") or 1), self._array(element)
+                found[element.get("Name", "")] = values if width == 1 else values.reshape(-1, width)
+        return found
+
+    def _integers(self, element: ElementTree.Element) -> np.ndarray:
+        values = self._array(element)
+        if values.dtype.kind not in "iu":
+            raise ClipError(f"cells: got {element.get('Name')} of {values.dtype}, expected integers")
+        return values.astype(np.int64)
+
+    def _array(self, element: ElementTree.Element) -> np.ndarray:
+        dtype = np.dtype(_TYPES[element.get("type", "")])
+        form = element.get("format", "ascii")
+        if form == "ascii":
+            words = (element.text or "").split()
+            return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
+        if form == "binary":
+            data = self._decoded((element.text or "").strip().encode())
+        elif form == "appended":
+            data = self._appended_at(int(element.get("offset", "0")))
+        else:
+            raise ClipError(f"got data in the format {form[:40]!r}, expected ascii, binary or appended")
+        return np.frombuffer(data, dtype.newbyteorder(self._order)).astype(dtype)
+
+    def _appended_at(self, offset: int) -> bytes:
+        if self._appended is not None:
+            if not 0 <= offset < len(self._appended):
+                raise ClipError(f"got data at {offset}, expected less than {len(self._appended)}")
+            return self._unpacked(self._appended[offset:])
+        element = self._root.find("AppendedData")
+        text = "" if element is None else (element.text or "").strip().removeprefix("_")
+        return self._decoded(text[offset:].encode())
+
+    def _decoded(self, text: bytes) -> bytes:
+        """Base64: the counts before packed data are encoded by themselves."""
+        size = self._count.itemsize
+        if self._unpack is None:
+            length = self._numbers(_from_base64(text, size), 1)[0]
+            return _from_base64(text, size + length)[size:]
+        blocks = self._numbers(_from_base64(text, size), 1)[0]
+        head_bytes = size * (3 + blocks)
+        head = _from_base64(text, head_bytes)
+        packed = sum(self._numbers(head, 3 + blocks)[3:])
+        body = text[4 * ((head_bytes + 2) // 3):]
+        return self._unpacked(head + _from_base64(body, packed))
+
+    def _unpacked(self, data: bytes) -> bytes:
+        size = self._count.itemsize
+        first = self._numbers(data, 1)[0]
+        if self._unpack is None:
+            if len(data) < size + first:
+                raise ClipError(f"got {len(data) - size} bytes of data, expected {first}")
+            return data[size: size + first]
+        sizes = self._numbers(data, 3 + first)
+        at, parts = size * (3 + first), []
+        for length in sizes[3:]:
+            parts.append(self._unpack().decompress(data[at: at + length], max(1, min(sizes[1], MAX_BLOCK_BYTES))))
+            at += length
+        whole_size = sizes[1] * (first - bool(sizes[2])) + sizes[2] if first else 0
+        joined = b"".join(parts)
+        if len(joined) != whole_size:
+            raise ClipError(f"got {len(joined)} bytes of unpacked data, expected {whole_size}")
+        return joined
+
+    def _numbers(self, data: bytes, count: int) -> list[int]:
+        if not 0 <= count * self._count.itemsize <= len(data):
+            raise ClipError(f"got {len(data)} bytes of data, expected {count} counts before it")
+        return np.frombuffer(data, self._count, count).tolist()
+
+
+def _from_base64(text: bytes, size: int) -> bytes:
+    """The first `size` bytes."""
+    data = base64.b64decode(text[: 4 * ((size + 2) // 3)], validate=False)
+    if len(data) < size:
+        raise ClipError(f"got {len(data)} bytes of data, expected {size}")
+    return data[:size]
+
+
+def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
+    """The XML of a file, and the raw bytes appended to it, which are none; None where there are none."""
+    found = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
+    if not found:
+        return data, None
+    end = data.rfind(b"</AppendedData>")
+    start = data.find(b"_", found.end()) + 1
+    if not found.end() < start <= end:
+        raise ClipError("got no end of the appended data")
+    return data[: found.end()] + data[end:], data[start:end]
