@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -20,6 +21,7 @@ import numpy as np
 
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
+from athcodec.exporters.hdf5 import _Sink
 from athcodec.files import check_target, new_files
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
@@ -38,16 +40,18 @@ SERIES = "motion"
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
-    with new_files(path) as folder:
-        with h5py.File(os.path.join(folder, f"{name}.h5"), "w") as data:
-            root = _Writer(motion, data, f"{name}.h5", options.gzip).write(report)
+    with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
+        sink = _Sink(SimpleNamespace(descriptor=file.fileno(), path=fspath(path)))
+        with h5py.File(sink, "w") as data:
+            root = _Writer(motion, data, f"{name}.h5", options.gzip, sink).write(report)
+        sink.check()
         ElementTree.indent(root)
         ElementTree.ElementTree(root).write(os.path.join(folder, name), encoding="utf-8", xml_declaration=True)
 
 
 class _Writer:
-    def __init__(self, motion: Any, data: h5py.File, data_name: str, gzip: bool):
-        self._motion, self._data, self._name = motion, data, data_name
+    def __init__(self, motion: Any, data: h5py.File, data_name: str, gzip: bool, sink: _Sink):
+        self._motion, self._data, self._name, self._sink = motion, data, data_name, sink
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
     def write(self, report: Callable[[float], None]) -> ElementTree.Element:
@@ -65,6 +69,7 @@ class _Writer:
                 grid = ElementTree.SubElement(series, "Grid", Name=f"frame {frame}", GridType="Uniform")
                 moved = (points - rest).astype(motion.dtype)
                 self._fill(grid, frame, time[frame], moved, static)
+                self._sink.check()
                 report((frame + 1) / motion.frame_count)
         return root
 
