@@ -142,6 +142,10 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
             raise FileNotFoundError(f"{path}: the writer has made no such file")
         for each in made:
             os.replace(os.path.join(folder, each), os.path.join(directory, each))
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, path) from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         if lock >= 0:

@@ -302,6 +302,7 @@ REFUSED = {
     "no file": (FENICS.replace("a.h5:/Mesh", "b.h5:/Mesh"), r"'b\.h5', which does not exist"),
     "no data": (FENICS.replace("mesh/geometry", "mesh/none"), "mesh/none: cannot be read"),
     "no XML": ("<Xdmf><Domain>", "got no XML"),
+    "no encoding": (FENICS.replace("?>", ' encoding="utfD8"?>'), "got no XML: unknown encoding"),
     "other XML": ("<svg/>", "got the XML of 'svg'"),
     "entities": ('<!DOCTYPE Xdmf [<!ENTITY a "aaaaaaaaaa">]>' + FENICS.split("[]>")[1], "entities of its own"),
     "no mesh": (FENICS.replace("Geometry", "Other"), "no grid with a Geometry"),
