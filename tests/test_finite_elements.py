@@ -300,7 +300,7 @@ def test_a_pvd_has_the_times_also_of_a_file_that_it_lists(tmp_path):
 
 REFUSED = {
     "no file": (FENICS.replace("a.h5:/Mesh", "b.h5:/Mesh"), r"'b\.h5', which does not exist"),
-    "no data": (FENICS.replace("mesh/geometry", "mesh/none"), "mesh/none: cannot be read"),
+    "no data": (FENICS.replace("mesh/geometry", "mesh/none"), "mesh/none.: cannot be read"),
     "no XML": ("<Xdmf><Domain>", "got no XML"),
     "no encoding": (FENICS.replace("?>", ' encoding="utfD8"?>'), "got no XML: unknown encoding"),
     "other XML": ("<svg/>", "got the XML of 'svg'"),

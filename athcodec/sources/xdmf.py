@@ -135,16 +135,16 @@ class Data:
         try:
             dataset = self._files[path][inside]
             if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind not in "fiu":
-                raise ClipError(f"{path.name}: {inside[:80]}: got no array of numbers")
+                raise ClipError(f"{path.name}: {inside[:80]!r}: got no array of numbers")
             size = dataset.nbytes if selection == () else dataset.dtype.itemsize * int(
                 np.prod([len(range(*part.indices(length))) for part, length in zip(selection, dataset.shape)]))
             if size > MAX_ARRAY_BYTES:
-                raise ClipError(f"{path.name}: {inside[:80]}: got {size} bytes, expected at most {MAX_ARRAY_BYTES}")
+                raise ClipError(f"{path.name}: {inside[:80]!r}: got {size} bytes, expected at most {MAX_ARRAY_BYTES}")
             return np.asarray(dataset[selection]).astype(dataset.dtype.newbyteorder("="), copy=False)
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
             if isinstance(error, ClipError):
                 raise
-            raise ClipError(f"{path.name}: {inside[:80]}: cannot be read: {error}") from None
+            raise ClipError(f"{path.name}: {inside[:80]!r}: cannot be read: {error}") from None
 
     def _slab(self, item: ElementTree.Element) -> np.ndarray:
         children = item.findall("DataItem")
