@@ -263,6 +263,10 @@ def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     if hierarchy is None or hierarchy == "auto" or hierarchy in discovery.METHODS:
         found = athcodec.find_branches(clip, hierarchy or "auto")
         _say("hierarchy", str(found))
+    elif hierarchy.lower().endswith(".mtg"):
+        from athcodec.sources.mtg import mtg_branches
+
+        found = athcodec.Found(*mtg_branches(hierarchy, clip), "file")
     else:
         found = discovery.load(hierarchy)
     return discovery.with_branches(clip, found)
@@ -631,8 +635,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument(
-        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or an MTG file, "
-        f"or found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
+        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or a .mtg, or "
+        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument("--lossless", action="store_true",

@@ -23,6 +23,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.excerpt import Excerpt
 from athcodec.exporters import WriteOptions
+from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import (
     UNKNOWN_BOUND,
     VERTICES,
@@ -35,7 +36,6 @@ from athcodec.exporters.gltf_build import (
     shapes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
-from athcodec.exporters.fitting import allowed_error
 from athcodec.files import new_file
 
 MOST_JOINTS = 65536

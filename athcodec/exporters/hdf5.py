@@ -80,7 +80,7 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._part: Part | None = Part(path)
-        self._file, self._sink = None, _Sink(self._part)
+        self._file, self._sink = None, Sink(self._part.descriptor, self._part.path)
         try:
             self._file = h5py.File(self._sink, "w")
             self._positions = self._create_positions(dtype)
@@ -186,13 +186,13 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
             report((start + len(frames)) / len(clip.time))
 
 
-class _Sink:
-    """The bytes of a part, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that
+class Sink:
+    """The bytes of an open file, whose errors name `path`, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that
     there was an interruption: it loses track of its objects and crashes when the program ends. So it is not told;
     `check` raises what has happened."""
 
-    def __init__(self, part: Part):
-        self._file, self._path = open(part.descriptor, "r+b", buffering=0, closefd=False), part.path
+    def __init__(self, descriptor: int, path: str):
+        self._file, self._path = open(descriptor, "r+b", buffering=0, closefd=False), path
         self._error: BaseException | None = None
 
     def check(self) -> None:

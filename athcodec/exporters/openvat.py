@@ -18,9 +18,9 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
+from athcodec.exporters.fitting import portions
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
-from athcodec.exporters.fitting import portions
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
 from athcodec.files import new_folder
 

@@ -12,7 +12,6 @@ import os
 from collections.abc import Callable
 from os import PathLike, fspath
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import Cells, cell_and_point_data, cells_of
-from athcodec.exporters.hdf5 import _Sink
+from athcodec.exporters.hdf5 import Sink
 from athcodec.files import check_target, new_files
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
@@ -41,7 +40,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
-        sink = _Sink(SimpleNamespace(descriptor=file.fileno(), path=fspath(path)))
+        sink = Sink(file.fileno(), fspath(path))
         with h5py.File(sink, "w") as data:
             root = _Writer(motion, data, f"{name}.h5", options.gzip, sink).write(report)
         sink.check()
@@ -50,7 +49,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
 
 
 class _Writer:
-    def __init__(self, motion: Any, data: h5py.File, data_name: str, gzip: bool, sink: _Sink):
+    def __init__(self, motion: Any, data: h5py.File, data_name: str, gzip: bool, sink: Sink):
         self._motion, self._data, self._name, self._sink = motion, data, data_name, sink
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
