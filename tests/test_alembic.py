@@ -159,8 +159,8 @@ def test_a_closed_clip_and_a_changed_file_are_told(tmp_path):
 def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
     write_archive(tmp_path / "a.abc")
     data, rng, path = (tmp_path / "a.abc").read_bytes(), np.random.default_rng(5), tmp_path / "b.abc"
-    broken = [data[:cut] for cut in np.linspace(1, len(data) - 1, 8).astype(int)]
-    for _ in range(12):
+    broken = [data[:cut] for cut in np.linspace(1, len(data) - 1, 5).astype(int)]
+    for _ in range(6):
         damaged = bytearray(data)
         for place in rng.integers(0, len(data), 6):
             damaged[place] = rng.integers(256)
@@ -174,7 +174,7 @@ def test_broken_files_are_refused_in_one_line(tmp_path, capfd):
         except ClipError as error:
             refused += 1
             assert "\n" not in str(error)
-    assert refused >= 12 and capfd.readouterr().err == ""
+    assert refused >= 7 and capfd.readouterr().err == ""
     with pytest.raises(FileNotFoundError):
         athcodec.read(tmp_path / "none.abc", "alembic")
 

@@ -454,6 +454,21 @@ def test_an_export_that_fails_leaves_what_was_there(tmp_path, sample_clip):
 # ---- broken files ----
 
 
+@pytest.fixture
+def limited_memory():
+    """USD takes the lengths of arrays in a damaged file as they are: without a limit it asks for all the memory."""
+    if sys.platform != "linux":
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + (4 << 30), before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+
+
 def try_to_read(path):
     try:
         with athcodec.read(path) as clip:
@@ -466,7 +481,7 @@ def try_to_read(path):
 
 
 @pytest.mark.parametrize("suffix", ["usda", "usdc", "usdz"])
-def test_broken_files_are_refused(tmp_path, suffix, capfd):
+def test_broken_files_are_refused(tmp_path, suffix, capfd, limited_memory):
     whole_plant(tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as clip:
         athcodec.write(clip, tmp_path / f"b.{suffix}")

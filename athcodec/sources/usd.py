@@ -7,7 +7,8 @@ else the time codes that have samples; options.fps sets another rate. Static pri
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
 what a layer needs and cannot be found is one warning each. Point instancers, patches, tetrahedra, materials and
-velocities are not read. A stage is opened by its structure; positions are read frame by frame.
+velocities are not read. A stage is opened by its structure; positions are read frame by frame. Of a damaged binary file
+USD believes how long an array is, whatever that is: files that are not trusted are read under a limit of memory.
 """
 
 from __future__ import annotations
