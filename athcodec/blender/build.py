@@ -1,7 +1,8 @@
 """Packs the Blender extension: python -m athcodec.blender.build athcodec.zip athcodec-*.whl
 
-The wheels of athcodec (one per platform) are given; those of zstandard, which it needs besides what Blender has, are
-given too or fetched by pip for the same platforms and the Pythons of Blender. Wheels go in as they are.
+The wheels of athcodec (one per platform) are given; those of zstandard and scipy, which it needs besides what Blender
+has, the latter to find branches, are given too or fetched by pip for the same platforms and the Pythons of Blender.
+Wheels go in as they are.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from athcodec.files import new_file
 
 PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and from 5.1
-NEEDED = "zstandard"
+NEEDED = ("zstandard", "scipy")
 EXTENSION = Path(__file__).resolve().parent / "extension"
 PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64"}
@@ -26,7 +27,7 @@ MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m athcodec.blender.build", description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path, help="the .zip to write, which Blender installs")
-    parser.add_argument("wheels", type=Path, nargs="+", help="wheels of athcodec, and of zstandard if not by pip")
+    parser.add_argument("wheels", type=Path, nargs="+", help="wheels of athcodec, and of the others if not by pip")
     args = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         pack(args.output, [*args.wheels, *_fetched(args.wheels, Path(folder))])
@@ -69,14 +70,15 @@ def platform(wheel: Path) -> str:
 
 
 def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
-    """Wheels of what is needed for each platform and Python, by pip; none where some are given."""
-    if any(each.name.startswith(f"{NEEDED}-") for each in wheels):
+    """Wheels of what is needed and not given, for each platform and Python, by pip."""
+    missing = [name for name in NEEDED if not any(each.name.startswith(f"{name}-") for each in wheels)]
+    if not missing:
         return []
     for tag in sorted({each.stem.split("-")[-1] for each in wheels}):
         tags = [option for each in _pip_platforms(tag) for option in ("--platform", each)]
         for python in PYTHONS:
             subprocess.run([sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
-                            "--python-version", python, *tags, "--dest", str(folder), NEEDED], check=True)
+                            "--python-version", python, *tags, "--dest", str(folder), *missing], check=True)
     return sorted(folder.glob("*.whl"))
 
 

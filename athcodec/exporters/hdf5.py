@@ -187,9 +187,9 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
 
 
 class Sink:
-    """The bytes of an open file, whose errors name `path`, as HDF5 writes them through Python. HDF5 cannot be told that the disk is full, or that
-    there was an interruption: it loses track of its objects and crashes when the program ends. So it is not told;
-    `check` raises what has happened."""
+    """The bytes of an open file, whose errors name `path`, as HDF5 writes them through Python. HDF5 cannot be told that
+    the disk is full, or that there was an interruption: it loses track of its objects and crashes when the program
+    ends. So it is not told; `check` raises what has happened."""
 
     def __init__(self, descriptor: int, path: str):
         self._file, self._path = open(descriptor, "r+b", buffering=0, closefd=False), path
