@@ -6,18 +6,22 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
+import pygltflib
 import pytest
 
 import athcodec
 from athcodec.excerpt import Excerpt
 from athcodec.exporters import write
+from athcodec.exporters.parts import quaternions
 from athcodec.sources import read
-from test_gltf import far, leafy, leafy_ath  # noqa: F401, the fixtures too
+from test_gltf import Maker, far, leafy, leafy_ath  # noqa: F401, the fixtures too
 from test_vat import exr
 
 pytestmark = pytest.mark.programs
@@ -44,6 +48,20 @@ def node(request):
         return done.stdout
 
     return run
+
+
+@pytest.fixture(scope="session")
+def panda(request, tmp_path_factory):
+    """A walking panda that people drew and rigged, as Panda3D moves it; see node/panda.py."""
+    folder = Path(request.config.cache.mkdir("panda3d"))
+    if not (folder / "panda3d").exists():
+        subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder,
+                        "panda3d==1.10.16"], check=True)
+    out = tmp_path_factory.mktemp("panda") / "panda.npz"
+    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+    subprocess.run([sys.executable, SCRIPTS / "panda.py", out], check=True, env=os.environ | {"PYTHONPATH": path},
+                   capture_output=True)
+    return dict(np.load(out))
 
 
 @pytest.fixture
@@ -155,3 +173,40 @@ def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath,
         texels = np.fromfile(tmp_path / "out.bin", "<f4").reshape(size["height"], size["width"], 4)[::-1]
         pixels = exr(tmp_path / "a.vat" / name)
         assert np.array_equal(texels[..., : pixels.shape[2]], pixels)
+
+
+def rigged(panda, path):
+    """The panda as a skin with keys of its joints, made with pygltflib."""
+    made = Maker()
+    mesh = made.mesh({"POSITION": made.array(panda["rest"]), "JOINTS_0": made.array(panda["joints"]),
+                      "WEIGHTS_0": made.array(panda["weights"])}, "panda", indices=panda["faces"].ravel())
+    times, matrices = np.arange(len(panda["matrices"])) / panda["fps"], panda["matrices"]
+    joints = [made.node() for _ in range(matrices.shape[1])]
+    turns = quaternions(matrices[..., :3, :3])
+    made.animation([(node, "translation", times, matrices[:, i, :3, 3], "LINEAR") for i, node in enumerate(joints)]
+                   + [(node, "rotation", times, turns[:, i], "LINEAR") for i, node in enumerate(joints)], "walk")
+    made.gltf.skins.append(pygltflib.Skin(joints=joints))
+    made.node(mesh=mesh, skin=0)
+    return made.save(path)
+
+
+def test_an_animal_that_people_rigged_walks_as_panda3d_and_three_walk_it(panda, played, tmp_path):
+    path, size = rigged(panda, tmp_path / "panda.glb"), np.linalg.norm(np.ptp(panda["rest"], axis=0))
+    with read(path) as clip:
+        positions = clip.block(0, clip.frame_count)
+        assert clip.metadata["fps"] == 30 and np.array_equal(clip.faces, panda["faces"])
+        assert far(positions, panda["positions"]) < 1e-4 * size  # Panda3D's matrices are rigid to 1e-5
+        assert far(positions[::10], played(path, clip.time[::10])) < 1e-6 * size
+
+
+def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, played, tmp_path):
+    with read(rigged(panda, tmp_path / "panda.glb")) as clip:
+        athcodec.encode(read_as_one_branch(clip), tmp_path / "a.ath", rel_error=1e-4)
+        wanted, times = clip.block(0, clip.frame_count), clip.time
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        for animation in ("joints", "morphs"):
+            write(Excerpt(decoder), tmp_path / "b.glb", animation=animation)
+            assert_valid(node, tmp_path / "b.glb")
+            stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
+            shown = played(tmp_path / "b.glb", times[::10])
+            assert far(shown, wanted[::10]) <= decoder.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
