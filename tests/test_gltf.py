@@ -329,6 +329,8 @@ REFUSED = {
     "too many vertices": ({"accessors": [ACCESSOR | {"count": 2**50}]}, "vertices, expected at most"),
     "a view too long": ({"bufferViews": [{"buffer": 0, "byteLength": 2**50}],
                          "accessors": [ACCESSOR | {"count": 9000}]}, "buffer of 96"),
+    "sparse values nowhere": ({"accessors": [ACCESSOR | {"sparse": {
+        "count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {}}}]}, "got index None"),
     "a type": ({"accessors": [ACCESSOR | {"type": "VEC9"}]}, "VEC9"),
     "a fraction": ({"accessors": [ACCESSOR | {"count": 7.5}]}, "7.5"),
     "no number": ({"nodes": [{"mesh": "0"}]}, "'0'"),

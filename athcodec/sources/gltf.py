@@ -52,7 +52,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     except ClipError as error:
         file.close()
         raise _named(path, error) from error
-    except (MemoryError, OverflowError, RecursionError, TypeError, ValueError) as error:
+    except (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError) as error:
         file.close()
         raise ClipError(f"{fspath(path)}: got glTF that cannot be read: {str(error)[:100]}") from error
     except BaseException:

@@ -152,7 +152,8 @@ class GltfFile:
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
     def _strided(self, accessor: Mapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
-        view = self.item("bufferViews", accessor["bufferView"])
+        index = accessor.get("bufferView")
+        view = self.item("bufferViews", index)
         item, offset = dtype.itemsize * width, integer(accessor, "byteOffset", 0)
         stride = integer(view, "byteStride", 0) or item
         size = stride * (count - 1) + item
@@ -160,7 +161,7 @@ class GltfFile:
         if stride < item or offset + size > length:
             raise ClipError(f"{where}: got {count} elements of {item} bytes at {offset}, expected what fits into the "
                             f"{length} bytes of its buffer view")
-        raw = self._view(accessor["bufferView"], view, offset, size)
+        raw = self._view(index, view, offset, size)
         return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
 
     def _sparse(self, sparse: Mapping, values: np.ndarray, where: str) -> np.ndarray:
