@@ -40,6 +40,7 @@ COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no br
 IN_ORDER = 0.7  # rank correlation of the source's order with the distance from the base from which on it is kept
 SMALL = 8  # vertices of a branch whose order is kept in any case
 PATCH_VERTICES = 150  # that a patch of a mesh without other branches has on average
+SMALL_PATCH, LARGE_PATCH, LARGE_MESH = 40, 600, 10_000  # that are tried besides, and vertices from which on the latter
 PATCH_ROUNDS = 8
 MOST_PATCHES = 2000
 CRUMB = 12  # vertices: smaller patches join a neighbour
@@ -64,13 +65,14 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives, and where that goes by motion, larger patches and a single one in the source's order
-    too: only a trial tells which of them makes the smallest file."""
+    """What find_branches gives, and where that goes by motion, patches of other sizes and a single one too: only a trial
+    tells which of them makes the smallest file."""
     found = find_branches(clip)
     if found.method != "motion":
         return [found]
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
-    return [found, _by_motion(clip, None, 4 * PATCH_VERTICES), single]
+    other = SMALL_PATCH if clip.vertex_count < LARGE_MESH else LARGE_PATCH
+    return [single, found, _by_motion(clip, None, other)]
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:

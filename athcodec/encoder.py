@@ -155,14 +155,25 @@ def _best_branches(clip: MotionClip, fraction: float) -> Found:
     start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
     stop = min(clip.frame_count, start + TRIAL_FRAMES)
     some = MotionClip(clip.block(start, stop), clip.time[start:stop], rest=clip.rest.astype(clip.rest_dtype))
-    return min(found, key=lambda each: _trial_size(with_branches(some, each), fraction))
+
+    def size(each: Found) -> float:
+        return _trial_size(with_branches(some, each), fraction, clip.frame_count / some.frame_count)
+
+    best = min(found, key=size)
+    return min((best, dataclasses.replace(best, stem_index=None)), key=size)  # the source's order costs nothing to say
 
 
-def _trial_size(clip: MotionClip, fraction: float) -> float:
+def _trial_size(clip: MotionClip, fraction: float, longer: float) -> float:
+    """Bytes of a file of a clip that is so many times longer."""
     hierarchy = hierarchy_of(clip)
     source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=False)
     job = _Job(source, None, False, "default", lambda stage, done: None, False)
-    return _file_size(job, _relative_bound(fraction, job))
+    with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+        try:
+            entries = job.encode(_relative_bound(fraction, job), ct.ChunkStore(spool)).store.entries
+        except BoundError:
+            return math.inf
+    return sum(chunk.length * (longer if chunk.is_motion and chunk.kind != ct.SHAPES else 1) for chunk, _ in entries)
 
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
