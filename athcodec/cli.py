@@ -190,18 +190,21 @@ def _truncate(args: argparse.Namespace) -> int:
 def _formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
-    table = {each.name: each for each in (*sources.FORMATS, *exporters.FORMATS)}
-    read, written = ({each.name for each in module.FORMATS} for module in (sources, exporters))
-    rows = [{"format": name, "title": each.title, "suffixes": list(each.suffixes), "read": name in read,
-             "written": name in written, "extra": each.extra, "installed": each.is_installed}
-            for name, each in table.items()]
+    read, written = ({each.name: each for each in module.FORMATS} for module in (sources, exporters))
+    rows = [{"format": name, "reads": _suffixes(read.get(name)), "writes": _suffixes(written.get(name)),
+             "title": each.title, "extra": each.extra, "installed": each.is_installed}
+            for name, each in (written | read).items()]
     if args.json:
         _print_json({"formats": rows})
         return 0
-    cells = [[row["format"], row["title"], " ".join(row["suffixes"]),
-              " ".join(verb for verb in ("read", "written") if row[verb]), _needs(row)] for row in rows]
-    _print_table(["format", "what", "suffixes", "", "needs"], cells)
+    cells = [[row["format"], " ".join(row["reads"]), " ".join(row["writes"]), row["title"], _needs(row)]
+             for row in rows]
+    _print_table(["format", "reads", "writes", "what", "needs"], cells, justify="left")
     return 0
+
+
+def _suffixes(kind: Any) -> list[str]:
+    return list(kind.suffixes) if kind else []
 
 
 def _needs(row: dict[str, Any]) -> str:
@@ -471,10 +474,10 @@ def _print_verdict(result: dict[str, Any]) -> None:
         print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
 
 
-def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
     for index, name in enumerate(columns):
-        table.add_column(Text(name), justify="right" if index else "left", no_wrap=True)
+        table.add_column(Text(name), justify=justify if index else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)

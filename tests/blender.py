@@ -1,7 +1,6 @@
 """A Blender for tests: the module bpy in a Python of its own, and athcodec's extension installed in it.
 
-ATHCODEC_BLENDER names a Python that has bpy; without it one is made in the user's cache folder, once, which needs a
-Python of the version that bpy is published for. A test gives `Blender.run` a script, which finds its arguments in
+Which Python that is, says programs.py. A test gives `Blender.run` a script, which finds its arguments in
 `args` and saves arrays with `save(name=array)`.
 """
 
@@ -11,7 +10,6 @@ import json
 import os
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 import numpy as np
@@ -66,20 +64,6 @@ class Blender:
             return {}
         with np.load(out) as arrays:
             return dict(arrays)
-
-
-def find_python() -> Path:
-    """A Python that has bpy; made where there is none."""
-    named = os.environ.get("ATHCODEC_BLENDER")
-    if named:
-        return Path(named)
-    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "athcodec-tests" / "bpy"
-    python = cache / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    if not (cache / "complete").exists():
-        venv.create(cache, with_pip=True, clear=True)
-        subprocess.run([python, "-m", "pip", "install", "--quiet", "bpy"], check=True)
-        (cache / "complete").touch()
-    return python
 
 
 def build_extension(folder: Path) -> Path:

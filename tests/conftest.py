@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
-from blender import INSTALL, Blender, build_extension, find_python
+from blender import INSTALL, Blender, build_extension
 from plants import awkward, plant
+from programs import blender_python
 
 
 @pytest.fixture
@@ -111,14 +114,14 @@ def full_ath(full_clip, tmp_path_factory):
 @pytest.fixture(scope="session")
 def blender(tmp_path_factory):
     """A Blender of its own, for tests marked `programs`."""
-    return Blender(find_python(), tmp_path_factory.mktemp("blender"))
+    return Blender(Path(blender_python()), tmp_path_factory.mktemp("blender"))
 
 
 @pytest.fixture(scope="session")
 def extended_blender(tmp_path_factory):
     """A Blender that has athcodec's extension, installed as a user installs it."""
     folder = tmp_path_factory.mktemp("extended")
-    blender = Blender(find_python(), folder)
+    blender = Blender(Path(blender_python()), folder)
     blender.run(INSTALL, zip=build_extension(folder))
     blender.has_extension = True
     return blender

@@ -1,4 +1,5 @@
-"""Other programs for tests marked `programs`: found by an environment variable, or installed where that is not set."""
+"""Other programs for tests marked `programs`: found by an environment variable, or installed, once, in the user's cache
+folder where that is not set."""
 
 from __future__ import annotations
 

@@ -408,3 +408,23 @@ def test_the_examples_of_the_readme_work(tmp_path, monkeypatch, capsys):
     exec(compile(python, "README.md", "exec"), names)
     assert names["frame"].shape == (1001, 3) and names["block"].shape == (48, 1001, 3)
     assert names["maps"].shape[1:] == (3, 4)
+
+
+def test_formats_are_listed_with_what_they_need(capsys):
+    assert main(["formats", "--json"]) == 0
+    rows = {row["format"]: row for row in json.loads(capsys.readouterr().out)["formats"]}
+    assert rows["usd"]["extra"] == "usd" and ".usdc" in rows["usd"]["reads"] and ".usdc" in rows["usd"]["writes"]
+    assert rows["vat"]["reads"] == [] and rows["vat"]["writes"] == [".vat"]
+    assert rows["hdf5"]["extra"] == "" and rows["hdf5"]["installed"]
+    assert main(["formats"]) == 0
+    assert "athcodec[usd]" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["encode", "decode"])
+def test_a_missing_package_is_named_with_the_command_that_installs_it(encoded, tmp_path, capsys, monkeypatch, verb):
+    monkeypatch.setattr("athcodec.sources.find_spec", lambda name: None)  # as where the package is not installed
+    scene = tmp_path / "a.usda"
+    scene.write_text("#usda 1.0\n")
+    files = [str(scene), str(tmp_path / "b.ath")] if verb == "encode" else [str(encoded), str(tmp_path / "b.usdc")]
+    assert main([verb, *files]) == 1
+    assert capsys.readouterr().err.endswith('needs pxr: pip install "athcodec[usd]"\n')

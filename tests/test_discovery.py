@@ -214,7 +214,8 @@ def test_a_saved_hierarchy_comes_back_unchanged(dressed, tmp_path):
 
 
 def one_branch(vertex_count: int, parent: int, vertices: str) -> str:
-    return json.dumps({"vertex_count": vertex_count, "branches": [{"branch": 0, "parent": parent, "vertices": vertices}]})
+    branch = {"branch": 0, "parent": parent, "vertices": vertices}
+    return json.dumps({"vertex_count": vertex_count, "branches": [branch]})
 
 
 @pytest.mark.parametrize("text, message", [

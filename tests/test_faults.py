@@ -19,7 +19,6 @@ import pytest
 
 import athcodec
 from athcodec import cli, files
-from athcodec.errors import ClipError
 from athcodec.files import Part, new_file
 from athcodec.sources import sample_path
 from plants import plant

@@ -19,7 +19,7 @@ import pytest
 import athcodec
 from athcodec.excerpt import Excerpt
 from athcodec.exporters import write
-from athcodec.exporters.parts import quaternions
+from athcodec.exporters.fitting import quaternions
 from athcodec.sources import read
 from test_gltf import Maker, far, leafy, leafy_ath  # noqa: F401, the fixtures too
 from test_vat import exr

@@ -163,7 +163,7 @@ class FileFrames:
         mesh = self._parse(data, path)
         different = self.mesh.same_topology(mesh)
         if different:
-            raise ClipError(f"frame {frame}, {path.name}: {different} as in {self.paths[0].name}; topology that "
+            raise ClipError(f"frame {frame}, {path.name}: {different}, unlike {self.paths[0].name}; topology that "
                             "changes cannot be coded")
         return mesh.points
 
