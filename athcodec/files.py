@@ -130,26 +130,14 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
     in place of older ones; nothing is left behind when it raises. One of them must have that name, unless `named` is
     False. Raises OSError."""
     path = check_target(path)
-    remove_leftovers(path)
     directory, name = os.path.split(path)
-    folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
-    os.mkdir(folder)
-    lock = _locked_folder(folder)
-    try:
+    with _part_folder(path) as folder:
         yield folder
         made = sorted(os.listdir(folder), key=lambda each: (each == name, each))
         if named and name not in made:
             raise FileNotFoundError(f"{path}: the writer has made no such file")
         for each in made:
             os.replace(os.path.join(folder, each), os.path.join(directory, each))
-    except OSError as error:
-        if error.filename is not None or error.errno is None:
-            raise
-        raise OSError(error.errno, error.strerror, path) from None
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if lock >= 0:
-            os.close(lock)
 
 
 @contextmanager
@@ -159,6 +147,15 @@ def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
     path = check_target(path)
     if os.path.lexists(path):
         raise FileExistsError(f"{path}: exists, expected the name of a new folder")
+    with _part_folder(path) as folder:
+        yield folder
+        os.rename(folder, path)
+
+
+@contextmanager
+def _part_folder(path: str) -> Iterator[str]:
+    """A locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that names no
+    file names `path`."""
     remove_leftovers(path)
     directory, name = os.path.split(path)
     folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
@@ -166,7 +163,10 @@ def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
     lock = _locked_folder(folder)
     try:
         yield folder
-        os.rename(folder, path)
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, path) from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         if lock >= 0:

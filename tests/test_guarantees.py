@@ -127,3 +127,17 @@ def test_every_format_of_the_table_is_tried_here():
     for each in exporters.FORMATS:
         if each.name not in ("vat", "openvat"):  # which nobody reads back: see test_vat.py
             assert written & {suffix[1:] for suffix in each.suffixes}, each.name
+
+
+@pytest.mark.parametrize("cache", ["a.pc2", "a.mdd"])
+@pytest.mark.parametrize("mesh", ["mesh.glb", "mesh.usda", "mesh.obj"])
+def test_a_point_cache_takes_its_mesh_from_a_file_of_any_format(clip, tmp_path, cache, mesh):
+    athcodec.write(clip, tmp_path / cache)
+    for beside in tmp_path.glob("a*.obj"):
+        beside.unlink()
+    still = dataclasses.replace(clip, positions=clip.block(0, 1), time=clip.time[:1], rest=clip.rest.astype(np.float32))
+    athcodec.write(still, tmp_path / mesh)
+    with athcodec.read(tmp_path / cache, mesh=tmp_path / mesh) as again:
+        assert np.array_equal(again.block(0, 9), clip.block(0, 9))
+        counts, indices = again.polygons
+        assert counts.sum() >= clip.faces.size and indices.max() < clip.vertex_count

@@ -7,16 +7,13 @@
 from __future__ import annotations
 
 import importlib
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
-from athcodec.errors import ClipError
 from athcodec.files import check_target
-from athcodec.sources import Format
+from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
 
@@ -71,28 +68,11 @@ def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, 
     OSError where nothing can be written there, ValueError for options that do not exist.
     """
     wanted = WriteOptions(**options)
-    kind = find_format(path) if format is None else format_named(format)
+    kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
     kind.check()
     check_target(path)
     report = progress or (lambda stage, fraction: None)
     importlib.import_module(kind.module).write_clip(motion, path, wanted, lambda done: report("export", done))
-
-
-def format_named(name: str) -> Format:
-    for each in FORMATS:
-        if each.name == name:
-            return each
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in FORMATS)}")
-
-
-def find_format(path: str | PathLike[str]) -> Format:
-    """The format that a suffix stands for. Raises ClipError."""
-    suffix = Path(path).suffix.lower()
-    for each in FORMATS:
-        if suffix in each.suffixes:
-            return each
-    raise ClipError(f"{os.fspath(path)}: got the suffix {suffix!r}, expected one of "
-                    f"{' '.join(suffix for each in FORMATS for suffix in each.suffixes)}")
 
 
 def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:

@@ -115,7 +115,7 @@ def read(path: str | PathLike[str], format: str | None = None, *, unit: str | No
     be opened, ValueError for options that do not exist.
     """
     wanted = ReadOptions(**options)
-    kind = find_format(path) if format is None else format_named(format)
+    kind = find_format(path) if format is None else format_named(format, FORMATS)
     kind.check()
     clip = importlib.import_module(kind.module).read_clip(path, wanted)
     try:
@@ -130,11 +130,21 @@ def is_pattern(path: str | PathLike[str]) -> bool:
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
-def format_named(name: str) -> Format:
-    for each in FORMATS:
+def format_named(name: str, formats: Sequence[Format]) -> Format:
+    for each in formats:
         if each.name == name:
             return each
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in FORMATS)}")
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in formats)}")
+
+
+def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
+    """The first of `formats` that has the suffix of a path. Raises ClipError."""
+    suffix = Path(path).suffix.lower()
+    for each in formats:
+        if suffix in each.suffixes:
+            return each
+    known = " ".join(suffix for each in formats for suffix in each.suffixes)
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -149,12 +159,7 @@ def find_format(path: str | PathLike[str]) -> Format:
     for each in FORMATS:
         if head.startswith(each.magic or ()):
             return each
-    suffix = Path(path).suffix.lower()
-    for each in FORMATS:
-        if suffix in each.suffixes:
-            return each
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of "
-                    f"{' '.join(suffix for each in FORMATS for suffix in each.suffixes)}")
+    return format_by_suffix(path, FORMATS)
 
 
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
