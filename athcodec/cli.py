@@ -213,6 +213,26 @@ def _needs(row: dict[str, Any]) -> str:
     return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
 
 
+def _view(args: argparse.Namespace) -> int:
+    from athcodec import view
+
+    with _naming(args.file):
+        if args.export:
+            _check_output(args.export, args.file)
+            print(f"{args.export}: {view.export_page(args.file, args.export):,} bytes, opens in any browser")
+            return 0
+        view.serve(args.file, args.port, lambda address: _say_where(address, args.no_browser))
+    return 0
+
+
+def _say_where(address: str, no_browser: bool) -> None:
+    from athcodec import view
+
+    print(f"{address} (Ctrl-C ends it)", flush=True)
+    if not no_browser:
+        view.open_browser(address)
+
+
 def _demo(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)
@@ -604,6 +624,10 @@ def _parser() -> argparse.ArgumentParser:
     ))
     formats = verb("formats", _formats, "list the formats that are read and written, and what each needs")
     formats.add_argument("--json", action="store_true", help="print as JSON")
+    _view_arguments(verb(
+        "view", _view, "play an .ath file in a browser",
+        "Serves the viewer on this computer only, until it is interrupted.",
+    ))
     _demo_arguments(verb("demo", _demo, "encode the included sample, decode and measure every depth"))
     return parser
 
@@ -737,6 +761,14 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--depth", metavar="LEVEL", type=_argument(_whole), required=True, help="the last level to keep"
     )
+
+
+def _view_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("file", metavar="FILE.ath", help=READ)
+    verb.add_argument("--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)")
+    verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+    verb.add_argument("--export", metavar="PAGE.html",
+                      help="write one page with the file and the viewer inside, and serve nothing")
 
 
 def _demo_arguments(verb: argparse.ArgumentParser) -> None:

@@ -1,0 +1,66 @@
+// Bundles src and page into the folder given: `node build.mjs FOLDER`, with the packages of package.json on NODE_PATH.
+// build_viewer.py calls it.
+
+import { createHash } from "node:crypto";
+import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { deflateSync } from "node:zlib";
+
+const here = dirname(fileURLToPath(import.meta.url)), [out] = process.argv.slice(2);
+const modules = process.env.NODE_PATH, require = createRequire(join(modules, "x.js"));
+const esbuild = require("esbuild");
+mkdirSync(out, { recursive: true });
+
+// zstddec has its WebAssembly as base64; deflated first it takes half the room.
+const packedZstd = {
+  name: "packed-zstd",
+  setup(build) {
+    build.onLoad({ filter: /zstddec\.mjs$/ }, ({ path }) => {
+      const text = readFileSync(path, "utf8"), wasm = /const wasm = "([^"]*)"/.exec(text);
+      const load = "fetch(`data:application/wasm;base64,${wasm}`).then((response) => response.arrayBuffer())";
+      if (!wasm || !text.includes(load)) throw new Error(`${path}: got another zstddec than build.mjs knows`);
+      const packed = deflateSync(Buffer.from(wasm[1], "base64"), { level: 9 }).toString("base64");
+      const inflate = 'new Response(new Blob([Uint8Array.from(atob(wasm), (c) => c.charCodeAt(0))]).stream()'
+        + '.pipeThrough(new DecompressionStream("deflate"))).arrayBuffer()';
+      return { contents: text.replace(wasm[1], packed).replace(load, inflate), loader: "js" };
+    });
+  },
+};
+
+async function bundle(entry, name, external) {
+  await esbuild.build({
+    ...entry, outfile: join(out, name), bundle: true, minify: true, format: "esm", target: "es2022", external,
+    nodePaths: [modules], legalComments: "none", plugins: [packedZstd], charset: "utf8", logLevel: "error",
+  });
+  return readFileSync(join(out, name), "utf8");
+}
+
+// What a bundle imports of three.js.
+function names(text) {
+  return [...text.matchAll(/import\s*{([^}]*)}\s*from\s*"three"/g)]
+    .flatMap(([, list]) => list.split(",").map((name) => name.trim().split(" as ")[0]));
+}
+
+const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "athcodec-three", orbit];
+const loader = await bundle({ entryPoints: [join(here, "src/index.js")] }, "ATHLoader.js", outside);
+await bundle({ entryPoints: [join(here, "src/ath_worker.js")] }, "ath_worker.js", []);
+const viewer = await bundle({ entryPoints: [join(here, "page/main.js")] }, "viewer.js", outside);
+const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
+const used = [...new Set([loader, viewer, controls].flatMap(names))].sort();
+await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three";`, resolveDir: modules } }, "three.js", []);
+
+copyFileSync(join(here, "page/viewer.css"), join(out, "viewer.css"));
+const page = readFileSync(join(here, "page/index.html"), "utf8"), map = /<script type="importmap">([^]*?)<\/script>/.exec(page)[1];
+const digest = createHash("sha256").update(map).digest("base64");
+writeFileSync(join(out, "index.html"), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));
+copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
+const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
+const zstd = readFileSync(join(modules, "zstddec/dist/zstddec.mjs"), "utf8");
+const facebook = /\/\*\*\n\* BSD License[^]*?\*\//.exec(zstd)[0];
+writeFileSync(join(out, "LICENSES.txt"), [
+  `three.js (three.js, OrbitControls.js), version ${JSON.parse(readFileSync(join(modules, "three/package.json"), "utf8")).version}\n\n${licence("three")}`,
+  `zstddec (in ath_worker.js)\n\n${licence("zstddec")}`,
+  `Zstandard (in ath_worker.js)\n\n${facebook.replace(/^\/?\*+\/? ?/gm, "").trim()}`,
+].join(`\n\n${"-".repeat(80)}\n\n`) + "\n");

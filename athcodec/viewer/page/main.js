@@ -1,0 +1,577 @@
+// The viewer: opens a file by ?file=URL, by dropping it, or one that the page itself carries, and plays it.
+
+import { Box3, Color, LineBasicMaterial, MeshLambertMaterial, DoubleSide, Vector3 } from "three";
+import { ATHForest, ATHLoader } from "athcodec-three";
+
+import { heatGradient, nodeColour } from "./colours.js";
+import { Plant } from "./plant.js";
+import { readback } from "./readback.js";
+import { Stage } from "./stage.js";
+import { $, bytesText, Choice, countText, lengthText, paintReady, rateText, rows } from "./ui.js";
+
+const SPEEDS = ["0.1", "0.25", "0.5", "1", "2", "4"];
+const GOLDEN = Math.PI * (3 - Math.sqrt(5));
+
+const loader = new ATHLoader();
+const state = { playing: true, speed: 1, loop: true, time: 0, forest: null, dirty: true, name: "" };
+const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null };
+let plants = [], opened = [], last = 0;
+
+const stage = new Stage($("canvas"), () => { state.dirty = true; });
+
+// ---- files ----
+
+const words = { NOT_AN_ATH_FILE: "This is not an .ath file", UNSUPPORTED_VERSION: "This file is of another version of the format",
+  HTTP: "The file cannot be fetched", NETWORK: "The file cannot be fetched", MISSING: "The file is cut off too early", TRUNCATED: "The file is cut off too early",
+  CHANGED: "The file has changed", WORKER: "The decoder cannot be started" };
+
+function refuse(error) {
+  console.warn(`athcodec: ${error.message}`);
+  $("message").querySelector("h2").textContent = words[error.codeName] ?? "The file is damaged";
+  $("message").querySelector("p").textContent = error.message;
+  $("message").hidden = false;
+}
+
+function note(text) {
+  $("note").textContent = text;
+  $("note").hidden = false;
+  clearTimeout(note.timer);
+  note.timer = setTimeout(() => { $("note").hidden = true; }, 6000);
+}
+
+// A URL, or {bytes}.
+function load(source) {
+  if (typeof source === "string") return loader.loadAsync(source);
+  return loader.parseAsync(source.bytes);
+}
+
+async function open(source, name, beside = false) {
+  $("message").hidden = true;
+  if (!beside) Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, pictures: 0 });
+  let ath;
+  try {
+    ath = await load(source);
+  } catch (error) {
+    refuse(error);
+    return;
+  }
+  ath.fileName = name;
+  if (!beside) {
+    for (const each of opened) each.dispose();
+    opened = [];
+    state.time = 0;
+  } else {
+    for (const each of opened.splice(1)) each.dispose();
+  }
+  opened.push(ath);
+  ath.motion.addEventListener("stopped", ({ message }) => note(message));
+  ath.motion.addEventListener("damaged", ({ message }) => note(`Shown without what is damaged: ${message}`));
+  compare.set(beside ? "file" : "off");
+  arrange();
+  frameView();
+}
+
+function describe() {
+  const [ath] = opened, { info } = ath.motion;
+  $("name").textContent = opened.map((each) => each.fileName).join("  ·  ");
+  document.title = `${ath.fileName} – athcodec`;
+  const height = ath.metadata.height ? "" : "";
+  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${countText(info.frameCount)} frames${height}`;
+}
+
+// ---- what is on the stage ----
+
+// Plants and panes for the files that are open and what is chosen.
+function arrange() {
+  for (const plant of plants) {
+    plant.dispose();
+    if (plant.motion !== plant.ath.motion) plant.motion.dispose();
+  }
+  const [ath] = opened;
+  plants = [new Plant(ath)];
+  if (compare.value === "depths") plants = [new Plant(ath, ath.motion.clone()), ...plants];
+  if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
+  for (const plant of plants) {
+    plant.setShow(show.value);
+    plant.setColour(colour.value);
+    plant.onPaint = () => { state.dirty = true; };
+    plant.motion.addEventListener("frame", () => pictured(plant));
+    plant.motion.addEventListener("ready", () => { state.dirty = true; });
+  }
+  if (plants.length > 1) forestSwitch(false);
+  stage.setPanes(plants.map((plant) => ({
+    scene: stage.scene([plant.root]), before: (width, height) => plant.setScreen(width, height),
+  })));
+  place();
+  depthControls();
+  setDepth(depth.value ?? "auto");
+  describe();
+  $("compare-depth-row").hidden = compare.value !== "depths";
+  labels();
+  if (state.forest) forestOn();
+}
+
+function pictured(plant) {
+  state.dirty = true;
+  if (plant !== plants.at(-1)) return;
+  counters.pictures++;
+  counters.firstPicture ??= { ms: performance.now() - counters.started, bytes: plant.motion.bytesFetched };
+  if (counters.pictures > 1 && plant.motion.frame > 0)
+    counters.firstMotion ??= { ms: performance.now() - counters.started, bytes: plant.motion.bytesFetched };
+}
+
+// The world's box of all rest poses.
+function box() {
+  const all = new Box3(), point = new Vector3();
+  for (const { ath, root } of plants) {
+    root.updateMatrixWorld(true);
+    for (let i = 0; i < ath.rest.length; i += 3) all.expandByPoint(point.fromArray(ath.rest, i).applyMatrix4(root.matrixWorld));
+  }
+  return all;
+}
+
+function place() {
+  const all = box(), size = all.getSize(new Vector3());
+  stage.placeGround(all.min.y, (state.forest ? 2.6 * forestRadius() : 1.9 * Math.max(size.x, size.y, size.z)));
+}
+
+function frameView() {
+  const all = box(), centre = all.getCenter(new Vector3()), radius = 0.5 * all.min.distanceTo(all.max);
+  if (state.forest) {
+    const reach = Math.max(forestRadius(), radius);
+    stage.look(new Vector3(0, all.min.y + radius * 0.4, 0), Math.min(reach, 5 * radius), { ground: all.min.y, groundSize: 2.6 * reach / Math.min(reach, 5 * radius) });
+    stage.controls.maxDistance = 6 * reach;
+    stage.camera.far = 12 * reach + 20 * radius;
+    return;
+  }
+  stage.look(centre, radius, { ground: all.min.y, groundSize: 2.8 });
+}
+
+// ---- depth, colour, what is shown ----
+
+const depth = new Choice($("depth-choice"), (value) => setDepth(value));
+const colour = new Choice($("colour"), (value) => {
+  for (const plant of plants) plant.setColour(value);
+  $("scale").hidden = value !== "distance";
+  colourForest();
+  state.dirty = true;
+});
+const show = new Choice($("show"), (value) => {
+  for (const plant of plants) plant.setShow(value);
+  state.dirty = true;
+});
+const compare = new Choice($("compare"), (value) => {
+  if (value === "file") {
+    $("file").dataset.beside = "yes";
+    $("file").click();
+    compare.set(plants.length > 1 && opened.length > 1 ? "file" : "off");
+    return;
+  }
+  for (const each of opened.splice(1)) each.dispose();
+  arrange();
+  frameView();
+});
+colour.set("plain");
+show.set("mesh");
+compare.set("off");
+$("scale").querySelector("i").style.background = heatGradient;
+
+function depthControls() {
+  const most = Math.max(...plants.map(({ motion }) => motion.depthCount)) - 1;
+  const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
+  if (values.length <= 9) depth.fill(values, ["Auto", ...values.slice(1)]);
+  else depth.fill(["auto"], ["Automatic"]);
+  for (const id of ["depth", "compare-depth"]) $(id).max = most;
+  $("compare-depth").value = Math.min(1, most);
+  $("depth").value = most;
+}
+
+function setDepth(value) {
+  depth.set(value);
+  const main = plants.at(-1);
+  for (const plant of plants) {
+    const left = plants.length > 1 && plant !== main && compare.value === "depths";
+    plant.motion.setDepth(left ? Number($("compare-depth").value) : value === "auto" ? "auto" : Number(value));
+  }
+  $("compare-depth-value").value = $("compare-depth").value;
+  if (value !== "auto") $("depth").value = value;
+  state.dirty = true;
+}
+
+$("depth").addEventListener("input", () => setDepth($("depth").value));
+$("compare-depth").addEventListener("input", () => setDepth(depth.value));
+
+function labels() {
+  const names = plants.length < 2 ? [] : plants.map(({ ath, motion }) => (compare.value === "file" ? `${ath.fileName}, depth ${motion.depth}`
+    : `Depth ${Math.max(motion.depth, 0)} · ${rateText(motion.bitRate())}`));
+  const text = names.join("|");
+  if (labels.text === text) return;
+  labels.text = text;
+  const tags = names.map((name, i) => {
+    const tag = Object.assign(document.createElement("span"), { textContent: name });
+    tag.style.left = `${((i + 0.5) * 100) / names.length}%`;
+    return tag;
+  });
+  if (tags.length) {
+    const line = document.createElement("i");
+    line.style.left = "50%";
+    tags.push(line);
+  }
+  $("labels").replaceChildren(...tags);
+}
+
+// ---- forest ----
+
+const forestCount = () => Math.round(10 ** ($("forest-count").value / 25));
+
+function forestRadius() {
+  const count = state.forestCount ?? forestCount();
+  return 2 * plants[0].ath.sphere.radius * Number($("forest-spread").value) * Math.sqrt(count) * 0.55;
+}
+
+function instances(count) {
+  const { ath } = plants[0], { rest } = ath, up = ath.metadata.up_axis === "z" ? 2 : 1, spread = forestRadius();
+  const duration = ath.motion.duration || 1, foot = [rest[0], rest[1], rest[2]];
+  return Array.from({ length: count }, (_, i) => {
+    const far = spread * Math.sqrt((i + 0.3) / count), angle = i * GOLDEN + 0.5 * Math.sin(i * 12.9898);
+    const size = 0.75 + 0.5 * (Math.sin(i * 78.233) * 0.5 + 0.5), x = far * Math.cos(angle), y = far * Math.sin(angle);
+    const at = up === 2 ? { x, y, z: foot[2] * (1 - size) } : { x, y: foot[1] * (1 - size), z: y };
+    return { ...at, size, angle: i * 2.4, seconds: (i * 0.7548776662 % 1) * duration };
+  });
+}
+
+function forestMaterial(lines, level) {
+  const stored = Boolean(plants[0].ath.geometry?.getAttribute("color"));
+  const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide, vertexColors: stored });
+  tintForest(material, lines, level, stored);
+  return material;
+}
+
+function tintForest(material, lines, level, stored) {
+  if (colour.value === "plain") material.color = new Color(stored && !lines ? 0xffffff : lines ? 0x75683f : 0x6f8f4a);
+  else material.color = new Color().setRGB(...nodeColour(level + 1));
+}
+
+function colourForest() {
+  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level, drawn.material.vertexColors));
+}
+
+function forestOn() {
+  const [plant] = plants;
+  state.forest?.removeFromParent();
+  state.forest?.dispose();
+  const forest = new ATHForest(plant.ath, forestMaterial);
+  state.forest = forest;
+  forest.levelOfDetail = $("forest-lod").checked;
+  forest.addEventListener("depth", () => { state.dirty = true; });
+  plant.root.add(forest);
+  plantForest();
+  for (const child of plant.root.children) if (child !== forest) child.visible = false;
+  plant.motion.setDepth(plant.motion.depthCount - 1); // near instances show all of it
+  bakeWhatIsReady();
+}
+
+function plantForest() {
+  state.forest.setInstances(instances(state.forestCount ?? forestCount()));
+  place();
+  state.dirty = true;
+}
+
+function bakeWhatIsReady() {
+  if (!state.forest) return;
+  for (let level = 0; level <= plants[0].motion.readyDepth; level++) state.forest.bake(level);
+}
+
+function forestOff() {
+  state.forest.removeFromParent();
+  state.forest.dispose();
+  state.forest = null;
+  plants[0].setShow(show.value);
+  setDepth(depth.value);
+  place();
+}
+
+function forestSwitch(on) {
+  if (on === Boolean(state.forest)) return;
+  $("forest").checked = on;
+  $("forest-rows").hidden = !on;
+  if (on && plants.length > 1) {
+    compare.set("off");
+    for (const each of opened.splice(1)) each.dispose();
+    arrange();
+  }
+  if (on) forestOn();
+  else forestOff();
+  frameView();
+}
+
+$("forest").addEventListener("change", () => forestSwitch($("forest").checked));
+for (const id of ["forest-count", "forest-spread"]) $(id).addEventListener("input", () => { delete state.forestCount; forestNumbers(); plantForest(); });
+$("forest-count").addEventListener("change", frameView);
+$("forest-lod").addEventListener("change", () => { state.forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
+
+function forestNumbers() {
+  $("forest-count-value").value = countText(state.forestCount ?? forestCount());
+  $("forest-spread-value").value = `${Number($("forest-spread").value).toFixed(1)}×`;
+}
+forestNumbers();
+
+function forestBars() {
+  const { counts, culled } = state.forest, most = Math.max(1, ...counts, culled);
+  const all = [...counts.map((count, level) => [`Depth ${level}`, count]), ["Unseen", culled]];
+  if ($("forest-bars").children.length !== all.length)
+    $("forest-bars").replaceChildren(...all.map(() => {
+      const row = document.createElement("div");
+      row.append(...["span", "i", "b"].map((name) => document.createElement(name)));
+      return row;
+    }));
+  all.forEach(([name, count], i) => {
+    const [label, bar, number] = $("forest-bars").children[i].children;
+    label.textContent = name;
+    bar.style.width = `${(100 * count) / most}%`;
+    number.textContent = countText(count);
+  });
+}
+
+// ---- time ----
+
+function setPlaying(playing) {
+  const { motion } = plants[0] ?? {};
+  if (playing && motion && !state.loop && state.time >= motion.duration) state.time = 0;
+  state.playing = playing;
+  document.body.classList.toggle("paused", !playing);
+  $("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+  state.dirty = true;
+}
+
+function seek(seconds) {
+  state.time = Math.max(0, Math.min(seconds, limit()));
+  state.dirty = true;
+}
+
+// Where the clip ends: a loop has the way back to its first frame too.
+function limit() {
+  return Math.max(...plants.map(({ motion }) => (state.loop ? motion.duration : motion.info.duration)), 0);
+}
+
+function step(frames) {
+  setPlaying(false);
+  const { info } = plants[0].motion, rate = info.duration > 0 ? (info.frameCount - 1) / info.duration : 1;
+  seek(Math.min((Math.round(state.time * rate) + frames) / rate, info.duration));
+}
+
+function advance(seconds) {
+  state.time += seconds * state.speed;
+  if (state.time < limit()) return;
+  if (state.loop && limit() > 0) {
+    state.time %= limit();
+  } else {
+    state.time = limit();
+    setPlaying(false);
+  }
+}
+
+function setLoop(loop) {
+  state.loop = loop;
+  $("loop").setAttribute("aria-pressed", String(loop));
+  for (const { motion } of plants) motion.wrap = loop ? "loop" : "clamp";
+}
+
+$("play").addEventListener("click", () => setPlaying(!state.playing));
+$("loop").addEventListener("click", () => setLoop(!state.loop));
+$("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
+$("time").addEventListener("input", () => seek(Number($("time").value)));
+
+// ---- every frame ----
+
+function tick(now) {
+  requestAnimationFrame(tick);
+  const passed = Math.min(0.1, (now - last) / 1000);
+  last = now;
+  if (plants.length === 0) return;
+  stage.controls.update();
+  if (state.playing) advance(passed);
+  for (const plant of plants) {
+    plant.motion.wrap = state.loop ? "loop" : "clamp";
+    if (!state.forest) plant.motion.update(stage.camera, stage.pixels, plant.root).setTime(state.time);
+    else plant.motion.setTime(0);
+  }
+  if (state.forest) {
+    bakeWhatIsReady();
+    if (state.playing || state.dirty) state.forest.update(stage.camera, stage.pixels, state.time);
+  }
+  if (state.dirty || (state.playing && state.forest)) draw();
+  count(now);
+}
+
+function draw() {
+  state.dirty = false;
+  const start = performance.now();
+  stage.render();
+  counters.frames++;
+  counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
+}
+
+function count(now) {
+  const passed = now - counters.since;
+  if (passed < 250) return;
+  counters.fps = (counters.frames * 1000) / passed;
+  Object.assign(counters, { frames: 0, since: now });
+  tell();
+}
+
+function tell() {
+  const main = plants.at(-1), { motion, ath } = main, { unit } = ath.metadata, share = motion.bytesFetched / motion.bytesTotal;
+  $("progress").firstElementChild.style.width = `${100 * Math.min(1, share)}%`;
+  $("progress").setAttribute("aria-valuenow", String(Math.round(100 * Math.min(1, share))));
+  const shown = Math.max(motion.depth, 0), error = motion.error(shown).max;
+  rows($("facts"), [
+    ["Fetched", `${bytesText(motion.bytesFetched)} of ${bytesText(motion.bytesTotal)}`],
+    ["This view", `${rateText(motion.bitRate(shown))}`],
+    ["Depth", `${shown} of ${motion.depthCount - 1}`],
+    ["Within", lengthText(error, unit)],
+    ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
+    ["Frames", `${counters.fps.toFixed(0)} per second`],
+    ["Vertices", countText(state.forest ? state.forest.vertices : plants.reduce((sum, plant) => sum + plant.vertices, 0))],
+  ]);
+  $("depth-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
+    : motion.depth < motion.target ? `Depth ${motion.target} is still on its way` : `No vertex is further off than ${lengthText(error, unit)}`;
+  if (motion.automatic) $("depth").value = motion.target;
+  $("scale-title").textContent = `Distance from the full depth, depth ${shown}`;
+  $("scale-high").textContent = lengthText(main.heatMost, unit);
+  $("time").max = limit();
+  if (document.activeElement !== $("time") || state.playing) $("time").value = state.time;
+  $("clock").value = `${state.time.toFixed(2)} s`;
+  paintReady($("ready"), [...ath.channel.state.ready], motion.depthCount);
+  labels();
+  if (state.forest) forestBars();
+}
+
+// ---- pictures, files, keys ----
+
+function picture() {
+  draw();
+  $("canvas").toBlob((blob) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = `${opened[0].fileName.replace(/\.ath$/, "")}_${state.time.toFixed(2)}s.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  });
+}
+
+async function openFile(file, beside) {
+  if (file) await open({ bytes: await file.arrayBuffer() }, file.name, beside && opened.length > 0);
+}
+
+function choose(beside = "") {
+  $("file").dataset.beside = beside;
+  $("file").click();
+}
+
+$("open").addEventListener("click", () => choose());
+$("message").querySelector("button").addEventListener("click", () => choose());
+$("file").addEventListener("change", async () => {
+  await openFile($("file").files[0], $("file").dataset.beside === "yes");
+  $("file").value = "";
+});
+$("picture").addEventListener("click", picture);
+$("help").addEventListener("click", () => $("keys").showModal());
+$("toggle-panel").addEventListener("click", togglePanel);
+
+function togglePanel() {
+  const hidden = document.body.classList.toggle("no-panel");
+  $("toggle-panel").setAttribute("aria-expanded", String(!hidden));
+}
+
+let dragging = 0;
+addEventListener("dragenter", (event) => { event.preventDefault(); dragging++; $("drop").hidden = false; });
+addEventListener("dragleave", () => { if (--dragging <= 0) $("drop").hidden = true; });
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", async (event) => {
+  event.preventDefault();
+  dragging = 0;
+  $("drop").hidden = true;
+  const files = [...event.dataTransfer.files];
+  await openFile(files[0], event.shiftKey);
+  if (files[1]) await openFile(files[1], true);
+});
+
+function changeSpeed(by) {
+  const at = SPEEDS.indexOf($("speed").value) + by;
+  $("speed").value = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, at))];
+  state.speed = Number($("speed").value);
+}
+
+function changeDepth(by) {
+  const { motion } = plants.at(-1), from = motion.automatic ? motion.target : Number(depth.value);
+  setDepth(String(Math.max(0, Math.min(motion.depthCount - 1, from + by))));
+}
+
+const KEYS = {
+  " ": () => setPlaying(!state.playing), ArrowLeft: (event) => step(event.shiftKey ? -10 : -1), ArrowRight: (event) => step(event.shiftKey ? 10 : 1),
+  Home: () => seek(0), End: () => { setPlaying(false); seek(plants[0].motion.info.duration); },
+  ",": () => changeSpeed(-1), ".": () => changeSpeed(1), l: () => setLoop(!state.loop),
+  "-": () => changeDepth(-1), "+": () => changeDepth(1), "=": () => changeDepth(1), a: () => setDepth("auto"),
+  c: () => colour.next(), s: () => show.next(), d: () => compare.pick(compare.value === "off" ? "depths" : "off"),
+  f: () => forestSwitch(!state.forest), r: frameView, p: picture, h: togglePanel, "?": () => $("keys").showModal(),
+};
+
+addEventListener("keydown", (event) => {
+  const { target, key } = event, typing = target.matches("select") || (target.matches("input") && key.startsWith("Arrow"));
+  const pressing = target.matches("button, input[type=checkbox]") && key === " ";
+  if (event.ctrlKey || event.metaKey || event.altKey || typing || pressing || plants.length === 0 || $("keys").open) return;
+  const action = KEYS[key.length === 1 ? key.toLowerCase() : key];
+  if (!action) return;
+  event.preventDefault();
+  action(event);
+});
+
+// ---- begin ----
+
+// A page that carries its file and its worker: see serve.py.
+function embedded() {
+  const worker = $("ath-worker"), file = $("ath-file");
+  if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
+  if (!file) return false;
+  const bytes = Uint8Array.from(atob(file.textContent.trim()), (character) => character.charCodeAt(0));
+  open({ bytes: bytes.buffer }, file.dataset.name);
+  return true;
+}
+
+if (matchMedia("(max-width: 680px)").matches) togglePanel();
+
+const wanted = new URLSearchParams(location.search);
+if (!embedded()) {
+  const url = wanted.get("file"), second = wanted.get("compare");
+  const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
+  if (url) open(url, nameOf(url)).then(() => second && opened.length && open(second, nameOf(second), true));
+  else refuse({ message: "Drop an .ath file here, or open one. It stays on this computer.", codeName: "none" });
+  if (!url) $("message").querySelector("h2").textContent = "No file yet";
+}
+requestAnimationFrame(tick);
+
+/** For scripts and tests. */
+globalThis.athcodecViewer = {
+  counters, state, stage, seek, setPlaying, setDepth, forestSwitch, frameView,
+  get plants() { return plants; },
+  get motion() { return plants.at(-1)?.motion; },
+  async shown(seconds, level) {
+    setPlaying(false);
+    const { motion } = plants.at(-1);
+    await motion.show(seconds, level);
+    return { depth: motion.depth, frame: motion.frame };
+  },
+  decoded: async (seconds, level) => [...await plants.at(-1).motion.positions(seconds, level)],
+  uploaded: () => [...plants.at(-1).motion.uploaded()],
+  onGraphics: () => [...readback(stage.renderer, plants.at(-1).ath, plants.at(-1).motion)],
+  forestOf(count, levelOfDetail = true) {
+    state.forestCount = count;
+    $("forest-lod").checked = levelOfDetail;
+    if (!state.forest) forestSwitch(true);
+    state.forest.levelOfDetail = levelOfDetail;
+    plantForest();
+    frameView();
+    forestNumbers();
+  },
+};

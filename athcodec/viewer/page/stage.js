@@ -1,0 +1,120 @@
+// The stage: renderer, camera and light, and one or two panes side by side, each with its own scene.
+
+import { Color, DirectionalLight, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
+  WebGLRenderer } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+const GROUND = /* glsl */`
+varying vec2 at;
+uniform vec3 tint;
+uniform float strength;
+void main() {
+  float d = length(at);
+  gl_FragColor = vec4(tint, strength * pow(max(1.0 - d, 0.0), 1.8));
+}`;
+
+export class Stage {
+  panes = [];
+
+  constructor(canvas, changed) {
+    this.canvas = canvas;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.addEventListener("change", changed);
+    this.dark = matchMedia("(prefers-color-scheme: dark)");
+    this.dark.addEventListener("change", () => { this.#tint(); changed(); });
+    this.changed = changed;
+    new ResizeObserver(() => { this.#resize(); changed(); }).observe(canvas.parentElement);
+    this.#resize();
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.width = width;
+    this.height = height;
+  }
+
+  /** A pane's scene; `content` is added to it. */
+  scene(content) {
+    const scene = new Scene(), sun = new DirectionalLight(0xfff2dd, 2.4);
+    sun.position.set(0.6, 1, 0.7);
+    scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), sun, this.#ground(), ...content);
+    this.#tint([scene]);
+    return scene;
+  }
+
+  #ground() {
+    const material = new ShaderMaterial({
+      vertexShader: "varying vec2 at; void main() { at = position.xy * 2.0; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }",
+      fragmentShader: GROUND, transparent: true, depthWrite: false,
+      uniforms: { tint: { value: new Color(0, 0, 0) }, strength: { value: 0.16 } },
+    });
+    const ground = new Mesh(new PlaneGeometry(1, 1), material);
+    ground.name = "ground";
+    ground.rotation.x = -Math.PI / 2;
+    ground.renderOrder = -1;
+    return ground;
+  }
+
+  #tint(scenes = this.panes.map(({ scene }) => scene)) {
+    const style = getComputedStyle(document.documentElement);
+    for (const scene of scenes) {
+      scene.background = new Color(style.getPropertyValue("--back").trim() || "#ffffff");
+      const { tint, strength } = scene.getObjectByName("ground").material.uniforms;
+      tint.value.set(0, 0, 0);
+      strength.value = this.dark.matches ? 0.5 : 0.16;
+    }
+  }
+
+  setPanes(panes) {
+    this.panes = panes;
+    this.#tint();
+    this.changed();
+  }
+
+  /** The whole of a sphere (in the world) in view; `up` is the height of the ground. */
+  look(centre, radius, { near = 1, ground = 0, groundSize = 4 } = {}) {
+    const aspect = Math.min(1, (this.width / this.height) / Math.max(1, this.panes.length));
+    const distance = near * 1.12 * radius / Math.sin(this.camera.fov * Math.PI / 360) / aspect;
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
+    this.camera.near = distance / 500;
+    this.camera.far = distance * 60;
+    this.controls.maxDistance = distance * 20;
+    this.placeGround(ground, groundSize * radius);
+    this.controls.update();
+    this.changed();
+  }
+
+  placeGround(height, size) {
+    for (const { scene } of this.panes) {
+      const ground = scene.getObjectByName("ground");
+      ground.position.y = height;
+      ground.scale.setScalar(size);
+    }
+  }
+
+  /** Height of a pane in pixels of the device. */
+  get pixels() {
+    return this.height * this.renderer.getPixelRatio();
+  }
+
+  render() {
+    const { renderer, camera, panes } = this, width = this.width / Math.max(1, panes.length);
+    camera.aspect = width / this.height;
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+    renderer.setScissorTest(panes.length > 1);
+    panes.forEach(({ scene, before }, i) => {
+      before?.(width * renderer.getPixelRatio(), this.pixels);
+      renderer.setViewport(i * width, 0, width, this.height);
+      renderer.setScissor(i * width, 0, width, this.height);
+      renderer.render(scene, camera);
+    });
+  }
+}

@@ -1,0 +1,96 @@
+// Small things that the page is made of: numbers as text, groups of buttons, the bar of what is ready.
+
+export const $ = (id) => document.getElementById(id);
+
+const UNITS = { m: 1, cm: 0.01, mm: 0.001, km: 1000, in: 0.0254, ft: 0.3048 };
+
+export function bytesText(bytes) {
+  if (bytes < 1e3) return `${bytes} B`;
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 2 : 1)} MB`;
+}
+
+export function rateText(bits) {
+  return bits < 1e6 ? `${(bits / 1e3).toFixed(1)} kbit/s` : `${(bits / 1e6).toFixed(2)} Mbit/s`;
+}
+
+export const countText = (number) => number.toLocaleString("en");
+
+/** A length of the file, in millimetres and the like where its unit is known. */
+export function lengthText(length, unit) {
+  if (!(unit in UNITS)) return `${Number(length.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
+  const metres = length * UNITS[unit];
+  const [factor, name] = metres >= 1 ? [1, "m"] : metres >= 0.01 ? [100, "cm"] : metres >= 1e-4 ? [1e3, "mm"] : [1e6, "µm"];
+  return `${Number((metres * factor).toPrecision(3))} ${name}`;
+}
+
+/** Buttons of which one is chosen: {value, set, values}. */
+export class Choice {
+  constructor(element, chosen) {
+    this.element = element;
+    this.chosen = chosen;
+    element.addEventListener("click", ({ target }) => {
+      const button = target.closest("button");
+      if (button && !button.disabled) this.pick(button.dataset.value);
+    });
+    this.mark();
+  }
+
+  get buttons() {
+    return [...this.element.querySelectorAll("button")];
+  }
+
+  fill(values, labels) {
+    this.element.replaceChildren(...values.map((value, i) =>
+      Object.assign(document.createElement("button"), { textContent: labels[i] })));
+    this.buttons.forEach((button, i) => { button.dataset.value = values[i]; });
+    this.mark();
+  }
+
+  mark() {
+    for (const button of this.buttons) {
+      button.setAttribute("role", "radio");
+      button.setAttribute("aria-checked", String(button.dataset.value === this.value));
+    }
+  }
+
+  set(value) {
+    this.value = value;
+    this.mark();
+  }
+
+  pick(value) {
+    this.set(value);
+    this.chosen(value);
+  }
+
+  next() {
+    const values = this.buttons.filter((button) => !button.disabled).map((button) => button.dataset.value);
+    this.pick(values[(values.indexOf(this.value) + 1) % values.length]);
+  }
+}
+
+/** Rows of text, made once and changed where they differ. */
+export function rows(list, entries) {
+  while (list.children.length > 2 * entries.length) list.lastChild.remove();
+  entries.forEach(([name, value], i) => {
+    if (!list.children[2 * i]) list.append(document.createElement("dt"), document.createElement("dd"));
+    const [term, detail] = [list.children[2 * i], list.children[2 * i + 1]];
+    if (term.textContent !== name) term.textContent = name;
+    if (detail.textContent !== value) detail.textContent = value;
+  });
+}
+
+/** What is here over time: the deeper, the stronger. */
+export function paintReady(canvas, levels, depthCount) {
+  const width = canvas.clientWidth * devicePixelRatio, height = canvas.clientHeight * devicePixelRatio;
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  const pen = canvas.getContext("2d");
+  pen.clearRect(0, 0, width, height);
+  pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--accent");
+  levels.forEach((level, i) => {
+    if (level < 0) return;
+    pen.globalAlpha = 0.2 + 0.8 * ((level + 1) / depthCount) ** 1.5;
+    const from = Math.round((i * width) / levels.length), to = Math.round(((i + 1) * width) / levels.length);
+    pen.fillRect(from, 0, Math.max(1, to - from), height);
+  });
+}

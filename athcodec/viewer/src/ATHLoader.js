@@ -1,0 +1,317 @@
+// Loads .ath files for three.js: a Loader with the conventions of DRACOLoader and KTX2Loader. The decoder is in
+// ath_worker.js, beside this module.
+
+import { Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
+  LoaderUtils } from "three";
+
+import { ATHMotion, restSphere } from "./ATHMotion.js";
+import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
+
+let files = 0;
+
+/** A file that is open in a worker: what the page knows of it, and the way there. */
+class Channel {
+  views = new Map();
+  state = { fetched: 0, requests: 0, ready: new Int8Array(1).fill(-1) };
+  #asked = new Map(); // what is under way: key: resolve
+  #nextView = 1;
+  #nextBake = 1;
+
+  constructor(worker, release) {
+    this.id = ++files;
+    this.worker = worker;
+    this.release = release;
+    this.opened = new Promise((resolve, reject) => { this.settle = { resolve, reject }; });
+    this.opened.catch(() => {});
+    this.arrays = new Promise((resolve) => { this.settle.arrays = resolve; });
+    worker.channels.set(this.id, this);
+  }
+
+  send(message, transfer = []) {
+    this.worker.postMessage({ ...message, file: this.id }, transfer);
+  }
+
+  receive(message) {
+    const { type } = message;
+    if (type === "opened") {
+      Object.assign(this, message, { type: undefined, sphere: restSphere(message.rest) });
+      this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
+      this.settle.resolve(this);
+    } else if (type === "failed") {
+      this.settle.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
+    } else if (type === "attributes") {
+      this.settle.arrays(message.attributes);
+    } else if (type === "state") {
+      this.#changed(message);
+    } else if (type === "picture") {
+      this.views.get(message.view)?.picture(message);
+    } else if (type === "parts") {
+      this.#asked.get(`parts ${message.level}`)(message);
+    } else if (type === "decoded") {
+      for (const view of this.views.values()) view.refresh();
+    } else if (type === "baked") {
+      this.#asked.get(`bake ${message.id}`)(message);
+    } else {
+      this.#tell(message); // "stopped", "damaged"
+    }
+  }
+
+  #changed(message) {
+    const ready = message.ready.some((level, segment) => level !== this.state.ready[segment]);
+    this.state = message;
+    this.#tell({ type: "progress", loaded: message.fetched, total: message.total });
+    if (!ready) return;
+    this.#tell({ type: "ready" });
+    for (const view of this.views.values()) view.refresh();
+  }
+
+  #tell(event) {
+    for (const view of this.views.values()) view.dispatchEvent({ ...event });
+  }
+
+  parts(level) {
+    return this.#ask(`parts ${level}`, { type: "parts", level });
+  }
+
+  bake(level, step) {
+    const id = this.#nextBake++;
+    return this.#ask(`bake ${id}`, { type: "bake", id, level, step });
+  }
+
+  #waiting = new Map();
+
+  #ask(key, message) {
+    if (!this.#waiting.has(key)) {
+      this.#waiting.set(key, new Promise((resolve) => { this.#asked.set(key, resolve); }));
+      this.send(message);
+    }
+    return this.#waiting.get(key);
+  }
+
+  /** athPart of every vertex, in source order. */
+  partOfVertices({ parts, texels }) {
+    const { nodeCount, exactCount, branch, first, count, index } = parts, out = new Float32Array(this.info.vertexCount);
+    const stride = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
+    for (let part = 0; part < branch.length; part++)
+      for (let i = 0; i < count[part]; i++)
+        out[this.vertexSource[first[part] + i]] = branch[part] >= 0 ? 1 + 3 * index[part]
+          : -(1 + 3 * nodeCount + stride * (index[part] + i));
+    return out;
+  }
+
+  partNumbers({ parts: { branch, first, count } }) {
+    const out = new Int32Array(this.info.vertexCount);
+    for (let part = 0; part < branch.length; part++)
+      for (let i = 0; i < count[part]; i++) out[this.vertexSource[first[part] + i]] = part;
+    return out;
+  }
+
+  view() {
+    return new ATHMotion(this, this.#nextView++);
+  }
+
+  dropView(id) {
+    this.views.delete(id);
+    this.send({ type: "drop", view: id });
+  }
+
+  close() {
+    this.send({ type: "close" });
+    this.worker.channels.delete(this.id);
+    this.release();
+  }
+}
+
+/** What load() gives: see ATHLoader.d.ts. */
+export class ATH extends EventDispatcher {
+  geometry = null;   // faces
+  lines = null;      // edges, or the skeleton where there are no faces either
+  attributes = {};
+  object = new Group();
+  #channel;
+
+  constructor(channel, mode) {
+    super();
+    this.#channel = channel;
+    this.motion = channel.view().setMode(mode);
+    this.metadata = channel.statics.metadata;
+    const { statics } = channel, faces = polygonsOf(statics, {});
+    if (faces) this.#setFaces(faces);
+    if (statics.edges || !faces) this.#setLines(statics.edges ?? statics.skeleton);
+    this.object.name = "ath";
+    this.arrays = channel.arrays.then((attributes) => this.#addArrays(attributes));
+  }
+
+  /** Numbers of the vertices of the skeleton's edges, whether they are drawn or not. */
+  get skeleton() {
+    return this.#channel.statics.skeleton;
+  }
+
+  get rest() {
+    return this.#channel.rest;
+  }
+
+  get branches() {
+    return this.#channel.branches;
+  }
+
+  /** Number (file order) of the branch of every vertex, in source order. */
+  get vertexBranch() {
+    const { branches: { first, count }, vertexSource } = this.#channel, out = new Int32Array(vertexSource.length);
+    for (let b = 0; b < first.length; b++)
+      for (let i = first[b]; i < first[b] + count[b]; i++) out[vertexSource[i]] = b;
+    return out;
+  }
+
+  /** The sphere about the rest pose. */
+  get sphere() {
+    return this.#channel.sphere;
+  }
+
+  get channel() {
+    return this.#channel;
+  }
+
+  #setFaces(faces) {
+    this.geometry = this.motion.attach(meshGeometry(this.#channel, faces));
+    const material = this.motion.bind(new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
+    this.mesh = new Mesh(this.geometry, material);
+    this.object.add(this.mesh);
+    if (this.lines && !this.#channel.statics.edges) this.object.remove(this.line);
+  }
+
+  #setLines(edges) {
+    this.lines = this.motion.attach(lineGeometry(this.#channel, edges));
+    this.line = new LineSegments(this.lines, this.motion.bind(new LineBasicMaterial({ color: 0x6b5b45 })));
+    this.object.add(this.line);
+  }
+
+  #addArrays(attributes) {
+    this.attributes = attributes;
+    const faces = this.geometry ? null : polygonsOf(this.#channel.statics, attributes);
+    if (faces) this.#setFaces(faces);
+    if (this.geometry) {
+      addAttributes(this.geometry, this.#channel, attributes);
+      if (this.geometry.getAttribute("color") && this.mesh) {
+        this.mesh.material.color.set(0xffffff);
+        this.mesh.material.vertexColors = true;
+        this.mesh.material.needsUpdate = true;
+      }
+    }
+    this.dispatchEvent({ type: "arrays" });
+    return attributes;
+  }
+
+  dispose() {
+    this.motion.dispose();
+    for (const geometry of [this.geometry, this.lines]) geometry?.dispose();
+    for (const drawn of [this.mesh, this.line]) drawn?.material.dispose();
+    this.#channel.close();
+  }
+}
+
+export class ATHLoader extends Loader {
+  constructor(manager) {
+    super(manager);
+    this.workerLimit = 4;
+    this.workerPool = [];
+    this.workerURL = null;
+    this.mode = "matrices";
+  }
+
+  /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
+  setDecoderPath(path) {
+    this.workerURL = /\/$/.test(path) ? `${path}ath_worker.js` : path;
+    return this;
+  }
+
+  /** At most so many workers; a file lives in one of them. */
+  setWorkerLimit(limit) {
+    this.workerLimit = limit;
+    return this;
+  }
+
+  /** "matrices", or "positions" for renderers other than WebGLRenderer: see ATHMotion.setMode. */
+  setMode(mode) {
+    this.mode = mode;
+    return this;
+  }
+
+  /** Starts to load. onLoad gets an ATH when its first picture can be shown; the rest goes on arriving. */
+  load(url, onLoad, onProgress, onError) {
+    const whole = this.manager.resolveURL(LoaderUtils.resolveURL(url, this.path));
+    const options = { headers: this.requestHeader, credentials: this.withCredentials ? "include" : "same-origin" };
+    this.manager.itemStart(url);
+    const done = (call, value) => {
+      if (call === onError) this.manager.itemError(url);
+      call?.(value);
+      this.manager.itemEnd(url);
+    };
+    this.#open({ url: new URL(whole, globalThis.location?.href).href, options }, [], onProgress)
+      .then((ath) => done(onLoad, ath), (error) => {
+        if (!onError) console.error(error);
+        done(onError, error);
+      });
+  }
+
+  /** The same of bytes that are here: an ArrayBuffer, which the worker gets a copy of. */
+  parse(buffer, onLoad, onError = (error) => console.error(error)) {
+    const bytes = buffer.slice(0);
+    this.#open({ bytes }, [bytes]).then(onLoad, onError);
+  }
+
+  parseAsync(buffer) {
+    return new Promise((resolve, reject) => this.parse(buffer, resolve, reject));
+  }
+
+  async #open(message, transfer, onProgress) {
+    const worker = this.#worker();
+    const channel = new Channel(worker, () => { worker.files--; });
+    worker.files++;
+    channel.send({ type: "open", ...message }, transfer);
+    try {
+      await channel.opened;
+    } catch (error) {
+      channel.close();
+      throw error;
+    }
+    const ath = new ATH(channel, this.mode), { motion } = ath;
+    if (onProgress) motion.addEventListener("progress", ({ loaded, total }) => onProgress({ loaded, total, lengthComputable: true }));
+    await new Promise((resolve, reject) => {
+      const failed = ({ level = 0, message: text, codeName }) => {
+        if (level === 0) reject(Object.assign(new Error(text), { codeName }));
+      };
+      motion.addEventListener("frame", resolve);
+      motion.addEventListener("stopped", failed);
+      motion.addEventListener("damaged", failed);
+      motion.setTime(0);
+    });
+    return ath;
+  }
+
+  // The worker with the fewest files; a new one as long as there may be more.
+  #worker() {
+    const idle = this.workerPool.find((worker) => worker.files === 0);
+    if (idle) return idle;
+    if (this.workerPool.length < this.workerLimit) {
+      const worker = this.workerURL ? new Worker(this.workerURL, { type: "module" })
+        : new Worker(new URL("./ath_worker.js", import.meta.url), { type: "module" }); // as bundlers expect it
+      Object.assign(worker, { files: 0, channels: new Map() });
+      worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);
+      worker.onerror = ({ message }) => {
+        const text = `ath_worker.js: got no worker (${message ?? "not found"}), expected it beside the loader`;
+        for (const channel of worker.channels.values()) channel.receive({ type: "failed", message: text, codeName: "WORKER" });
+      };
+      this.workerPool.push(worker);
+      return worker;
+    }
+    return this.workerPool.reduce((least, worker) => (worker.files < least.files ? worker : least));
+  }
+
+  /** Ends all workers; what was loaded shows its last picture from then on. */
+  dispose() {
+    for (const worker of this.workerPool) worker.terminate();
+    this.workerPool.length = 0;
+    return this;
+  }
+}

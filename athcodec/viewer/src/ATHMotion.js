@@ -1,0 +1,348 @@
+// The motion of one loaded plant: what time and depth it shows, what of it is here, and how it gets into a material.
+// Decoding is the worker's; this holds the textures that the vertex shaders read.
+
+import { BufferAttribute, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
+  Vector3 } from "three";
+
+import { injectMotion, motionUniforms } from "./shader.js";
+
+const WIDTH = 1024; // as in session.js
+const centre = new Vector3(), scale = new Vector3();
+
+export function dataTexture(data) {
+  const texture = new DataTexture(data, WIDTH, data.length / 4 / WIDTH, RGBAFormat, FloatType);
+  texture.magFilter = texture.minFilter = NearestFilter;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** Events: "frame" (a new picture is shown), "depth" (another depth is), "progress" (bytes came), "ready" (what can
+ * be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
+export class ATHMotion extends EventDispatcher {
+  time = 0;           // seconds, as asked for
+  wrap = "loop";      // "clamp", "pingpong"
+  frame = 0;          // of the picture that is shown; -1: of none yet
+  depth = -1;
+  held = false;
+  automatic = true;
+  target = 0;         // the depth that is asked for
+  pixels = 1;         // error on the screen that automatic depth allows
+  heat = false;       // whether pictures come with `distances`
+  distances = null;   // per vertex, from the deepest position that is here
+  mode = "matrices";
+  milliseconds = 0;   // that the worker took for the last picture
+  uniforms = motionUniforms();
+
+  #channel;
+  #id;
+  #geometries = new Set();
+  #parts = new Map();     // depth: {parts, texels}
+  #perVertex = new Map(); // depth: athPart in source order
+  #textures = new Map();
+  #spare = null;
+  #asked = null;          // what the worker was asked last, "" while it is at work
+  #pending = false;
+  #stale = false;
+  #answers = new Map();
+  #next = 1;
+
+  constructor(channel, id) {
+    super();
+    this.#channel = channel;
+    this.#id = id;
+    this.target = channel.info.levelCount - 1;
+    channel.views.set(id, this);
+  }
+
+  // ---- what there is ----
+
+  get info() {
+    return this.#channel.info;
+  }
+
+  /** Seconds of one round, the way from the last frame back to the first included. */
+  get duration() {
+    const { duration, frameCount } = this.info;
+    return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
+  }
+
+  get depthCount() {
+    return this.info.levelCount;
+  }
+
+  get bytesFetched() {
+    return this.#channel.state.fetched;
+  }
+
+  get bytesTotal() {
+    return this.info.fileLength;
+  }
+
+  get requests() {
+    return this.#channel.state.requests;
+  }
+
+  /** Bytes of the motion up to a depth, all segments. */
+  motionBytes(depth) {
+    return this.#channel.chunks.reduce((sum, chunk) => sum + (chunk.level <= depth ? chunk.length : 0), 0);
+  }
+
+  /** Bits per second of motion at a depth. */
+  bitRate(depth = Math.max(this.depth, 0)) {
+    return this.info.duration > 0 ? 8 * this.motionBytes(depth) / this.info.duration : 0;
+  }
+
+  /** Largest and root-mean-square error of a depth: {max, rms}. */
+  error(depth) {
+    return this.#channel.errors[depth];
+  }
+
+  /** The parts of the time that can be shown at `depth`, in seconds: [{start, end}]. */
+  ready(depth) {
+    const { times, segments, state } = this.#channel, found = [], last = times.length - 1;
+    state.ready.forEach((level, segment) => {
+      if (level < depth) return;
+      const start = times[segments[segment]] - times[0], end = times[Math.min(segments[segment + 1], last)] - times[0];
+      if (found.at(-1)?.end === start) found.at(-1).end = end;
+      else found.push({ start, end });
+    });
+    return found;
+  }
+
+  /** The deepest depth that every part of the time can be shown at; -1: none. */
+  get readyDepth() {
+    return Math.min(...this.#channel.state.ready);
+  }
+
+  get complete() {
+    return this.readyDepth === this.depthCount - 1;
+  }
+
+  // ---- what is shown ----
+
+  /** Shows the clip at `seconds`, as soon as the worker has it. */
+  setTime(seconds) {
+    this.time = seconds;
+    this.#ask();
+    return this;
+  }
+
+  /** A depth from 0 on, or "auto": update() then chooses it by the error on the screen. */
+  setDepth(depth) {
+    this.automatic = depth === "auto";
+    if (!this.automatic) this.target = MathUtils.clamp(depth, 0, this.depthCount - 1);
+    this.#ask();
+    return this;
+  }
+
+  /** "matrices" (default): the vertex shader moves the vertices. "positions": the worker does, and every picture
+   * writes the position attributes, for materials that injectMotion() cannot change. Before any bind(). */
+  setMode(mode) {
+    this.mode = mode;
+    return this;
+  }
+
+  /** The coarsest depth whose largest error is at most `pixels` on a screen `height` pixels high. */
+  depthFor(camera, height, matrixWorld = null, pixels = this.pixels) {
+    const sphere = this.#channel.sphere;
+    centre.copy(sphere.center);
+    let size = 1;
+    if (matrixWorld) {
+      centre.applyMatrix4(matrixWorld);
+      size = matrixWorld.getMaxScaleOnAxis();
+    }
+    const distance = Math.max(centre.distanceTo(scale.setFromMatrixPosition(camera.matrixWorld)) - sphere.radius * size, 1e-9);
+    const perUnit = camera.isOrthographicCamera ? height * camera.zoom / (camera.top - camera.bottom)
+      : height / (2 * Math.tan(MathUtils.degToRad(camera.fov) / 2) / camera.zoom * distance);
+    for (let depth = 0; depth < this.depthCount; depth++)
+      if (this.error(depth).max * size * perUnit <= pixels) return depth;
+    return this.depthCount - 1;
+  }
+
+  /** Automatic depth for a camera; once per frame, before setTime(). */
+  update(camera, height, object = null) {
+    if (this.automatic) this.target = this.depthFor(camera, height, object?.matrixWorld ?? null);
+    return this;
+  }
+
+  /** The clip at `seconds` and `depth`, decoded there and then: resolves when it is shown. Rejects where bytes of it
+   * are missing. */
+  show(seconds, depth = this.target) {
+    return this.#exactly({ seconds, level: depth, heat: this.heat, positions: this.mode === "positions" });
+  }
+
+  /** All vertices at `seconds` and `depth` in source order, 3 numbers each, whatever is shown. */
+  async positions(seconds, depth = this.target) {
+    const picture = await this.#exactly({ seconds, level: depth, positions: true, aside: true });
+    return picture.data;
+  }
+
+  #exactly(message) {
+    const id = this.#next++;
+    return new Promise((resolve, reject) => {
+      this.#answers.set(id, { resolve, reject, aside: message.aside });
+      this.#channel.send({ type: "picture", view: this.#id, id, wrap: this.wrap, exactly: true, ...message });
+    });
+  }
+
+  // One request at a time; the newest wishes go with the next.
+  #ask() {
+    const wish = `${this.time} ${this.target} ${this.wrap} ${this.heat}`;
+    if (this.#pending) {
+      this.#stale = wish !== this.#asked;
+      return;
+    }
+    if (wish === this.#asked && !this.#stale) return;
+    this.#asked = wish;
+    this.#stale = false;
+    this.#pending = true;
+    const buffer = this.#spare;
+    this.#spare = null;
+    this.#channel.send({
+      type: "picture", view: this.#id, id: 0, seconds: this.time, wrap: this.wrap, level: this.target, heat: this.heat,
+      positions: this.mode === "positions", buffer,
+    }, buffer ? [buffer] : []);
+  }
+
+  /** Asks again for what is shown: there may be a deeper picture now. */
+  refresh() {
+    this.#asked = null;
+    this.#ask();
+  }
+
+  // A picture of the worker: data is a texture (see session.js) or, in mode "positions", all vertices.
+  async picture(message) {
+    const answer = this.#answers.get(message.id);
+    this.#answers.delete(message.id);
+    if (!answer) this.#pending = false;
+    if (message.shown < 0) {
+      answer?.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
+    } else if (answer?.aside) {
+      answer.resolve(message);
+    } else {
+      if (!this.#parts.has(message.shown)) await this.#learn(message.shown);
+      this.#take(message);
+      answer?.resolve(message);
+    }
+    if (!answer && this.#stale) this.#ask();
+  }
+
+  async #learn(depth) {
+    if (!this.#parts.has(depth)) this.#parts.set(depth, await this.#channel.parts(depth));
+  }
+
+  #take({ shown, frame, data, heat, ms, held }) {
+    const changed = shown !== this.depth;
+    Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, depth: shown });
+    if (this.mode === "positions") this.#write(data);
+    else this.#upload(shown, data);
+    if (changed) {
+      for (const geometry of this.#geometries) this.#setParts(geometry);
+      this.dispatchEvent({ type: "depth", depth: shown });
+    }
+    this.dispatchEvent({ type: "frame", frame, depth: shown });
+  }
+
+  #upload(depth, data) {
+    const old = this.#textures.get(depth);
+    if (old && old.image.data.length === data.length) {
+      this.#spare = old.image.data.buffer;
+      old.image.data = data;
+      old.needsUpdate = true;
+    } else {
+      old?.dispose();
+      this.#textures.set(depth, dataTexture(data));
+    }
+    this.uniforms.athData.value = this.#textures.get(depth);
+  }
+
+  #write(data) {
+    for (const geometry of this.#geometries) {
+      const { source } = geometry.userData, { position, normal } = geometry.attributes;
+      for (let i = 0; i < source.length; i++)
+        for (let k = 0; k < 3; k++) position.array[3 * i + k] = data[3 * source[i] + k];
+      position.needsUpdate = true;
+      if (normal) geometry.computeVertexNormals();
+    }
+  }
+
+  /** What the shader makes of the texture that it reads now: 3 numbers per vertex, in source order. */
+  uploaded() {
+    const data = this.uniforms.athData.value.image.data, { rest } = this.#channel, out = new Float32Array(rest.length);
+    this.#partOfVertices(this.depth).forEach((part, vertex) => {
+      const at = 4 * (Math.abs(part) - 1), [x, y, z] = rest.subarray(3 * vertex, 3 * vertex + 3);
+      for (let k = 0; k < 3; k++)
+        out[3 * vertex + k] = part < 0 ? data[at + k]
+          : data[at + 4 * k] * x + data[at + 4 * k + 1] * y + data[at + 4 * k + 2] * z + data[at + 4 * k + 3];
+    });
+    return out;
+  }
+
+  // ---- materials and geometries ----
+
+  /** Lets a material draw this motion. In mode "positions" any material does. */
+  bind(material) {
+    return this.mode === "positions" ? material : injectMotion(material, this.uniforms);
+  }
+
+  /** Keeps a geometry made by the loader (`userData.source`) in step with what is shown. */
+  attach(geometry) {
+    geometry.boundingSphere = this.#channel.sphere.clone();
+    this.#geometries.add(geometry);
+    this.#setParts(geometry);
+    return geometry;
+  }
+
+  detach(geometry) {
+    this.#geometries.delete(geometry);
+  }
+
+  #setParts(geometry) {
+    if (this.mode === "positions") return;
+    const { source, other } = geometry.userData;
+    this.#setPart(geometry, "athPart", source);
+    if (other) this.#setPart(geometry, "athPartOther", other); // of the far end, where a vertex draws a line's side
+  }
+
+  #setPart(geometry, name, source) {
+    const there = geometry.getAttribute(name), array = there?.array ?? new Float32Array(source.length);
+    const parts = this.depth >= 0 ? this.#partOfVertices(this.depth) : null;
+    if (parts) for (let i = 0; i < source.length; i++) array[i] = parts[source[i]];
+    if (there) there.needsUpdate = true;
+    else geometry.setAttribute(name, new BufferAttribute(array, 1));
+  }
+
+  // athPart of every vertex in source order: 1 + first texel of its node's matrix, or minus that of its position.
+  #partOfVertices(depth) {
+    if (!this.#perVertex.has(depth)) this.#perVertex.set(depth, this.#channel.partOfVertices(this.#parts.get(depth)));
+    return this.#perVertex.get(depth);
+  }
+
+  /** Per vertex in source order, the number of the part that moves it at the depth that is shown. */
+  async partNumbers(depth = this.depth) {
+    await this.#learn(depth);
+    return this.#channel.partNumbers(this.#parts.get(depth));
+  }
+
+  /** A second view of the same file, with a time and a depth of its own. */
+  clone() {
+    return this.#channel.view();
+  }
+
+  dispose() {
+    for (const texture of this.#textures.values()) texture.dispose();
+    this.#textures.clear();
+    this.#channel.dropView(this.#id);
+  }
+}
+
+/** Where a plant can be in any frame, near enough: its rest pose, and room to move. */
+export function restSphere(rest) {
+  const low = new Vector3(Infinity, Infinity, Infinity), high = low.clone().negate(), point = new Vector3();
+  for (let i = 0; i < rest.length; i += 3) {
+    point.fromArray(rest, i);
+    low.min(point);
+    high.max(point);
+  }
+  return new Sphere(low.clone().add(high).multiplyScalar(0.5), low.distanceTo(high) * 0.5);
+}

@@ -1,0 +1,31 @@
+// The worker of ATHLoader: one or more files, each a Session. Messages carry the number of their file; the first
+// of a file is "open".
+
+import { ready } from "../ath_decoder.mjs";
+import { describe, Session } from "./session.js";
+import { HttpSource, MemorySource } from "./source.js";
+
+const sessions = new Map();
+
+function open({ file, url, options, bytes }) {
+  const post = (message, transfer = []) => self.postMessage({ ...message, file }, transfer);
+  const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
+  const session = new Session(source, post);
+  sessions.set(file, session);
+  ready.then(() => session.run(), (error) => post({ type: "failed", ...describe(error) }));
+}
+
+self.onmessage = ({ data }) => {
+  const session = sessions.get(data.file);
+  if (data.type === "open") open(data);
+  else if (data.type === "picture") session?.picture(data);
+  else if (data.type === "view") session?.view(data.view, data.level, data.frame);
+  else if (data.type === "drop") session?.drop(data.view);
+  else if (data.type === "parts") self.postMessage({ type: "parts", file: data.file, level: data.level,
+    parts: session.parts(data.level), texels: session.texels(data.level) });
+  else if (data.type === "bake") session?.bake(data);
+  else if (data.type === "close") {
+    session?.close();
+    sessions.delete(data.file);
+  }
+};

@@ -1,0 +1,6 @@
+// The npm package athcodec-three: see index.d.ts.
+
+export { ATH, ATHLoader } from "./ATHLoader.js";
+export { ATHMotion } from "./ATHMotion.js";
+export { ATHForest } from "./ATHForest.js";
+export { injectMotion, MOTION_PARS } from "./shader.js";

@@ -1,0 +1,50 @@
+// Normals of a mesh whose vertices move on their own, for the worker.
+
+/** Smooth normals, 3 numbers per vertex: each face adds its normal, as long as twice its area, to its corners.
+ * faces: {array, columns} or {array, counts}. */
+export function normals(positions, { array, columns = 0, counts = null }) {
+  const out = new Float32Array(positions.length), faces = counts ? counts.length : array.length / columns;
+  for (let face = 0, first = 0; face < faces; face++) {
+    const size = counts ? Number(counts[face]) : columns;
+    for (let k = 1; k + 1 < size; k++)
+      add(out, positions, Number(array[first]), Number(array[first + k]), Number(array[first + k + 1]));
+    first += size;
+  }
+  for (let at = 0; at < out.length; at += 3) {
+    const length = Math.hypot(out[at], out[at + 1], out[at + 2]) || 1;
+    out[at] /= length;
+    out[at + 1] /= length;
+    out[at + 2] /= length;
+  }
+  return out;
+}
+
+function add(out, p, a, b, c) {
+  a *= 3;
+  b *= 3;
+  c *= 3;
+  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+  for (const at of [a, b, c]) {
+    out[at] += nx;
+    out[at + 1] += ny;
+    out[at + 2] += nz;
+  }
+}
+
+/** The smallest rotation that takes normal `vertex` of `from` to that of `to`, as a quaternion at out[at]. */
+export function turns(from, to, vertex, out, at) {
+  const i = 3 * vertex, ax = from[i], ay = from[i + 1], az = from[i + 2], bx = to[i], by = to[i + 1], bz = to[i + 2];
+  const x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx, w = 1 + ax * bx + ay * by + az * bz;
+  const length = Math.hypot(x, y, z, w);
+  if (length < 1e-6) { // opposite: half a turn about anything across
+    const across = Math.hypot(ax, ay) || 1;
+    out.set(Math.hypot(ax, ay) > 1e-3 ? [-ay / across, ax / across, 0, 0] : [1, 0, 0, 0], at);
+    return;
+  }
+  out[at] = x / length;
+  out[at + 1] = y / length;
+  out[at + 2] = z / length;
+  out[at + 3] = w / length;
+}

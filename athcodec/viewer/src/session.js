@@ -1,0 +1,471 @@
+// One file in a worker: fetches what the views need, depth by depth and ahead of the playhead first; decodes it in
+// short steps between the pictures that are asked for; packs pictures for the GPU. The page is told by `post`.
+
+import { AthFile } from "../ath_decoder.mjs";
+import { normals, turns } from "./normals.js";
+import { attributeRanges, readAttributes, readPrelude } from "./statics.js";
+
+const FIRST_BYTES = 12 << 10;     // of the first request: prelude and coarse levels of a plant of 8,000 vertices
+const LEAST_REQUEST = 16 << 10, MOST_REQUEST = 2 << 20;
+const REQUEST_SECONDS = 0.15;     // what a request should take, by the speed of those before
+const LANES = 2;                  // requests at once
+const AHEAD_SECONDS = 8;          // what is fetched in full before what comes later
+const STEPS = 8, SLICE_MS = 6;    // of decoding between two looks at the messages
+const MOST_PREPARED = 256 << 20;  // bytes of decoded segments that are kept
+const STATE_MS = 50;
+const WIDTH = 1024;               // of the texture, in texels of four numbers
+
+const channel = new MessageChannel(), waiting = [];
+channel.port1.onmessage = () => waiting.shift()();
+const turn = () => new Promise((done) => { waiting.push(done); channel.port2.postMessage(0); });
+
+export class Session {
+  #file = null;
+  #front = new Uint8Array(0);
+  #views = new Map();     // id: {level, frame}
+  #prepared = new Map();  // "segment/level": Segment, those used last at the end
+  #underway = [];         // ranges that are being fetched
+  #parts = new Map();
+  #attributes = "missing"; // "reading", "here"
+  #speed = 0;             // bytes a second
+  #busy = false;
+  #failed = new Set();    // damaged chunks, "segment/level"
+  #wake = null;
+  #stateAt = 0;
+  #stateTimer = 0;
+  #closed = false;
+  #opened = false;
+  #hasFront = null;
+  #order = null;
+  #rest = null;
+  #restNormals = null;
+  #faces = null;
+
+  constructor(source, post) {
+    this.source = source;
+    this.post = post;
+  }
+
+  // ---- opening ----
+
+  async run() {
+    const opened = new Promise((done) => { this.#hasFront = done; });
+    const reading = this.#readFront();
+    try {
+      await Promise.race([opened, reading]);
+      await this.#tellOfFile();
+    } catch (error) {
+      reading.catch(() => {});
+      this.source.abort();
+      if (!this.#closed) this.post({ type: "failed", ...describe(error) });
+      return;
+    }
+    try {
+      await reading; // without ranges: the whole file
+      await this.#readAttributes();
+    } catch (error) {
+      if (!this.#closed) this.post({ type: "stopped", ...describe(error) });
+      return;
+    }
+    await Promise.all(Array.from({ length: LANES }, () => this.#lane()));
+  }
+
+  async #readFront() {
+    for (let needed = FIRST_BYTES; !this.#file;) {
+      const have = this.#front.length;
+      await this.source.read(have, needed - have, (bytes, offset) => this.#take(bytes, offset));
+      if (this.#file) return;
+      if (this.#front.length < needed) AthFile.open(this.#front); // throws what is missing
+      needed = Math.max(AthFile.front(this.#front).needed, this.#front.length + 1);
+    }
+  }
+
+  async #tellOfFile() {
+    const file = this.#file, { info } = file, statics = await readPrelude(file);
+    this.#faces = statics.faces;
+    this.#order = file.vertexSource();
+    this.post({
+      type: "opened", info: { ...info }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
+      vertexSource: this.#order, branchSource: file.branchSource(),
+      errors: Array.from({ length: info.levelCount }, (_, level) => file.levelError(level)),
+      chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
+      segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),
+    });
+    this.#opened = true;
+    this.#state(true);
+  }
+
+  // Bytes that have come, in any order once the file is open.
+  #take(bytes, offset) {
+    if (this.#closed) return;
+    if (this.#file) {
+      this.#file.feed(bytes, offset);
+      this.#changed();
+      return;
+    }
+    const skip = this.#front.length - offset;
+    if (skip < 0 || skip >= bytes.length) return;
+    const front = new Uint8Array(offset + bytes.length);
+    front.set(this.#front);
+    front.set(bytes.subarray(skip), this.#front.length);
+    this.#front = front;
+    if (!AthFile.front(front).ready) return;
+    this.#file = AthFile.open(front);
+    this.#front = new Uint8Array(0);
+    this.#hasFront();
+  }
+
+  // ---- fetching ----
+
+  async #lane() {
+    while (!this.#closed) {
+      const range = this.#next();
+      if (!range) {
+        await new Promise((wake) => { const before = this.#wake; this.#wake = () => { before?.(); wake(); }; });
+        continue;
+      }
+      this.#underway.push(range);
+      const start = performance.now();
+      let came = 0;
+      try {
+        await this.source.read(range.offset, range.size, (bytes, offset) => {
+          came += bytes.length;
+          this.#take(bytes, offset);
+        });
+      } catch (error) {
+        if (this.#closed) return;
+        this.post({ type: "stopped", ...describe(error) });
+        return;
+      } finally {
+        this.#underway.splice(this.#underway.indexOf(range), 1);
+      }
+      const seconds = (performance.now() - start) / 1000;
+      this.#speed = this.#speed * 0.5 + (came / Math.max(seconds, 1e-3)) * 0.5;
+      await this.#readAttributes();
+      this.#changed(true);
+    }
+  }
+
+  // The next bytes to ask for: one range; null: none for now.
+  #next() {
+    if (this.source.ranged === false) return null; // everything came with the first request
+    const most = Math.min(MOST_REQUEST, Math.max(LEAST_REQUEST, this.#speed * REQUEST_SECONDS));
+    let found = null;
+    for (const range of this.#wanted()) {
+      const size = Math.min(range.size, (this.source.total ?? Infinity) - range.offset);
+      if (size <= 0 || this.#isUnderway(range)) {
+        if (found) break;
+        continue;
+      }
+      if (!found) found = { offset: range.offset, size };
+      else if (range.offset === found.offset + found.size) found.size += size;
+      else break;
+      if (found.size >= most) break;
+    }
+    return found;
+  }
+
+  #isUnderway({ offset, size }) {
+    return this.#underway.some((other) => offset < other.offset + other.size && other.offset < offset + size);
+  }
+
+  // Missing ranges in the order in which they are wanted.
+  * #wanted() {
+    const file = this.#file, { segmentCount, frameCount, duration } = file.info;
+    const views = [...this.#views.values()];
+    const level = Math.max(0, ...views.map((view) => view.level));
+    const first = views.length ? file.segmentOf(Math.min(frameCount - 1, Math.floor(views[0].frame))) : 0;
+    const frames = frameCount / segmentCount;
+    const ahead = Math.min(segmentCount, 1 + Math.ceil(AHEAD_SECONDS * frameCount / Math.max(duration, 1e-9) / frames));
+    const order = Array.from({ length: segmentCount }, (_, i) => (first + i) % segmentCount);
+    const soon = order.slice(0, ahead), late = order.slice(ahead);
+    yield* this.#missing(soon, 0, Math.min(1, level));
+    if (this.#attributes === "missing") yield* attributeRanges(file);
+    yield* this.#missing(soon, 2, level);
+    yield* this.#missing(late, 0, level);
+  }
+
+  * #missing(segments, from, to) {
+    for (let level = from; level <= to; level++)
+      for (const segment of segments)
+        if (this.#file.readyLevel(segment) < level) yield* this.#file.ranges(level, segment, segment);
+  }
+
+  // Tells the page of the named arrays once all that can be had are here.
+  async #readAttributes() {
+    const end = this.source.total ?? Infinity;
+    const left = attributeRanges(this.#file).filter(({ offset, size }) => offset + size <= end);
+    if (this.#attributes !== "missing" || (left.length > 0 && this.source.ranged !== false)) return;
+    this.#attributes = "reading";
+    try {
+      const attributes = await readAttributes(this.#file);
+      if (attributes.face_vertex_counts && attributes.face_vertex_indices) {
+        this.#faces = { counts: attributes.face_vertex_counts.array, array: attributes.face_vertex_indices.array };
+        this.#restNormals = null;
+      }
+      this.post({ type: "attributes", attributes });
+    } catch (error) {
+      this.post({ type: "damaged", level: null, ...describe(error) });
+    }
+    this.#attributes = "here";
+  }
+
+  // ---- what is here ----
+
+  #changed(soon = false) {
+    this.#wakeUp();
+    if (this.#opened) {
+      this.#decode();
+      this.#state(soon);
+    }
+  }
+
+  #wakeUp() {
+    const wake = this.#wake;
+    this.#wake = null;
+    wake?.();
+  }
+
+  // Tells the page, not at every piece.
+  #state(now = false) {
+    const since = performance.now() - this.#stateAt;
+    if (!now && since < STATE_MS) {
+      if (!this.#stateTimer) this.#stateTimer = setTimeout(() => this.#state(true), STATE_MS - since);
+      return;
+    }
+    clearTimeout(this.#stateTimer);
+    this.#stateTimer = 0;
+    this.#stateAt = performance.now();
+    if (this.#closed) return;
+    const { segmentCount, fileLength } = this.#file.info;
+    this.post({
+      type: "state", fetched: this.source.fetched, requests: this.source.requests, ranged: this.source.ranged,
+      total: fileLength, there: this.source.total, speed: this.#speed,
+      ready: Int8Array.from({ length: segmentCount }, (_, segment) => this.#readyLevel(segment)),
+    });
+  }
+
+  // The deepest level that a segment can be shown at: its bytes are here and are not damaged.
+  #readyLevel(segment) {
+    let level = this.#file.readyLevel(segment);
+    for (let damaged = 0; damaged <= level; damaged++)
+      if (this.#failed.has(`${segment}/${damaged}`)) level = damaged - 1;
+    return level;
+  }
+
+  // ---- decoding ----
+
+  /** A view shows `frame` at `level` from now on. */
+  view(id, level, frame) {
+    this.#views.set(id, { level, frame });
+    this.#wakeUp();
+    if (this.#opened) this.#decode();
+  }
+
+  drop(id) {
+    this.#views.delete(id);
+  }
+
+  async #decode() {
+    if (this.#busy) return;
+    this.#busy = true;
+    for (let job = this.#job(); job && !this.#closed; job = this.#job()) await this.#prepareInSteps(...job);
+    this.#busy = false;
+  }
+
+  // The next segment and level to decode: what the views show, then what they show next.
+  #job() {
+    const { frameCount, segmentCount } = this.#file.info;
+    for (const next of [0, 1]) {
+      for (const { level, frame } of this.#views.values()) {
+        const now = this.#file.segmentOf(Math.max(0, Math.min(frameCount - 1, Math.floor(frame))));
+        const segment = (now + next) % segmentCount, best = Math.min(level, this.#readyLevel(segment));
+        if (best >= 0 && !this.#prepared.has(`${segment}/${best}`)) return [segment, best];
+      }
+    }
+    return null;
+  }
+
+  async #prepareInSteps(segment, level) {
+    try {
+      const preparation = this.#file.preparation(segment, level);
+      let start = performance.now();
+      while (!preparation.step(STEPS)) {
+        if (performance.now() - start < SLICE_MS) continue;
+        await turn();
+        if (this.#closed) return;
+        start = performance.now();
+      }
+      this.#keep(preparation.segment);
+      this.post({ type: "decoded", segment, level });
+    } catch (error) {
+      this.#damaged(segment, level, error);
+    }
+  }
+
+  #damaged(segment, level, error) {
+    const chunk = error.chunk >= 0 ? this.#file.chunks()[error.chunk] : null;
+    const known = this.#failed.size, bad = chunk && chunk.level < 255 ? Math.min(level, chunk.level) : level;
+    this.#failed.add(`${segment}/${bad}`);
+    if (this.#failed.size > known) this.post({ type: "damaged", segment, level: bad, ...describe(error) });
+    this.#state(true);
+  }
+
+  #keep(segment) {
+    const key = `${segment.index}/${segment.level}`;
+    this.#prepared.get(key)?.free();
+    this.#prepared.delete(key);
+    this.#prepared.set(key, segment);
+    const { frameCount, segmentCount, vertexCount } = this.#file.info;
+    const most = Math.max(6, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
+    for (const [oldest, old] of this.#prepared) {
+      if (this.#prepared.size <= most) break;
+      old.free();
+      this.#prepared.delete(oldest);
+    }
+  }
+
+  #segment(index, level) {
+    const key = `${index}/${level}`, segment = this.#prepared.get(key);
+    if (!segment) return null;
+    this.#prepared.delete(key);
+    this.#prepared.set(key, segment);
+    return segment;
+  }
+
+  // Segments of one level that show `frame`: the deepest that is decoded, or, where nothing is, the coarsest that
+  // there is. `exactly`: this level and no other, decoded now.
+  #show(frame, level, exactly) {
+    const file = this.#file, { frameCount } = file.info;
+    const low = Math.min(frameCount - 1, Math.floor(frame));
+    const high = frame > low ? (low + 1) % frameCount : low;
+    const indices = [...new Set([file.segmentOf(low), file.segmentOf(high)])];
+    if (exactly) return { level, segments: indices.map((index) => this.#now(index, level)) };
+    for (let each = level; each >= 0; each--) {
+      const segments = indices.map((index) => this.#segment(index, each));
+      if (segments[0]) return { level: each, segments };
+    }
+    return this.#readyLevel(indices[0]) < 0 ? null : { level: 0, segments: [this.#now(indices[0], 0)] };
+  }
+
+  #now(index, level) {
+    const there = this.#segment(index, level);
+    if (there) return there;
+    const segment = this.#file.prepare(index, level);
+    this.#keep(segment);
+    return segment;
+  }
+
+  // ---- pictures ----
+
+  parts(level) {
+    if (!this.#parts.has(level)) this.#parts.set(level, this.#file.parts(level));
+    return this.#parts.get(level);
+  }
+
+  /** The picture of a view: see ATHMotion's #picture. */
+  picture({ view, id, seconds, wrap, level, exactly = false, heat = false, positions = false, buffer = null }) {
+    if (!this.#opened) return;
+    const start = performance.now(), frame = this.#file.frameAt(seconds, wrap);
+    if (!exactly) this.view(view, level, frame);
+    let shown = null;
+    try {
+      shown = this.#show(frame, level, exactly);
+    } catch (error) {
+      if (exactly) {
+        this.post({ type: "picture", view, id, shown: -1, frame, ...describe(error) });
+        return;
+      }
+      this.#damaged(this.#file.segmentOf(Math.floor(frame)), 0, error);
+    }
+    if (!shown) {
+      this.post({ type: "picture", view, id, shown: -1, frame, buffer }, buffer ? [buffer] : []);
+      return;
+    }
+    const answer = { type: "picture", view, id, shown: shown.level, frame, exactly };
+    if (positions) answer.data = this.#file.positions(shown.segments, frame);
+    else answer.data = this.#pack(shown, frame, buffer);
+    answer.held = this.#file.held;
+    if (heat) answer.heat = this.#distances(shown, frame);
+    answer.ms = performance.now() - start;
+    this.post(answer, [answer.data.buffer, ...(answer.heat ? [answer.heat.buffer] : [])]);
+  }
+
+  /** Texels of a level: three per node, then one per exact vertex, two where the mesh has faces: its position and
+   * the rotation of its normal. */
+  texels(level) {
+    const { nodeCount, exactCount } = this.parts(level);
+    return 3 * nodeCount + (this.#faces ? 2 : 1) * exactCount;
+  }
+
+  #pack({ level, segments }, frame, buffer = null) {
+    const size = 4 * WIDTH * Math.ceil(this.texels(level) / WIDTH);
+    const data = buffer?.byteLength === 4 * size ? new Float32Array(buffer) : new Float32Array(size);
+    this.#fill(data, 0, level, segments, frame);
+    return data;
+  }
+
+  #fill(data, at, level, segments, frame) {
+    const { nodeCount, exactCount } = this.parts(level), exactAt = at + 12 * nodeCount;
+    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt) });
+    if (exactCount === 0) return;
+    const exact = this.#file.exact(segments, frame);
+    const stride = this.#faces ? 8 : 4;
+    for (let i = 0, from = 0, to = exactAt; i < exactCount; i++, to += stride) {
+      data[to] = exact[from++];
+      data[to + 1] = exact[from++];
+      data[to + 2] = exact[from++];
+    }
+    if (this.#faces) this.#fillTurns(data, exactAt, level, segments, frame);
+  }
+
+  // How the normal of every exact vertex has turned since the rest pose.
+  #fillTurns(data, at, level, segments, frame) {
+    const file = this.#file;
+    this.#rest ??= file.rest();
+    this.#restNormals ??= normals(this.#rest, this.#faces);
+    const { branch, first, count, index } = this.parts(level), source = this.#order;
+    const now = normals(file.positions(segments, frame), this.#faces);
+    for (let part = 0; part < branch.length; part++) {
+      if (branch[part] >= 0) continue;
+      for (let i = 0; i < count[part]; i++)
+        turns(this.#restNormals, now, source[first[part] + i], data, at + 8 * (index[part] + i) + 4);
+    }
+  }
+
+  // Per vertex, how far the shown position is from that of the deepest level that is here.
+  #distances({ level, segments }, frame) {
+    const { levelCount } = this.#file.info;
+    const deepest = this.#show(frame, levelCount - 1, false);
+    const a = this.#file.positions(segments, frame), b = this.#file.positions(deepest.segments, frame);
+    return Float32Array.from({ length: a.length / 3 }, (_, i) => level === deepest.level ? 0
+      : Math.hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1], a[3 * i + 2] - b[3 * i + 2]));
+  }
+
+  /** All frames of a level, every `step`-th of them, one behind the other: what a forest plays. */
+  async bake({ id, level, step }) {
+    const file = this.#file, { frameCount } = file.info, texels = this.texels(level);
+    const rows = Math.ceil(frameCount / step), data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
+    try {
+      for (let row = 0; row < rows; row++) {
+        const { segments } = this.#show(row * step, level, true);
+        this.#fill(data, 4 * row * texels, level, segments, row * step);
+        if (row % 4 === 3) await turn();
+        if (this.#closed) return;
+      }
+      this.post({ type: "baked", id, level, step, rows, texels, data }, [data.buffer]);
+    } catch (error) {
+      this.post({ type: "baked", id, level, data: null, ...describe(error) });
+    }
+  }
+
+  close() {
+    this.#closed = true;
+    this.source.abort();
+    this.#wakeUp();
+  }
+}
+
+export function describe(error) {
+  return { message: error.message, codeName: error.codeName ?? error.name };
+}

@@ -1,0 +1,128 @@
+// Where the bytes of a file come from: a server, in ranges or, where it has none, in one growing download; or
+// memory. What they mean is not known here.
+
+const TRIES = 4, FIRST_PAUSE = 150; // milliseconds; four times as long each further time
+
+export class LoadError extends Error {
+  constructor(message, codeName = "NETWORK") {
+    super(message);
+    this.name = "LoadError";
+    this.codeName = codeName;
+  }
+}
+
+/** Bytes that are all here. */
+export class MemorySource {
+  ranged = true;
+  requests = 0;
+  fetched = 0;
+
+  constructor(bytes) {
+    this.bytes = bytes;
+    this.total = bytes.length;
+  }
+
+  async read(offset, size, take) {
+    const piece = this.bytes.subarray(offset, offset + size);
+    this.fetched += piece.length;
+    take(piece, offset);
+  }
+
+  abort() {}
+}
+
+/** A file behind http or https. `ranged` is null until the first answer. */
+export class HttpSource {
+  ranged = null;
+  requests = 0;
+  fetched = 0;   // bytes of answers
+  total = null;  // bytes of the file, where the server says it
+  #tag = null;
+  #abort = new AbortController();
+
+  constructor(url, { headers = {}, credentials = "same-origin" } = {}) {
+    this.url = url;
+    this.options = { headers, credentials };
+  }
+
+  /** Hands `take(bytes, offset)` the pieces of a range as they come. A server without ranges sends the whole
+   * file, and so does this. */
+  async read(offset, size, take) {
+    let at = offset;
+    const end = offset + size, forward = (bytes, from) => {
+      this.fetched += bytes.length;
+      at = from + bytes.length;
+      take(bytes, from);
+    };
+    for (let attempt = 0; ; attempt++) {
+      try {
+        const answered = await this.#request(at, end - at, forward);
+        if (answered && this.ranged && at < Math.min(end, this.total ?? end)) throw new TypeError("connection cut off");
+        return;
+      } catch (error) {
+        if (!(error instanceof TypeError)) throw error; // fetch: the network; all others know better
+        if (attempt === TRIES - 1) throw new LoadError(`${this.url}: got no answer (${error.message})`);
+        if (this.ranged === false) at = 0;
+        await new Promise((done) => setTimeout(done, FIRST_PAUSE * 4 ** attempt));
+      }
+    }
+  }
+
+  async #request(offset, size, forward) {
+    const { headers, credentials } = this.options;
+    this.requests++;
+    const answer = await fetch(this.url, {
+      headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
+    });
+    if (answer.status === 416) return this.#beyond(answer);
+    if (answer.status >= 500 || answer.status === 429) throw new TypeError(`status ${answer.status}`);
+    if (!answer.ok) throw new LoadError(`${this.url}: got status ${answer.status} ${answer.statusText}`, "HTTP");
+    const from = this.#place(answer, offset);
+    this.#sameFile(answer);
+    await this.#pieces(answer, from, forward);
+    return true;
+  }
+
+  #beyond(answer) {
+    const total = /\/(\d+)$/.exec(answer.headers.get("Content-Range") ?? "");
+    this.ranged = true;
+    this.total = total ? Number(total[1]) : this.total;
+    return false;
+  }
+
+  // Where the answer begins in the file.
+  #place(answer, offset) {
+    if (answer.status !== 206) {
+      this.ranged = false;
+      const length = answer.headers.get("Content-Length");
+      this.total = length && !answer.headers.get("Content-Encoding") ? Number(length) : null;
+      return 0;
+    }
+    this.ranged = true;
+    const found = /bytes (\d+)-\d+\/(\d+|\*)/.exec(answer.headers.get("Content-Range") ?? "");
+    if (!found) return offset; // another site that keeps the header to itself
+    if (found[2] !== "*") this.total = Number(found[2]);
+    return Number(found[1]);
+  }
+
+  #sameFile(answer) {
+    const tag = answer.headers.get("ETag") ?? answer.headers.get("Last-Modified");
+    if (tag && this.#tag && tag !== this.#tag)
+      throw new LoadError(`${this.url}: got another file than the one that was opened; load it again`, "CHANGED");
+    this.#tag ??= tag;
+  }
+
+  async #pieces(answer, offset, forward) {
+    const reader = answer.body.getReader();
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      forward(value, offset);
+      offset += value.length;
+    }
+  }
+
+  abort() {
+    this.#abort.abort();
+  }
+}
