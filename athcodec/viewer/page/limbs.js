@@ -39,54 +39,79 @@ void main() {
   #include <colorspace_fragment>
 }`;
 
-/** Radius of every vertex: the file's, or by the pipe model, so that the trunk is 1/90 of the plant's size. */
+/** Radius of every vertex: the file's, or by the pipe model, so that the trunk is a fiftieth of the plant's size. */
 export function radii(ath) {
-  const stored = ath.attributes.radius, { edges, count } = { edges: ath.skeleton, count: ath.rest.length / 3 };
+  const stored = ath.attributes.radius, count = ath.rest.length / 3;
   if (stored?.array.length === count) return Float32Array.from(stored.array, Number);
-  const beyond = new Float32Array(count).fill(1), after = Array.from({ length: edges.length / 2 }, (_, i) => i);
-  const { first, count: stem, attach } = ath.branches, source = ath.channel.vertexSource;
+  const beyond = new Float32Array(count).fill(1), { first, count: stem, attach } = ath.branches, source = ath.channel.vertexSource;
   for (let b = first.length - 1; b >= 0; b--) {
     for (let i = first[b] + stem[b] - 2; i >= first[b]; i--) beyond[source[i]] += beyond[source[i + 1]];
     if (attach[b] >= 0) beyond[source[attach[b]]] += beyond[source[first[b]]];
   }
-  after.length = 0;
-  const most = beyond.reduce((a, b) => Math.max(a, b), 1), thick = ath.sphere.radius / 45;
+  const most = beyond.reduce((a, b) => Math.max(a, b), 1), thick = ath.sphere.radius / 50;
   return beyond.map((value) => thick * Math.sqrt(value / most));
 }
 
+/** Does ahead of limbGeometry() what takes longest of it. */
+export function prepareLimbs(ath) {
+  if (!ath.hasFaces) ath.limbs = limbs(ath);
+}
+
 /** Four vertices per edge. */
-export function limbGeometry(ath) {
+export function limbGeometry(ath, radius) {
+  const geometry = ath.limbs ?? limbs(ath);
+  ath.limbs = null;
+  setRadii(geometry, radius);
+  return geometry;
+}
+
+function limbs(ath) {
   const edges = ath.skeleton, count = edges.length / 2, source = new Uint32Array(4 * count), other = new Uint32Array(4 * count);
   const side = new Float32Array(4 * count), index = new Uint32Array(6 * count);
-  for (let e = 0; e < count; e++) {
-    const [u, v] = [edges[2 * e], edges[2 * e + 1]];
-    source.set([u, u, v, v], 4 * e);
-    other.set([v, v, u, u], 4 * e);
-    side.set([1, 2, -2, -1], 4 * e); // sign: which end; size: which side
-    index.set([0, 1, 2, 2, 1, 3].map((k) => 4 * e + k), 6 * e);
+  for (let e = 0, at = 0, corner = 0; e < edges.length; e += 2, at += 4) {
+    source[at] = source[at + 1] = other[at + 2] = other[at + 3] = edges[e];
+    other[at] = other[at + 1] = source[at + 2] = source[at + 3] = edges[e + 1];
+    side[at] = 1; // sign: which end; size: which side
+    side[at + 1] = 2;
+    side[at + 2] = -2;
+    side[at + 3] = -1;
+    index[corner++] = at;
+    index[corner++] = at + 1;
+    index[corner++] = at + 2;
+    index[corner++] = at + 2;
+    index[corner++] = at + 1;
+    index[corner++] = at + 3;
   }
-  const geometry = new BufferGeometry(), at = (list) => {
-    const out = new Float32Array(3 * list.length);
-    list.forEach((vertex, i) => out.set(ath.rest.subarray(3 * vertex, 3 * vertex + 3), 3 * i));
-    return new BufferAttribute(out, 3);
-  };
+  const geometry = new BufferGeometry();
   geometry.setIndex(new BufferAttribute(index, 1));
-  geometry.setAttribute("position", at(source));
-  geometry.setAttribute("other", at(other));
+  geometry.setAttribute("position", pointsOf(ath.rest, source));
+  geometry.setAttribute("other", pointsOf(ath.rest, other));
   geometry.setAttribute("side", new BufferAttribute(side, 1));
   geometry.userData = { source, other };
-  setRadii(geometry, radii(ath));
   return geometry;
+}
+
+function pointsOf(rest, vertices) {
+  const out = new Float32Array(3 * vertices.length);
+  for (let i = 0, to = 0; i < vertices.length; i++) {
+    const from = 3 * vertices[i];
+    out[to++] = rest[from];
+    out[to++] = rest[from + 1];
+    out[to++] = rest[from + 2];
+  }
+  return new BufferAttribute(out, 3);
 }
 
 export function setRadii(geometry, perVertex) {
   const { source } = geometry.userData;
-  geometry.setAttribute("radius", new BufferAttribute(Float32Array.from(source, (vertex) => perVertex[vertex]), 1));
+  const out = new Float32Array(source.length);
+  for (let i = 0; i < source.length; i++) out[i] = perVertex[source[i]];
+  geometry.setAttribute("radius", new BufferAttribute(out, 1));
 }
 
-export function limbMaterial(motion) {
+export function limbMaterial(uniforms) {
   return new ShaderMaterial({
     vertexShader: VERTEX, fragmentShader: FRAGMENT, side: 2,
-    uniforms: { ...motion.uniforms, screen: { value: new Vector2(1, 1) }, shade: { value: 1 } },
+    uniforms: { ...uniforms, screen: { value: new Vector2(1, 1) }, shade: { value: 1 } },
   });
 }

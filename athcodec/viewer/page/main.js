@@ -1,10 +1,11 @@
 // The viewer: opens a file by ?file=URL, by dropping it, or one that the page itself carries, and plays it.
 
-import { Box3, Color, LineBasicMaterial, MeshLambertMaterial, DoubleSide, Vector3 } from "three";
-import { ATHForest, ATHLoader } from "athcodec-three";
+import { Box3, BufferGeometry, Color, DoubleSide, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, Vector3 } from "three";
+import { ATHForest, ATHLoader, dataTexture, injectMotion, motionUniforms } from "athcodec-three";
 
 import { heatGradient, nodeColour } from "./colours.js";
-import { Plant } from "./plant.js";
+import { limbMaterial, prepareLimbs } from "./limbs.js";
+import { lineMaterial, meshMaterial, Plant } from "./plant.js";
 import { readback } from "./readback.js";
 import { Stage } from "./stage.js";
 import { $, bytesText, Choice, countText, lengthText, paintReady, rateText, rows } from "./ui.js";
@@ -17,13 +18,39 @@ const state = { playing: true, speed: 1, loop: true, time: 0, forest: null, dirt
 const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null };
 let plants = [], opened = [], last = 0;
 
-const stage = new Stage($("canvas"), () => { state.dirty = true; });
-
-// ---- files ----
-
 const words = { NOT_AN_ATH_FILE: "This is not an .ath file", UNSUPPORTED_VERSION: "This file is of another version of the format",
   HTTP: "The file cannot be fetched", NETWORK: "The file cannot be fetched", MISSING: "The file is cut off too early", TRUNCATED: "The file is cut off too early",
   CHANGED: "The file has changed", WORKER: "The decoder cannot be started" };
+
+begin(); // the file is on its way while the stage is set up, which takes longer
+loader.preload();
+const stage = new Stage($("canvas"), () => { state.dirty = true; });
+const unmoved = motionUniforms();
+unmoved.athData.value = dataTexture(new Float32Array(4096));
+stage.warm([new Mesh(new BufferGeometry(), limbMaterial(unmoved)), new Mesh(new BufferGeometry(), injectMotion(meshMaterial(), unmoved)),
+  new LineSegments(new BufferGeometry(), injectMotion(lineMaterial(), unmoved))]);
+if (matchMedia("(max-width: 680px)").matches) togglePanel();
+
+// ---- files ----
+
+// A page that carries its file and its worker: see serve.py.
+function embedded() {
+  const worker = $("ath-worker"), file = $("ath-file");
+  if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
+  if (!file) return false;
+  const bytes = Uint8Array.from(atob(file.textContent.trim()), (character) => character.charCodeAt(0));
+  open({ bytes: bytes.buffer }, file.dataset.name);
+  return true;
+}
+
+function begin() {
+  if (embedded()) return;
+  const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
+  const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
+  if (url) open(url, nameOf(url)).then(() => second && opened.length && open(second, nameOf(second), true));
+  else refuse({ message: "Drop an .ath file here, or open one. It stays on this computer.", codeName: "none" });
+  if (!url) $("message").querySelector("h2").textContent = "No file yet";
+}
 
 function refuse(error) {
   console.warn(`athcodec: ${error.message}`);
@@ -67,16 +94,22 @@ async function open(source, name, beside = false) {
   ath.motion.addEventListener("stopped", ({ message }) => note(message));
   ath.motion.addEventListener("damaged", ({ message }) => note(`Shown without what is damaged: ${message}`));
   compare.set(beside ? "file" : "off");
+  await breath();
+  prepareLimbs(ath);
+  await breath();
   arrange();
+  await breath();
   frameView();
 }
+
+// Lets the page answer between two pieces of work.
+const breath = () => new Promise((done) => { setTimeout(done); });
 
 function describe() {
   const [ath] = opened, { info } = ath.motion;
   $("name").textContent = opened.map((each) => each.fileName).join("  ·  ");
   document.title = `${ath.fileName} – athcodec`;
-  const height = ath.metadata.height ? "" : "";
-  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${countText(info.frameCount)} frames${height}`;
+  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${countText(info.frameCount)} frames`;
 }
 
 // ---- what is on the stage ----
@@ -100,7 +133,7 @@ function arrange() {
   }
   if (plants.length > 1) forestSwitch(false);
   stage.setPanes(plants.map((plant) => ({
-    scene: stage.scene([plant.root]), before: (width, height) => plant.setScreen(width, height),
+    scene: stage.scene([plant.root]), before: (width, height) => plant.prepare(width, height),
   })));
   place();
   depthControls();
@@ -241,7 +274,7 @@ function instances(count) {
 }
 
 function forestMaterial(lines, level) {
-  const stored = Boolean(plants[0].ath.geometry?.getAttribute("color"));
+  const stored = Boolean(plants[0].ath.geometry?.hasAttribute("color"));
   const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide, vertexColors: stored });
   tintForest(material, lines, level, stored);
   return material;
@@ -527,33 +560,11 @@ addEventListener("keydown", (event) => {
   action(event);
 });
 
-// ---- begin ----
-
-// A page that carries its file and its worker: see serve.py.
-function embedded() {
-  const worker = $("ath-worker"), file = $("ath-file");
-  if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
-  if (!file) return false;
-  const bytes = Uint8Array.from(atob(file.textContent.trim()), (character) => character.charCodeAt(0));
-  open({ bytes: bytes.buffer }, file.dataset.name);
-  return true;
-}
-
-if (matchMedia("(max-width: 680px)").matches) togglePanel();
-
-const wanted = new URLSearchParams(location.search);
-if (!embedded()) {
-  const url = wanted.get("file"), second = wanted.get("compare");
-  const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
-  if (url) open(url, nameOf(url)).then(() => second && opened.length && open(second, nameOf(second), true));
-  else refuse({ message: "Drop an .ath file here, or open one. It stays on this computer.", codeName: "none" });
-  if (!url) $("message").querySelector("h2").textContent = "No file yet";
-}
 requestAnimationFrame(tick);
 
 /** For scripts and tests. */
 globalThis.athcodecViewer = {
-  counters, state, stage, seek, setPlaying, setDepth, forestSwitch, frameView,
+  counters, state, stage, open, seek, setPlaying, setDepth, forestSwitch, frameView,
   get plants() { return plants; },
   get motion() { return plants.at(-1)?.motion; },
   async shown(seconds, level) {

@@ -5,7 +5,10 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Group, LineBasicMaterial, 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbGeometry, limbMaterial, radii, setRadii } from "./limbs.js";
 
-const LEAF = [0.19, 0.33, 0.09];
+const LEAF = [0.19, 0.33, 0.09], OVER = [0.55, 0.2, 0.06];
+
+export const meshMaterial = () => new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
+export const lineMaterial = () => new LineBasicMaterial({ vertexColors: true });
 
 // A geometry of its own for another motion: all but athPart is shared.
 function sharing(geometry) {
@@ -26,6 +29,7 @@ export class Plant {
   #node = null;
   #radii;
   #drawn = [];
+  #stale = true;
 
   constructor(ath, motion = ath.motion) {
     this.ath = ath;
@@ -36,54 +40,70 @@ export class Plant {
     this.root.updateMatrixWorld(true);
     const { depth } = ath.branches, branch = ath.vertexBranch;
     this.#orders = branch.map((b) => depth[b]);
-    this.onArrays = () => this.#build();
+    this.onArrays = () => this.#arrays();
     ath.addEventListener("arrays", this.onArrays);
     this.onDepth = () => { if (this.colour === "node") this.#numberNodes(); };
-    this.onFrame = () => { if (this.colour === "distance") this.#paint(); };
+    this.onFrame = () => { if (this.colour === "distance") this.paint(); };
     motion.addEventListener("depth", this.onDepth);
     motion.addEventListener("frame", this.onFrame);
     this.#build();
   }
 
   #build() {
+    this.#clear();
+    this.#radii = radii(this.ath);
+    this.setShow(this.show);
+    this.setColour(this.colour);
+  }
+
+  #clear() {
     for (const { object, geometry } of this.#drawn) {
       this.root.remove(object);
       this.motion.detach(geometry);
+      geometry.dispose();
       object.material.dispose();
     }
     this.#drawn = [];
-    this.#radii = radii(this.ath);
-    const { ath, motion } = this;
-    if (ath.geometry) {
-      const geometry = motion.attach(sharing(ath.geometry));
-      this.#add("mesh", geometry, new Mesh(geometry, motion.bind(new MeshLambertMaterial({ vertexColors: true, side: DoubleSide }))));
-    } else {
-      const geometry = limbGeometry(ath);
-      setRadii(geometry, this.#radii);
-      motion.attach(geometry);
-      this.#add("mesh", geometry, new Mesh(geometry, limbMaterial(motion)));
+  }
+
+  // What came behind the motion: faces, or how thick the limbs are.
+  #arrays() {
+    if (this.ath.hasFaces) {
+      this.#build();
+      return;
     }
-    const lines = motion.attach(this.#lines());
-    this.#add("skeleton", lines, new LineSegments(lines, motion.bind(new LineBasicMaterial({ vertexColors: true }))));
-    this.#drawn.at(-1).object.renderOrder = 1;
-    this.setShow(this.show);
-    this.setColour(this.colour);
+    this.#radii = radii(this.ath);
+    for (const { kind, geometry } of this.#drawn) if (kind === "mesh") setRadii(geometry, this.#radii);
+    this.paint();
+  }
+
+  // Made when it is first shown.
+  #need(kind) {
+    if (this.#drawn.some((drawn) => drawn.kind === kind)) return;
+    const { ath, motion } = this;
+    let object;
+    if (kind === "skeleton") {
+      object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
+      object.renderOrder = 1;
+    } else if (ath.hasFaces) {
+      object = new Mesh(motion.attach(sharing(ath.geometry)), motion.bind(meshMaterial()));
+    } else {
+      const geometry = limbGeometry(ath, this.#radii);
+      object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));
+    }
+    const { geometry } = object;
+    geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * geometry.userData.source.length), 3));
+    object.frustumCulled = false;
+    this.#drawn.push({ kind, geometry, object });
+    this.root.add(object);
   }
 
   #lines() {
     const { rest, skeleton } = this.ath, geometry = new BufferGeometry();
     geometry.setIndex(new BufferAttribute(skeleton, 1));
-    geometry.setAttribute("position", new BufferAttribute(rest.slice(), 3));
+    geometry.setAttribute("position", new BufferAttribute(rest, 3));
     geometry.userData.source = Uint32Array.from({ length: rest.length / 3 }, (_, i) => i);
     return geometry;
-  }
-
-  #add(kind, geometry, object) {
-    const { source } = geometry.userData;
-    geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * source.length), 3));
-    object.frustumCulled = false;
-    this.#drawn.push({ kind, geometry, object });
-    this.root.add(object);
   }
 
   get vertices() {
@@ -92,11 +112,12 @@ export class Plant {
 
   setShow(show) {
     this.show = show;
+    for (const kind of ["mesh", "skeleton"]) if (show === kind || show === "both") this.#need(kind);
     for (const { kind, object } of this.#drawn) {
       object.visible = show === "both" || show === kind;
       if (kind === "skeleton") object.material.depthTest = show !== "both";
     }
-    this.#paint();
+    this.paint();
   }
 
   setColour(colour) {
@@ -104,57 +125,68 @@ export class Plant {
     this.motion.heat = colour === "distance";
     if (colour === "node") this.#numberNodes();
     this.motion.refresh();
-    this.#paint();
-  }
-
-  setScreen(width, height) {
-    for (const { object } of this.#drawn) object.material.uniforms?.screen?.value.set(width, height);
+    this.paint();
   }
 
   async #numberNodes() {
     if (this.motion.depth < 0) return;
     this.#node = await this.motion.partNumbers();
-    this.#paint();
+    this.paint();
   }
 
   /** Colour of a vertex (source order) as linear r, g, b. */
   #colours() {
     const { colour, motion } = this;
-    if (colour === "node" && this.#node) return (vertex) => nodeColour(this.#node[vertex]);
-    if (colour === "order") return (vertex) => orderColour(this.#orders[vertex]);
+    if (colour === "node" && this.#node) {
+      const parts = Array.from({ length: 1 + this.#node.reduce((a, b) => Math.max(a, b), 0) }, (_, part) => nodeColour(part));
+      return (vertex) => parts[this.#node[vertex]];
+    }
+    if (colour === "order") {
+      const orders = Array.from({ length: 1 + this.#orders.reduce((a, b) => Math.max(a, b), 0) }, (_, order) => orderColour(order));
+      return (vertex) => orders[this.#orders[vertex]];
+    }
     if (colour === "distance") {
       const { distances } = motion;
       this.heatMost = motion.depth < 0 ? 0 : motion.error(motion.depth).max;
       return (vertex) => heat(distances && this.heatMost ? Math.sqrt(distances[vertex] / this.heatMost) : 0);
     }
     const most = this.#orders.reduce((a, b) => Math.max(a, b), 1);
-    return (vertex) => barkColour(this.#orders[vertex] / most);
+    const barks = Array.from({ length: most + 1 }, (_, order) => barkColour(order / most));
+    return (vertex) => barks[this.#orders[vertex]];
   }
 
-  #paint() {
-    const colourOf = this.#colours(), leafy = this.colour === "plain" && Boolean(this.ath.geometry);
-    const stored = this.ath.geometry?.getAttribute("color");
+  /** Asks for new colours, before the next picture is drawn. */
+  paint() {
+    this.#stale = true;
+    this.onPaint?.();
+  }
+
+  /** Once per drawn picture. */
+  prepare(width, height) {
+    for (const { object } of this.#drawn) object.material.uniforms?.screen?.value.set(width, height);
+    if (!this.#stale) return;
+    this.#stale = false;
+    const colourOf = this.#colours(), leafy = this.colour === "plain" && this.ath.hasFaces;
+    const stored = leafy ? this.ath.geometry.getAttribute("color") : null;
+    const line = this.show === "both" && this.colour === "plain" ? OVER : null;
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible) continue;
-      const { source } = geometry.userData, colour = geometry.getAttribute("color"), bare = kind === "skeleton" && this.show === "both";
-      for (let i = 0; i < source.length; i++) {
-        const value = leafy && kind === "mesh" ? (stored ? [stored.getX(i), stored.getY(i), stored.getZ(i)] : LEAF)
-          : bare && this.colour === "plain" ? [0.55, 0.2, 0.06] : colourOf(source[i]);
-        colour.array.set(value, 3 * i);
+      const { source } = geometry.userData, colour = geometry.getAttribute("color"), out = colour.array;
+      const fixed = kind === "skeleton" ? line : leafy && !stored ? LEAF : null;
+      for (let i = 0, at = 0; i < source.length; i++, at += 3) {
+        const value = fixed ?? (leafy && kind === "mesh" ? stored.array.subarray(i * stored.itemSize) : colourOf(source[i]));
+        out[at] = value[0];
+        out[at + 1] = value[1];
+        out[at + 2] = value[2];
       }
       colour.needsUpdate = true;
     }
-    this.onPaint?.();
   }
 
   dispose() {
     this.ath.removeEventListener("arrays", this.onArrays);
     this.motion.removeEventListener("depth", this.onDepth);
     this.motion.removeEventListener("frame", this.onFrame);
-    for (const { geometry, object } of this.#drawn) {
-      this.motion.detach(geometry);
-      geometry.dispose();
-      object.material.dispose();
-    }
+    this.#clear();
   }
 }

@@ -1,6 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes side by side, each with its own scene.
 
-import { Color, DirectionalLight, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
+import { BufferAttribute, Color, DirectionalLight, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
   WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
@@ -33,10 +33,23 @@ export class Stage {
 
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const ratio = Math.min(devicePixelRatio, 2);
+    if (width === this.width && height === this.height && ratio === this.renderer.getPixelRatio()) return;
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
     this.width = width;
     this.height = height;
+  }
+
+  /** Compiles what plants are drawn with before there are any, and draws it once: what waits for the graphics
+   * processor waits here. */
+  warm(objects) {
+    this.kept = this.scene(objects); // programs live as long as a material that uses them
+    for (const object of objects) {
+      object.geometry.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
+      object.frustumCulled = false;
+    }
+    this.renderer.render(this.kept, this.camera);
   }
 
   /** A pane's scene; `content` is added to it. */

@@ -13,7 +13,7 @@ export function rateText(bits) {
   return bits < 1e6 ? `${(bits / 1e3).toFixed(1)} kbit/s` : `${(bits / 1e6).toFixed(2)} Mbit/s`;
 }
 
-export const countText = (number) => number.toLocaleString("en");
+export const countText = (number) => String(number).replace(/\B(?=(\d{3})+$)/g, ",");
 
 /** A length of the file, in millimetres and the like where its unit is known. */
 export function lengthText(length, unit) {

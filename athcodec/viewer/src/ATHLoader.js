@@ -122,27 +122,71 @@ class Channel {
   }
 }
 
-/** What load() gives: see ATHLoader.d.ts. */
+/** What load() gives: see index.d.ts. What is drawn is made when it is first asked for. */
 export class ATH extends EventDispatcher {
-  geometry = null;   // faces
-  lines = null;      // edges, or the skeleton where there are no faces either
   attributes = {};
-  object = new Group();
   #channel;
+  #faces;
+  #geometry = null;
+  #lines = null;
+  #object = null;
 
   constructor(channel, mode) {
     super();
     this.#channel = channel;
     this.motion = channel.view().setMode(mode);
     this.metadata = channel.statics.metadata;
-    const { statics } = channel, faces = polygonsOf(statics, {});
-    if (faces) this.#setFaces(faces);
-    if (statics.edges || !faces) this.#setLines(statics.edges ?? statics.skeleton);
-    this.object.name = "ath";
+    this.#faces = polygonsOf(channel.statics, {});
     this.arrays = channel.arrays.then((attributes) => this.#addArrays(attributes));
   }
 
-  /** Numbers of the vertices of the skeleton's edges, whether they are drawn or not. */
+  get hasFaces() {
+    return this.#faces !== null;
+  }
+
+  /** Faces as triangles; null where there are none. */
+  get geometry() {
+    if (!this.#geometry && this.#faces) {
+      this.#geometry = this.motion.attach(meshGeometry(this.#channel, this.#faces));
+      addAttributes(this.#geometry, this.#channel, this.attributes);
+    }
+    return this.#geometry;
+  }
+
+  /** Edges as lines: those of the file or, where it has neither edges nor faces, of the branches. */
+  get lines() {
+    const { statics } = this.#channel;
+    if (!this.#lines && (statics.edges || !this.#faces))
+      this.#lines = this.motion.attach(lineGeometry(this.#channel, statics.edges ?? statics.skeleton));
+    return this.#lines;
+  }
+
+  /** Something to add to a scene: a Mesh of the faces, LineSegments where there are none. */
+  get object() {
+    if (!this.#object) {
+      this.#object = new Group();
+      this.#object.name = "ath";
+      this.#draw();
+    }
+    return this.#object;
+  }
+
+  #draw() {
+    const { geometry, motion } = this;
+    for (const old of [...this.#object.children]) {
+      old.removeFromParent();
+      old.material.dispose();
+    }
+    if (!geometry) {
+      this.#object.add(new LineSegments(this.lines, motion.bind(new LineBasicMaterial({ color: 0x6b5b45 }))));
+      return;
+    }
+    const vertexColors = geometry.hasAttribute("color"), color = vertexColors ? 0xffffff : 0x8a9a6b;
+    const material = new MeshStandardMaterial({ color, vertexColors, roughness: 0.8, side: DoubleSide });
+    this.#object.add(new Mesh(geometry, motion.bind(material)));
+  }
+
+  /** Edges (u, v) in any case, the file's or those that follow from the branches. */
   get skeleton() {
     return this.#channel.statics.skeleton;
   }
@@ -172,40 +216,19 @@ export class ATH extends EventDispatcher {
     return this.#channel;
   }
 
-  #setFaces(faces) {
-    this.geometry = this.motion.attach(meshGeometry(this.#channel, faces));
-    const material = this.motion.bind(new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
-    this.mesh = new Mesh(this.geometry, material);
-    this.object.add(this.mesh);
-    if (this.lines && !this.#channel.statics.edges) this.object.remove(this.line);
-  }
-
-  #setLines(edges) {
-    this.lines = this.motion.attach(lineGeometry(this.#channel, edges));
-    this.line = new LineSegments(this.lines, this.motion.bind(new LineBasicMaterial({ color: 0x6b5b45 })));
-    this.object.add(this.line);
-  }
-
   #addArrays(attributes) {
     this.attributes = attributes;
-    const faces = this.geometry ? null : polygonsOf(this.#channel.statics, attributes);
-    if (faces) this.#setFaces(faces);
-    if (this.geometry) {
-      addAttributes(this.geometry, this.#channel, attributes);
-      if (this.geometry.getAttribute("color") && this.mesh) {
-        this.mesh.material.color.set(0xffffff);
-        this.mesh.material.vertexColors = true;
-        this.mesh.material.needsUpdate = true;
-      }
-    }
+    this.#faces ??= polygonsOf(this.#channel.statics, attributes);
+    if (this.#geometry) addAttributes(this.#geometry, this.#channel, attributes);
+    if (this.#object && this.#faces) this.#draw();
     this.dispatchEvent({ type: "arrays" });
     return attributes;
   }
 
   dispose() {
     this.motion.dispose();
-    for (const geometry of [this.geometry, this.lines]) geometry?.dispose();
-    for (const drawn of [this.mesh, this.line]) drawn?.material.dispose();
+    for (const geometry of [this.#geometry, this.#lines]) geometry?.dispose();
+    for (const drawn of this.#object?.children ?? []) drawn.material.dispose();
     this.#channel.close();
   }
 }
@@ -234,6 +257,12 @@ export class ATHLoader extends Loader {
   /** "matrices", or "positions" for renderers other than WebGLRenderer: see ATHMotion.setMode. */
   setMode(mode) {
     this.mode = mode;
+    return this;
+  }
+
+  /** Starts a worker before there is a file for it. */
+  preload() {
+    if (this.workerPool.length === 0) this.#start();
     return this;
   }
 
@@ -293,19 +322,21 @@ export class ATHLoader extends Loader {
   #worker() {
     const idle = this.workerPool.find((worker) => worker.files === 0);
     if (idle) return idle;
-    if (this.workerPool.length < this.workerLimit) {
-      const worker = this.workerURL ? new Worker(this.workerURL, { type: "module" })
-        : new Worker(new URL("./ath_worker.js", import.meta.url), { type: "module" }); // as bundlers expect it
-      Object.assign(worker, { files: 0, channels: new Map() });
-      worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);
-      worker.onerror = ({ message }) => {
-        const text = `ath_worker.js: got no worker (${message ?? "not found"}), expected it beside the loader`;
-        for (const channel of worker.channels.values()) channel.receive({ type: "failed", message: text, codeName: "WORKER" });
-      };
-      this.workerPool.push(worker);
-      return worker;
-    }
+    if (this.workerPool.length < this.workerLimit) return this.#start();
     return this.workerPool.reduce((least, worker) => (worker.files < least.files ? worker : least));
+  }
+
+  #start() {
+    const worker = this.workerURL ? new Worker(this.workerURL, { type: "module" })
+      : new Worker(new URL("./ath_worker.js", import.meta.url), { type: "module" }); // as bundlers expect it
+    Object.assign(worker, { files: 0, channels: new Map() });
+    worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);
+    worker.onerror = ({ message }) => {
+      const text = `ath_worker.js: got no worker (${message ?? "not found"}), expected it beside the loader`;
+      for (const channel of worker.channels.values()) channel.receive({ type: "failed", message: text, codeName: "WORKER" });
+    };
+    this.workerPool.push(worker);
+    return worker;
   }
 
   /** Ends all workers; what was loaded shows its last picture from then on. */

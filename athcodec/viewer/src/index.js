@@ -1,6 +1,6 @@
 // The npm package athcodec-three: see index.d.ts.
 
 export { ATH, ATHLoader } from "./ATHLoader.js";
-export { ATHMotion } from "./ATHMotion.js";
+export { ATHMotion, dataTexture } from "./ATHMotion.js";
 export { ATHForest } from "./ATHForest.js";
-export { injectMotion, MOTION_PARS } from "./shader.js";
+export { injectMotion, MOTION_PARS, motionUniforms } from "./shader.js";
