@@ -6,33 +6,16 @@ import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { deflateSync } from "node:zlib";
 
 const here = dirname(fileURLToPath(import.meta.url)), [out] = process.argv.slice(2);
 const modules = process.env.NODE_PATH, require = createRequire(join(modules, "x.js"));
 const esbuild = require("esbuild");
 mkdirSync(out, { recursive: true });
 
-// zstddec has its WebAssembly as base64; deflated first it takes half the room.
-const packedZstd = {
-  name: "packed-zstd",
-  setup(build) {
-    build.onLoad({ filter: /zstddec\.mjs$/ }, ({ path }) => {
-      const text = readFileSync(path, "utf8"), wasm = /const wasm = "([^"]*)"/.exec(text);
-      const load = "fetch(`data:application/wasm;base64,${wasm}`).then((response) => response.arrayBuffer())";
-      if (!wasm || !text.includes(load)) throw new Error(`${path}: got another zstddec than build.mjs knows`);
-      const packed = deflateSync(Buffer.from(wasm[1], "base64"), { level: 9 }).toString("base64");
-      const inflate = 'new Response(new Blob([Uint8Array.from(atob(wasm), (c) => c.charCodeAt(0))]).stream()'
-        + '.pipeThrough(new DecompressionStream("deflate"))).arrayBuffer()';
-      return { contents: text.replace(wasm[1], packed).replace(load, inflate), loader: "js" };
-    });
-  },
-};
-
 async function bundle(entry, name, external) {
   await esbuild.build({
     ...entry, outfile: join(out, name), bundle: true, minify: true, format: "esm", target: "es2022", external,
-    nodePaths: [modules], legalComments: "none", plugins: [packedZstd], charset: "utf8", logLevel: "error",
+    nodePaths: [modules], legalComments: "none", charset: "utf8", logLevel: "error",
   });
   return readFileSync(join(out, name), "utf8");
 }
@@ -57,10 +40,6 @@ const digest = createHash("sha256").update(map).digest("base64");
 writeFileSync(join(out, "index.html"), page.replace("IMPORT_MAP_HASH", `'sha256-${digest}'`));
 copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
 const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
-const zstd = readFileSync(join(modules, "zstddec/dist/zstddec.mjs"), "utf8");
-const facebook = /\/\*\*\n\* BSD License[^]*?\*\//.exec(zstd)[0];
-writeFileSync(join(out, "LICENSES.txt"), [
-  `three.js (three.js, OrbitControls.js), version ${JSON.parse(readFileSync(join(modules, "three/package.json"), "utf8")).version}\n\n${licence("three")}`,
-  `zstddec (in ath_worker.js)\n\n${licence("zstddec")}`,
-  `Zstandard (in ath_worker.js)\n\n${facebook.replace(/^\/?\*+\/? ?/gm, "").trim()}`,
-].join(`\n\n${"-".repeat(80)}\n\n`) + "\n");
+const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;
+writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, OrbitControls.js"], ["fzstd", "in ath_worker.js"]]
+  .map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`).join(`\n${"-".repeat(80)}\n\n`));

@@ -24,7 +24,7 @@ const words = { NOT_AN_ATH_FILE: "This is not an .ath file", UNSUPPORTED_VERSION
 
 begin(); // the file is on its way while the stage is set up, which takes longer
 loader.preload();
-const stage = new Stage($("canvas"), () => { state.dirty = true; });
+const stage = new Stage($("canvas"), () => { state.dirty = true; }, () => { if (plants.length > 0 && !stage.moved) frameView(); });
 const unmoved = motionUniforms();
 unmoved.athData.value = dataTexture(new Float32Array(4096));
 stage.warm([new Mesh(new BufferGeometry(), limbMaterial(unmoved)), new Mesh(new BufferGeometry(), injectMotion(meshMaterial(), unmoved)),
@@ -94,6 +94,7 @@ async function open(source, name, beside = false) {
   ath.motion.addEventListener("stopped", ({ message }) => note(message));
   ath.motion.addEventListener("damaged", ({ message }) => note(`Shown without what is damaged: ${message}`));
   compare.set(beside ? "file" : "off");
+  stage.moved = false;
   await breath();
   prepareLimbs(ath);
   await breath();
@@ -155,10 +156,10 @@ function pictured(plant) {
 
 // The world's box of all rest poses.
 function box() {
-  const all = new Box3(), point = new Vector3();
+  const all = new Box3();
   for (const { ath, root } of plants) {
     root.updateMatrixWorld(true);
-    for (let i = 0; i < ath.rest.length; i += 3) all.expandByPoint(point.fromArray(ath.rest, i).applyMatrix4(root.matrixWorld));
+    all.union(ath.box.clone().applyMatrix4(root.matrixWorld));
   }
   return all;
 }
@@ -175,8 +176,10 @@ function frameView() {
     stage.look(new Vector3(0, all.min.y + radius * 0.4, 0), Math.min(reach, 5 * radius), { ground: all.min.y, groundSize: 2.6 * reach / Math.min(reach, 5 * radius) });
     stage.controls.maxDistance = 6 * reach;
     stage.camera.far = 12 * reach + 20 * radius;
+    stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * radius);
     return;
   }
+  stage.fog(0, 0);
   stage.look(centre, radius, { ground: all.min.y, groundSize: 2.8 });
 }
 
@@ -274,26 +277,28 @@ function instances(count) {
 }
 
 function forestMaterial(lines, level) {
-  const stored = Boolean(plants[0].ath.geometry?.hasAttribute("color"));
-  const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide, vertexColors: stored });
-  tintForest(material, lines, level, stored);
+  const material = lines ? new LineBasicMaterial() : new MeshLambertMaterial({ side: DoubleSide });
+  tintForest(material, lines, level);
   return material;
 }
 
-function tintForest(material, lines, level, stored) {
-  if (colour.value === "plain") material.color = new Color(stored && !lines ? 0xffffff : lines ? 0x75683f : 0x6f8f4a);
-  else material.color = new Color().setRGB(...nodeColour(level + 1));
+// Bark, leaves or the file's own colours; by depth where nodes are told apart.
+function tintForest(material, lines, level) {
+  const plain = colour.value === "plain", stored = lines || plants[0].ath.geometry.hasAttribute("color");
+  if (material.vertexColors !== (plain && stored)) material.needsUpdate = true;
+  material.vertexColors = plain && stored;
+  material.color = plain ? new Color(stored ? 0xffffff : 0x6f8f4a) : new Color().setRGB(...nodeColour(level + 1));
 }
 
 function colourForest() {
-  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level, drawn.material.vertexColors));
+  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.depth));
 }
 
 function forestOn() {
   const [plant] = plants;
   state.forest?.removeFromParent();
   state.forest?.dispose();
-  const forest = new ATHForest(plant.ath, forestMaterial);
+  const forest = new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial });
   state.forest = forest;
   forest.levelOfDetail = $("forest-lod").checked;
   forest.addEventListener("depth", () => { state.dirty = true; });
@@ -515,6 +520,7 @@ $("toggle-panel").addEventListener("click", togglePanel);
 function togglePanel() {
   const hidden = document.body.classList.toggle("no-panel");
   $("toggle-panel").setAttribute("aria-expanded", String(!hidden));
+  stage.fit();
 }
 
 let dragging = 0;
@@ -547,7 +553,7 @@ const KEYS = {
   ",": () => changeSpeed(-1), ".": () => changeSpeed(1), l: () => setLoop(!state.loop),
   "-": () => changeDepth(-1), "+": () => changeDepth(1), "=": () => changeDepth(1), a: () => setDepth("auto"),
   c: () => colour.next(), s: () => show.next(), d: () => compare.pick(compare.value === "off" ? "depths" : "off"),
-  f: () => forestSwitch(!state.forest), r: frameView, p: picture, h: togglePanel, "?": () => $("keys").showModal(),
+  f: () => forestSwitch(!state.forest), r: () => { stage.moved = false; frameView(); }, p: picture, h: togglePanel, "?": () => $("keys").showModal(),
 };
 
 addEventListener("keydown", (event) => {

@@ -98,6 +98,21 @@ export class Plant {
     this.root.add(object);
   }
 
+  /** What a forest draws of a plant without faces: lines in the colours of bark. */
+  forestGeometry() {
+    if (this.ath.hasFaces) return this.ath.geometry;
+    const geometry = this.#lines(), out = new Float32Array(this.ath.rest.length), colourOf = this.#barks();
+    for (let i = 0; i < out.length / 3; i++) out.set(colourOf(i), 3 * i);
+    geometry.setAttribute("color", new BufferAttribute(out, 3));
+    return geometry;
+  }
+
+  #barks() {
+    const most = this.#orders.reduce((a, b) => Math.max(a, b), 1);
+    const barks = Array.from({ length: most + 1 }, (_, order) => barkColour(order / most));
+    return (vertex) => barks[this.#orders[vertex]];
+  }
+
   #lines() {
     const { rest, skeleton } = this.ath, geometry = new BufferGeometry();
     geometry.setIndex(new BufferAttribute(skeleton, 1));
@@ -130,7 +145,7 @@ export class Plant {
 
   async #numberNodes() {
     if (this.motion.depth < 0) return;
-    this.#node = await this.motion.partNumbers();
+    this.#node = await this.motion.nodeNumbers();
     this.paint();
   }
 
@@ -150,9 +165,7 @@ export class Plant {
       this.heatMost = motion.depth < 0 ? 0 : motion.error(motion.depth).max;
       return (vertex) => heat(distances && this.heatMost ? Math.sqrt(distances[vertex] / this.heatMost) : 0);
     }
-    const most = this.#orders.reduce((a, b) => Math.max(a, b), 1);
-    const barks = Array.from({ length: most + 1 }, (_, order) => barkColour(order / most));
-    return (vertex) => barks[this.#orders[vertex]];
+    return this.#barks();
   }
 
   /** Asks for new colours, before the next picture is drawn. */

@@ -1,6 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes side by side, each with its own scene.
 
-import { BufferAttribute, Color, DirectionalLight, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
+import { BufferAttribute, Color, DirectionalLight, Fog, HemisphereLight, Mesh, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3,
   WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
@@ -16,7 +16,9 @@ void main() {
 export class Stage {
   panes = [];
 
-  constructor(canvas, changed) {
+  moved = false; // by hand, since the whole was last in view
+
+  constructor(canvas, changed, resized) {
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
@@ -24,21 +26,34 @@ export class Stage {
     this.controls.enableDamping = true;
     this.controls.dampingFactor = 0.12;
     this.controls.addEventListener("change", changed);
+    this.controls.addEventListener("start", () => { this.moved = true; });
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", () => { this.#tint(); changed(); });
     this.changed = changed;
-    new ResizeObserver(() => { this.#resize(); changed(); }).observe(canvas.parentElement);
+    this.resized = resized;
+    new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
     this.#resize();
+  }
+
+  /** Takes the size that the page leaves. */
+  fit() {
+    if (!this.#resize()) return;
+    this.resized();
+    this.changed();
   }
 
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
     const ratio = Math.min(devicePixelRatio, 2);
-    if (width === this.width && height === this.height && ratio === this.renderer.getPixelRatio()) return;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
-    this.width = width;
-    this.height = height;
+    const inset = parseInt(getComputedStyle(this.canvas.parentElement).getPropertyValue("--inset"), 10) || 0;
+    const sized = width !== this.width || height !== this.height || ratio !== this.renderer.getPixelRatio();
+    if (!sized && inset === this.inset) return false;
+    if (sized) {
+      this.renderer.setPixelRatio(ratio);
+      this.renderer.setSize(width, height, false);
+    }
+    Object.assign(this, { width, height, inset });
+    return true;
   }
 
   /** Compiles what plants are drawn with before there are any, and draws it once: what waits for the graphics
@@ -78,6 +93,7 @@ export class Stage {
     const style = getComputedStyle(document.documentElement);
     for (const scene of scenes) {
       scene.background = new Color(style.getPropertyValue("--back").trim() || "#ffffff");
+      scene.fog?.color.copy(scene.background);
       const { tint, strength } = scene.getObjectByName("ground").material.uniforms;
       tint.value.set(0, 0, 0);
       strength.value = this.dark.matches ? 0.5 : 0.16;
@@ -92,7 +108,7 @@ export class Stage {
 
   /** The whole of a sphere (in the world) in view; `up` is the height of the ground. */
   look(centre, radius, { near = 1, ground = 0, groundSize = 4 } = {}) {
-    const aspect = Math.min(1, (this.width / this.height) / Math.max(1, this.panes.length));
+    const aspect = Math.min(1, (this.width - this.inset) / this.height / Math.max(1, this.panes.length));
     const distance = near * 1.12 * radius / Math.sin(this.camera.fov * Math.PI / 360) / aspect;
     this.controls.target.copy(centre);
     this.camera.position.copy(centre).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
@@ -112,21 +128,28 @@ export class Stage {
     }
   }
 
+  /** Haze from one distance to another; none where both are 0. */
+  fog(near, far) {
+    for (const { scene } of this.panes) scene.fog = far > 0 ? new Fog(scene.background, near, far) : null;
+  }
+
   /** Height of a pane in pixels of the device. */
   get pixels() {
     return this.height * this.renderer.getPixelRatio();
   }
 
+  // What lies behind the settings is drawn too, and counts for nothing else.
   render() {
-    const { renderer, camera, panes } = this, width = this.width / Math.max(1, panes.length);
-    camera.aspect = width / this.height;
-    camera.updateProjectionMatrix();
-    camera.updateMatrixWorld();
+    const { renderer, camera, panes, height, inset } = this, width = (this.width - inset) / Math.max(1, panes.length);
+    camera.aspect = width / height;
     renderer.setScissorTest(panes.length > 1);
     panes.forEach(({ scene, before }, i) => {
-      before?.(width * renderer.getPixelRatio(), this.pixels);
-      renderer.setViewport(i * width, 0, width, this.height);
-      renderer.setScissor(i * width, 0, width, this.height);
+      const drawn = i === panes.length - 1 ? width + inset : width;
+      camera.setViewOffset(width, height, 0, 0, drawn, height);
+      camera.updateMatrixWorld();
+      before?.(drawn * renderer.getPixelRatio(), this.pixels);
+      renderer.setViewport(i * width, 0, drawn, height);
+      renderer.setScissor(i * width, 0, drawn, height);
       renderer.render(scene, camera);
     });
   }

@@ -81,16 +81,17 @@ export function rows(list, entries) {
 }
 
 /** What is here over time: the deeper, the stronger. */
-export function paintReady(canvas, levels, depthCount) {
-  const width = canvas.clientWidth * devicePixelRatio, height = canvas.clientHeight * devicePixelRatio;
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  const pen = canvas.getContext("2d");
-  pen.clearRect(0, 0, width, height);
-  pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--accent");
+export function paintReady(element, levels, depthCount) {
+  const stops = [];
   levels.forEach((level, i) => {
-    if (level < 0) return;
-    pen.globalAlpha = 0.2 + 0.8 * ((level + 1) / depthCount) ** 1.5;
-    const from = Math.round((i * width) / levels.length), to = Math.round(((i + 1) * width) / levels.length);
-    pen.fillRect(from, 0, Math.max(1, to - from), height);
+    if (i > 0 && level === levels[i - 1]) return;
+    const shade = level < 0 ? "transparent" : `color-mix(in srgb, var(--accent) ${Math.round(20 + 80 * ((level + 1) / depthCount) ** 1.5)}%, transparent)`;
+    let end = i;
+    while (end < levels.length && levels[end] === level) end++;
+    stops.push(`${shade} ${(100 * i) / levels.length}% ${(100 * end) / levels.length}%`);
   });
+  const image = `linear-gradient(to right, ${stops.join(", ")})`;
+  if (element.dataset.image === image) return;
+  element.dataset.image = image;
+  element.style.backgroundImage = image;
 }

@@ -1,16 +1,19 @@
 // Many instances of one plant, each with a place, size, turn and time of its own, drawn at the depth that its distance
 // asks for: a few draw calls per frame. The motion of a depth lies in one texture for all instances of it.
 
-import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBufferGeometry, LineSegments, Matrix4, Mesh,
-  Sphere, Vector3, BufferAttribute } from "three";
+import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBufferGeometry, LineBasicMaterial, LineSegments,
+  Matrix4, Mesh, MeshStandardMaterial, Sphere, Vector3, BufferAttribute, DoubleSide } from "three";
 
 import { dataTexture } from "./ATHMotion.js";
-import { clustered, gather, lineGeometry } from "./geometry.js";
+import { clustered, gather } from "./geometry.js";
 import { injectMotion, motionUniforms } from "./shader.js";
 
 const MOST_TEXELS = 4 << 20; // of one depth: 64 MiB; longer clips are played at fewer frames a second
 const TALLEST = 4096;        // rows of a texture that every device has
 const CELL = 1.5;            // side of the cells of simplified geometry, in pixels' worth of error
+
+const plainMaterial = (lines) => (lines ? new LineBasicMaterial({ color: 0x6b5b45 })
+  : new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
 
 export class ATHForest extends Group {
   levelOfDetail = true;
@@ -25,11 +28,14 @@ export class ATHForest extends Group {
   #places = new Float32Array(0);
   #turns = new Float32Array(0);
   #material;
+  #geometry;
 
-  /** material: makes the material of a depth's mesh or lines, given whether it is lines. */
-  constructor(ath, material) {
+  /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, depth): makes the material of a
+   * depth (default: like ath.object's). */
+  constructor(ath, { geometry = ath.geometry ?? ath.lines, material = plainMaterial } = {}) {
     super();
     this.#ath = ath;
+    this.#geometry = geometry;
     this.#material = material;
     this.name = "ath forest";
   }
@@ -69,10 +75,9 @@ export class ATHForest extends Group {
   }
 
   #draw(level, known, uniforms) {
-    const { channel, geometry: faces, motion } = this.#ath, lines = !faces;
-    const whole = faces ?? lineGeometry(channel, this.#ath.skeleton);
+    const { channel, motion } = this.#ath, whole = this.#geometry, lines = !whole.hasAttribute("normal");
     const deepest = level === motion.depthCount - 1;
-    const parts = channel.partNumbers(known), texel = channel.partOfVertices(known);
+    const parts = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
     parts.forEach((part, vertex) => { if (texel[vertex] < 0) parts[vertex] = -1; }); // exact runs: one space
     const less = deepest ? whole : clustered(whole, this.#ath.rest, CELL * motion.error(level).max, parts);
     const geometry = new InstancedBufferGeometry();
@@ -84,6 +89,7 @@ export class ATHForest extends Group {
     geometry.instanceCount = 0;
     const material = injectMotion(this.#material(lines, level), uniforms, true);
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
+    drawn.userData.depth = level;
     drawn.frustumCulled = false; // instances are, one by one
     return { drawn, geometry, size: less.userData.source.length };
   }
@@ -99,7 +105,7 @@ export class ATHForest extends Group {
 
   /** Chooses what to draw: once per frame. height: of the screen, in pixels. */
   update(camera, height, seconds) {
-    const filled = this.#depths.map(() => 0), sphere = new Sphere(), view = new Frustum(), base = this.#ath.sphere;
+    const filled = this.#depths.map(() => 0), sphere = new Sphere(), view = new Frustum();
     const place = new Vector3(), eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
     this.updateWorldMatrix(true, false);
     const inverse = new Matrix4().copy(this.matrixWorld).invert();
@@ -113,7 +119,7 @@ export class ATHForest extends Group {
     for (let i = 0; i < this.#places.length && there.length > 0; i += 4) {
       const size = this.#places[i + 3];
       place.fromArray(this.#places, i);
-      sphere.center.copy(place).addScaledVector(base.center, 0);
+      sphere.center.copy(place);
       sphere.radius = reach * size;
       if (!view.intersectsSphere(sphere)) {
         this.culled++;

@@ -4,7 +4,7 @@
 import { Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
   LoaderUtils } from "three";
 
-import { ATHMotion, restSphere } from "./ATHMotion.js";
+import { ATHMotion, restBounds } from "./ATHMotion.js";
 import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
 
 let files = 0;
@@ -34,7 +34,7 @@ class Channel {
   receive(message) {
     const { type } = message;
     if (type === "opened") {
-      Object.assign(this, message, { type: undefined, sphere: restSphere(message.rest) });
+      Object.assign(this, message, { type: undefined }, restBounds(message.rest));
       this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
       this.settle.resolve(this);
     } else if (type === "failed") {
@@ -99,10 +99,19 @@ class Channel {
     return out;
   }
 
-  partNumbers({ parts: { branch, first, count } }) {
-    const out = new Int32Array(this.info.vertexCount);
+  // The branch that a vertex moves with: that of its node, or its own where its position is exact.
+  nodeNumbers({ parts: { branch, first, count } }) {
+    const out = this.vertexBranch;
     for (let part = 0; part < branch.length; part++)
-      for (let i = 0; i < count[part]; i++) out[this.vertexSource[first[part] + i]] = part;
+      for (let i = 0; branch[part] >= 0 && i < count[part]; i++) out[this.vertexSource[first[part] + i]] = branch[part];
+    return out;
+  }
+
+  /** Number (file order) of the branch of every vertex, in source order. */
+  get vertexBranch() {
+    const { branches: { first, count }, vertexSource } = this, out = new Int32Array(vertexSource.length);
+    for (let b = 0; b < first.length; b++)
+      for (let i = first[b]; i < first[b] + count[b]; i++) out[vertexSource[i]] = b;
     return out;
   }
 
@@ -201,15 +210,17 @@ export class ATH extends EventDispatcher {
 
   /** Number (file order) of the branch of every vertex, in source order. */
   get vertexBranch() {
-    const { branches: { first, count }, vertexSource } = this.#channel, out = new Int32Array(vertexSource.length);
-    for (let b = 0; b < first.length; b++)
-      for (let i = first[b]; i < first[b] + count[b]; i++) out[vertexSource[i]] = b;
-    return out;
+    return this.#channel.vertexBranch;
   }
 
   /** The sphere about the rest pose. */
   get sphere() {
     return this.#channel.sphere;
+  }
+
+  /** The box of the rest pose. */
+  get box() {
+    return this.#channel.box;
   }
 
   get channel() {

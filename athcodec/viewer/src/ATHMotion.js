@@ -1,7 +1,7 @@
 // The motion of one loaded plant: what time and depth it shows, what of it is here, and how it gets into a material.
 // Decoding is the worker's; this holds the textures that the vertex shaders read.
 
-import { BufferAttribute, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
+import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
 import { injectMotion, motionUniforms } from "./shader.js";
@@ -318,10 +318,10 @@ export class ATHMotion extends EventDispatcher {
     return this.#perVertex.get(depth);
   }
 
-  /** Per vertex in source order, the number of the part that moves it at the depth that is shown. */
-  async partNumbers(depth = this.depth) {
+  /** Per vertex in source order, the branch (file order) whose node moves it at a depth; its own where it moves alone. */
+  async nodeNumbers(depth = this.depth) {
     await this.#learn(depth);
-    return this.#channel.partNumbers(this.#parts.get(depth));
+    return this.#channel.nodeNumbers(this.#parts.get(depth));
   }
 
   /** A second view of the same file, with a time and a depth of its own. */
@@ -336,13 +336,15 @@ export class ATHMotion extends EventDispatcher {
   }
 }
 
-/** Where a plant can be in any frame, near enough: its rest pose, and room to move. */
-export function restSphere(rest) {
-  const low = new Vector3(Infinity, Infinity, Infinity), high = low.clone().negate(), point = new Vector3();
+/** The box of the rest pose, and the sphere about it. */
+export function restBounds(rest) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < rest.length; i += 3) {
-    point.fromArray(rest, i);
-    low.min(point);
-    high.max(point);
+    for (let k = 0; k < 3; k++) {
+      if (rest[i + k] < low[k]) low[k] = rest[i + k];
+      if (rest[i + k] > high[k]) high[k] = rest[i + k];
+    }
   }
-  return new Sphere(low.clone().add(high).multiplyScalar(0.5), low.distanceTo(high) * 0.5);
+  const box = new Box3(new Vector3(...low), new Vector3(...high));
+  return { box, sphere: box.getBoundingSphere(new Sphere()) };
 }

@@ -26,7 +26,7 @@ export class Session {
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
-  #attributes = "missing"; // "reading", "here"
+  #attributes = "missing"; // "here"
   #speed = 0;             // bytes a second
   #busy = false;
   #failed = new Set();    // damaged chunks, "segment/level"
@@ -53,7 +53,7 @@ export class Session {
     const reading = this.#readFront();
     try {
       await Promise.race([opened, reading]);
-      await this.#tellOfFile();
+      this.#tellOfFile();
     } catch (error) {
       reading.catch(() => {});
       this.source.abort();
@@ -62,7 +62,7 @@ export class Session {
     }
     try {
       await reading; // without ranges: the whole file
-      await this.#readAttributes();
+      this.#readAttributes();
     } catch (error) {
       if (!this.#closed) this.post({ type: "stopped", ...describe(error) });
       return;
@@ -80,8 +80,8 @@ export class Session {
     }
   }
 
-  async #tellOfFile() {
-    const file = this.#file, { info } = file, statics = await readPrelude(file);
+  #tellOfFile() {
+    const file = this.#file, { info } = file, statics = readPrelude(file);
     this.#faces = statics.faces;
     this.#order = file.vertexSource();
     this.post({
@@ -141,7 +141,7 @@ export class Session {
       }
       const seconds = (performance.now() - start) / 1000;
       this.#speed = this.#speed * 0.5 + (came / Math.max(seconds, 1e-3)) * 0.5;
-      await this.#readAttributes();
+      this.#readAttributes();
       this.#changed(true);
     }
   }
@@ -192,13 +192,12 @@ export class Session {
   }
 
   // Tells the page of the named arrays once all that can be had are here.
-  async #readAttributes() {
+  #readAttributes() {
     const end = this.source.total ?? Infinity;
     const left = attributeRanges(this.#file).filter(({ offset, size }) => offset + size <= end);
     if (this.#attributes !== "missing" || (left.length > 0 && this.source.ranged !== false)) return;
-    this.#attributes = "reading";
     try {
-      const attributes = await readAttributes(this.#file);
+      const attributes = readAttributes(this.#file);
       if (attributes.face_vertex_counts && attributes.face_vertex_indices) {
         this.#faces = { counts: attributes.face_vertex_counts.array, array: attributes.face_vertex_indices.array };
         this.#restNormals = null;

@@ -1,7 +1,7 @@
 // Static data of a file: METADATA, FACES, EDGES and ATTRIBUTE chunks, as FORMAT.md has them. Chunks come from
 // AthFile.chunkBytes(), which has verified their checksums; everything else about them is checked here.
 
-import { ZSTDDecoder } from "zstddec";
+import { decompress } from "fzstd";
 
 const METADATA = 0x8004, FACES = 0x8005, EDGES = 0x8006, ATTRIBUTE = 0x8020;
 const MOST_BYTES = 2 ** 30; // of one array
@@ -11,8 +11,6 @@ const NUMBERS = {
   "u4": Uint32Array, "f4": Float32Array, "f8": Float64Array, "i8": BigInt64Array, "u8": BigUint64Array,
 };
 const text = new TextDecoder("utf-8", { fatal: true });
-
-let zstd = null;
 
 function wrong(what) {
   return Object.assign(new Error(`BAD_CHUNK: ${what}`), { codeName: "BAD_CHUNK" });
@@ -31,20 +29,23 @@ function contentSize(frame) {
   return bytes === 2 ? size + 256 : size;
 }
 
-async function unpack(frame, size) {
-  zstd ??= new ZSTDDecoder();
-  await zstd.init();
-  const content = zstd.decode(frame, size);
-  if (content.length !== size) throw wrong(`static data: got a damaged zstd frame, expected ${size} bytes in it`);
+function unpack(frame, size) {
+  let content;
+  try {
+    content = decompress(frame);
+  } catch (error) {
+    throw wrong(`static data: got a damaged zstd frame (${error.message})`);
+  }
+  if (content.length !== size) throw wrong(`static data: got ${content.length} bytes in a zstd frame, expected ${size}`);
   return content;
 }
 
-async function readMetadata(bytes) {
+function readMetadata(bytes) {
   let body = bytes.subarray(1);
   if (bytes[0] === 1) {
     const size = contentSize(body);
     if (size < 0 || size > MOST_TEXT) throw wrong(`metadata: got a text of ${size} bytes, expected at most ${MOST_TEXT}`);
-    body = await unpack(body, size);
+    body = unpack(body, size);
   }
   return parse(body, "metadata");
 }
@@ -71,7 +72,7 @@ function swap(bytes, size) {
 
 // A static array as {name, dtype, shape, array, derived}; `array` is null where there is none, or where its
 // Type has no typed array (records, text, halves).
-async function readArray(bytes) {
+function readArray(bytes) {
   if (bytes.length < 2) throw wrong("static array: got less than its head");
   const headLength = bytes[0] | (bytes[1] << 8);
   if (2 + headLength > bytes.length) throw wrong("static array: got less than its head");
@@ -85,7 +86,7 @@ async function readArray(bytes) {
   if (count === 0) return { name, dtype, shape, array: new Type(0) };
   const frame = bytes.subarray(2 + headLength);
   if (contentSize(frame) !== count * size) throw wrong(`static array ${name ?? ""}: got a frame of another size`);
-  const values = unshuffle(await unpack(frame, count * size), count, size);
+  const values = unshuffle(unpack(frame, count * size), count, size);
   if (dtype[0] === ">") swap(values, size);
   return { name, dtype, shape, array: new Type(values.buffer, values.byteOffset, count) };
 }
@@ -115,13 +116,13 @@ function derivedEdges(file) {
 
 /** What stands in front of the motion: {metadata, faces, edges, skeleton}. `skeleton` is always there: the
  * stored edges, or those that follow from the branches. */
-export async function readPrelude(file) {
+export function readPrelude(file) {
   const { vertexCount } = file.info, found = { metadata: {}, faces: null, edges: null };
   for (const [index, { kind }] of file.chunks().entries()) {
-    if (kind === METADATA) found.metadata = await readMetadata(file.chunkBytes(index));
-    if (kind === FACES) found.faces = asVertices(await readArray(file.chunkBytes(index)), vertexCount, "faces");
+    if (kind === METADATA) found.metadata = readMetadata(file.chunkBytes(index));
+    if (kind === FACES) found.faces = asVertices(readArray(file.chunkBytes(index)), vertexCount, "faces");
     if (kind === EDGES) {
-      const edges = await readArray(file.chunkBytes(index));
+      const edges = readArray(file.chunkBytes(index));
       if (edges.array && edges.shape[1] !== 2) throw wrong("edges: got rows of other than 2 columns");
       found.edges = edges.array ? asVertices(edges, vertexCount, "edges").array : derivedEdges(file);
     }
@@ -130,11 +131,11 @@ export async function readPrelude(file) {
 }
 
 /** Named arrays, as far as they are here: {name: {array, shape, dtype}}. */
-export async function readAttributes(file) {
+export function readAttributes(file) {
   const attributes = {};
   for (const [index, { kind, fed }] of file.chunks().entries()) {
     if (kind !== ATTRIBUTE || !fed) continue;
-    const { name, dtype, shape, array } = await readArray(file.chunkBytes(index));
+    const { name, dtype, shape, array } = readArray(file.chunkBytes(index));
     if (array && typeof name === "string") attributes[name] = { array, shape, dtype };
   }
   checkPolygons(attributes, file.info.vertexCount);

@@ -1,1 +1,210 @@
-export {};
+/**
+ * athcodec-three: plays .ath files, the motion of plants with levels of detail, in three.js.
+ *
+ *     import { ATHLoader } from "athcodec-three";
+ *
+ *     const loader = new ATHLoader();
+ *     const ath = await loader.loadAsync("tree.ath"); // resolves at the first picture; the rest goes on arriving
+ *     scene.add(ath.object);
+ *     renderer.setAnimationLoop((ms) => {
+ *       ath.motion.update(camera, renderer.domElement.height, ath.object).setTime(ms / 1000);
+ *       renderer.render(scene, camera);
+ *     });
+ *
+ * Files are fetched by HTTP ranges, depth by depth and ahead of the time that is shown, as deep as is asked for; from a
+ * server without ranges in one download, which plays while it grows. Workers decode (ath_worker.js, beside the module).
+ * Depths, levels and errors are those of the file; positions are in its units, `metadata.unit`, and its axes,
+ * `metadata.up_axis`; nothing is scaled or turned. Materials work with WebGLRenderer; for others see setMode().
+ */
+
+import {
+  Box3, BufferGeometry, Camera, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material, Matrix4,
+  Object3D, Sphere,
+} from "three";
+
+export class ATHLoader extends Loader<ATH> {
+  constructor(manager?: LoadingManager);
+  /** Folder (ending in "/") or URL of ath_worker.js, if it is not beside this module. */
+  setDecoderPath(path: string): this;
+  /** At most so many workers (default 4); a file lives in one of them. */
+  setWorkerLimit(limit: number): this;
+  /** How vertices move: "matrices" (default) in the vertex shader, by textures; "positions" in the worker, by position
+   * attributes that every picture writes, for WebGPURenderer and materials without onBeforeCompile. */
+  setMode(mode: "matrices" | "positions"): this;
+  /** Starts a worker before there is a file for it. */
+  preload(): this;
+  /** onLoad: at the first picture. onProgress: {loaded, total} bytes, as long as bytes come. */
+  load(url: string, onLoad: (ath: ATH) => void, onProgress?: (event: ProgressEvent) => void,
+       onError?: (error: unknown) => void): void;
+  loadAsync(url: string, onProgress?: (event: ProgressEvent) => void): Promise<ATH>;
+  /** The same of a whole file in memory, or the front of one; the buffer stays as it is. */
+  parse(buffer: ArrayBuffer, onLoad: (ath: ATH) => void, onError?: (error: unknown) => void): void;
+  parseAsync(buffer: ArrayBuffer): Promise<ATH>;
+  /** Ends all workers. */
+  dispose(): this;
+}
+
+/** What is wrong with a file or its way here. */
+export interface ATHFailure extends Error {
+  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER". */
+  readonly codeName: string;
+}
+
+export interface StaticArray {
+  readonly array: ArrayLike<number | bigint>;
+  readonly shape: number[];
+  /** As in NumPy, such as "<f4". */
+  readonly dtype: string;
+}
+
+/** A loaded file. Event: "arrays", when what is stored behind the motion is here (uv, normals, colors, radius, polygons of
+ * different sizes); `geometry` has them from then on. */
+export class ATH extends EventDispatcher<{ arrays: {} }> {
+  readonly motion: ATHMotion;
+  readonly metadata: { unit?: string; up_axis?: "x" | "y" | "z"; fps?: number; [name: string]: unknown };
+  /** Named arrays, {} until they are here. */
+  readonly attributes: Record<string, StaticArray>;
+  /** Resolves with `attributes`. */
+  readonly arrays: Promise<Record<string, StaticArray>>;
+  /** A Mesh of the faces, or LineSegments where there are none; with materials that can be replaced by bound ones. */
+  readonly object: Group;
+  readonly hasFaces: boolean;
+  /** Faces as triangles, normals computed where the file has none; null where there are no faces. `userData.source`: the
+   * vertex of the file that each one is. */
+  readonly geometry: BufferGeometry | null;
+  /** Edges; null where the file has faces and no edges. */
+  readonly lines: BufferGeometry | null;
+  /** Edges (u, v) in source order, stored or following from the branches. */
+  readonly skeleton: Uint32Array;
+  /** Rest pose in source order, 3 numbers per vertex. */
+  readonly rest: Float32Array;
+  readonly box: Box3;
+  readonly sphere: Sphere;
+  /** One entry per branch in file order: see ath_decoder.d.ts. */
+  readonly branches: Record<"parent" | "first" | "count" | "subtree" | "depth" | "attach" | "flags" | "lag", Int32Array>;
+  /** Branch of every vertex in source order. */
+  readonly vertexBranch: Int32Array;
+  /** Ends its downloads and frees its memory. */
+  dispose(): void;
+}
+
+export interface ATHMotionEvents {
+  /** A new picture is in the textures. */
+  frame: { frame: number; depth: number };
+  /** Another depth is shown. */
+  depth: { depth: number };
+  /** Bytes came. */
+  progress: { loaded: number; total: number };
+  /** What can be shown changed: see ready(). */
+  ready: {};
+  /** No more bytes come; what is here goes on playing. */
+  stopped: { message: string; codeName: string };
+  /** A part of the file is damaged; what is whole goes on playing. level: from which on; null: a static array. */
+  damaged: { message: string; codeName: string; level: number | null };
+}
+
+export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
+  /** Of the file: see AthInfo in ath_decoder.d.ts. */
+  readonly info: { vertexCount: number; branchCount: number; frameCount: number; segmentCount: number; levelCount: number;
+    fileLength: number; duration: number; maxError: number; [name: string]: unknown };
+  /** Seconds of a round: with "loop" the last frame blends into the first. */
+  readonly duration: number;
+  readonly depthCount: number;
+
+  /** Seconds, as asked for. */
+  readonly time: number;
+  /** After the last frame: "loop" (default), "clamp" or "pingpong". */
+  wrap: "loop" | "clamp" | "pingpong";
+  setTime(seconds: number): this;
+  /** A depth, or "auto": the coarsest whose largest error is at most `pixels` on the screen, by update(). What is not
+   * here or not decoded yet is shown at the deepest depth that is. */
+  setDepth(depth: number | "auto"): this;
+  pixels: number;
+  /** Chooses the automatic depth: once per frame, before setTime(). height: of the picture in pixels. */
+  update(camera: Camera, height: number, object?: Object3D): this;
+  depthFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
+  /** Decodes this very time and depth and shows it. Rejects where bytes are missing or damaged. */
+  show(seconds: number, depth?: number): Promise<unknown>;
+  /** All vertices in source order, 3 numbers each; what is shown stays. Rejects like show(). */
+  positions(seconds: number, depth?: number): Promise<Float32Array>;
+
+  /** The depth and frame (with a fraction) that are shown; -1: none yet. */
+  readonly depth: number;
+  readonly frame: number;
+  /** The depth that is wanted. */
+  readonly target: number;
+  readonly automatic: boolean;
+  /** Whether the nearer frame is shown in place of a blend, its neighbour not being decoded yet. */
+  readonly held: boolean;
+  /** Milliseconds that the worker took for the last picture. */
+  readonly milliseconds: number;
+  /** Whether pictures come with `distances`: per vertex, from the deepest position that is here. */
+  heat: boolean;
+  readonly distances: Float32Array | null;
+
+  /** What of the time can be shown at a depth, in seconds. */
+  ready(depth: number): { start: number; end: number }[];
+  /** The deepest depth that is here for all of the time; -1: none. */
+  readonly readyDepth: number;
+  readonly complete: boolean;
+  readonly bytesFetched: number;
+  readonly bytesTotal: number;
+  readonly requests: number;
+  motionBytes(depth: number): number;
+  bitRate(depth?: number): number;
+  error(depth: number): { max: number; rms: number };
+  /** Per vertex in source order, the branch whose node moves it at a depth; its own where it moves alone. */
+  nodeNumbers(depth?: number): Promise<Int32Array>;
+  refresh(): void;
+  /** What the vertex shader makes of the texture, computed here. */
+  uploaded(): Float32Array;
+
+  /** Lets a material draw geometries of this motion (by onBeforeCompile, after what is there already). */
+  bind<T extends Material>(material: T): T;
+  /** Keeps a geometry in step: `userData.source` holds the file's vertex of each of its vertices. */
+  attach<T extends BufferGeometry>(geometry: T): T;
+  detach(geometry: BufferGeometry): void;
+  readonly uniforms: Record<"athData" | "athClip" | "athStride", IUniform>;
+  /** A second motion of the same file, with a time and a depth of its own. */
+  clone(): ATHMotion;
+  dispose(): void;
+}
+
+export interface ATHInstance {
+  /** Place in the units and axes of the file. */
+  x: number; y: number; z: number;
+  size: number;
+  /** Turn about the up axis, radians. */
+  angle: number;
+  /** How far ahead in the clip it is. */
+  seconds: number;
+}
+
+/** Instances of one file, each drawn at the depth that its distance asks for. Event: "depth", when one can be drawn. */
+export class ATHForest extends Group {
+  constructor(ath: ATH, options?: {
+    geometry?: BufferGeometry;
+    material?: (isLines: boolean, depth: number) => Material;
+  });
+  setInstances(instances: ATHInstance[]): void;
+  /** Gets a depth ready, all of whose bytes are here (motion.readyDepth). */
+  bake(depth: number): Promise<void>;
+  /** Chooses depths and what is in view: once per frame. */
+  update(camera: Camera, height: number, seconds: number): void;
+  levelOfDetail: boolean;
+  /** Error on the screen that is allowed, in pixels. */
+  pixels: number;
+  readonly count: number;
+  /** Instances drawn, by depth; those out of view; vertices drawn. */
+  readonly counts: number[];
+  readonly culled: number;
+  readonly vertices: number;
+  dispose(): void;
+}
+
+/** The same as ATHMotion.bind(), by uniforms. */
+export function injectMotion<T extends Material>(material: T, uniforms: Record<string, IUniform>, forest?: boolean): T;
+export function motionUniforms(): Record<"athData" | "athClip" | "athStride", IUniform>;
+/** GLSL for materials of one's own: vec3 athMoved(vec3 position, float athPart), vec3 athTurned(vec3 normal, float athPart). */
+export const MOTION_PARS: string;
+export function dataTexture(data: Float32Array): DataTexture;
