@@ -765,7 +765,8 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
-    verb.add_argument("--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)")
+    verb.add_argument("--port", metavar="PORT", type=_argument(_whole), default=0,
+                      help="of the address (default: a free one)")
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     verb.add_argument("--export", metavar="PAGE.html",
                       help="write one page with the file and the viewer inside, and serve nothing")

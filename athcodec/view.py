@@ -62,7 +62,8 @@ def self_contained(data: bytes, name: str) -> str:
     inside = json.dumps({"imports": {name: _data_url(WEB / file) for name, file in modules.items()}})
     main = _script((WEB / "viewer.js").read_text("utf-8"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
-    file = f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}">{base64.b64encode(data).decode()}</script>'
+    file = (f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}">'
+            f"{base64.b64encode(data).decode()}</script>")
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
         (r'<link rel="modulepreload"[^>]*>\n', ""),
@@ -86,13 +87,13 @@ def _script(text: str) -> str:
 
 
 def file_name(path: str | os.PathLike[str]) -> str:
-    path = os.fspath(path)
-    return (urlsplit(path).path if is_url(path) else path).replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
+    path = urlsplit(os.fspath(path)).path if is_url(path) else os.fspath(path)
+    return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
 
 
 def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print) -> None:
-    """Serves the viewer with the file at `path` (or URL) on 127.0.0.1 until it is interrupted; `ready` is called with the
-    page's address. Port 0: a free one. Raises MissingExtra, AthError, OSError."""
+    """Serves the viewer with the file at `path` (or URL) on 127.0.0.1 until it is interrupted; `ready` is called with
+    the page's address. Port 0: a free one. Raises MissingExtra, AthError, OSError."""
     _check(path)
     import asyncio
 
@@ -119,8 +120,16 @@ def _check(path: str | os.PathLike[str]) -> None:
         import aiohttp  # noqa: F401
     except ImportError:
         raise MissingExtra(f"athcodec view: needs aiohttp: {INSTALL}; --export PAGE works without") from None
+    _refuse_other_urls(path)
     with open_ath(path):
         pass
+
+
+def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
+    """The server passes on what http and https have; for others there is --export."""
+    if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
+        scheme = urlsplit(path).scheme
+        raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
 def application(path: str | os.PathLike[str], place: str):
@@ -164,9 +173,3 @@ def open_browser(address: str) -> None:
         webbrowser.open(address)
     except webbrowser.Error:
         pass
-
-
-def refuse_other_urls(path: str) -> None:
-    """The server passes on what http and https have; for others there is --export."""
-    if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
-        raise AthError(f"{path}: got {urlsplit(path).scheme}://, expected http:// or https://; --export PAGE reads others")

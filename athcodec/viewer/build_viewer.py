@@ -1,7 +1,7 @@
 """Builds athcodec/viewer/web, the viewer and the loader as they ship, from src, page and ath_decoder.mjs.
 
-The packages are those of package-lock.json, put into a cache folder by npm; esbuild makes the bundles, which are the same
-on every machine.
+The packages are those of package-lock.json, put into a cache folder by npm; esbuild makes the bundles, which are the
+same on every machine.
 """
 
 from __future__ import annotations
@@ -80,8 +80,9 @@ def main() -> int:
             print(f"build_viewer: {error}", file=sys.stderr)
             return 1
         different = differences(Path(folder), WEB)
-        if own_bytes(Path(folder)) > MOST_BYTES:
-            print(f"build_viewer: got {own_bytes(Path(folder)):,} bytes, expected at most {MOST_BYTES:,}", file=sys.stderr)
+        size = own_bytes(Path(folder))
+        if size > MOST_BYTES:
+            print(f"build_viewer: got {size:,} bytes, expected at most {MOST_BYTES:,}", file=sys.stderr)
             return 1
         if different and arguments.check:
             print(f"build_viewer: {', '.join(different)}: got other than the sources make; "
@@ -90,7 +91,8 @@ def main() -> int:
         if different:
             shutil.rmtree(WEB, ignore_errors=True)
             shutil.copytree(folder, WEB)
-    print(f"web: {own_bytes(WEB):,} bytes of our own, {', '.join(different) + ' written' if different else 'up to date'}")
+    done = f"{', '.join(different)} written" if different else "up to date"
+    print(f"web: {size:,} bytes of our own, {done}")
     return 0
 
 

@@ -22,6 +22,7 @@ const turn = () => new Promise((done) => { waiting.push(done); channel.port2.pos
 export class Session {
   #file = null;
   #front = new Uint8Array(0);
+  #came = 0;              // bytes from the file's beginning on
   #views = new Map();     // id: {level, frame}
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
@@ -98,6 +99,7 @@ export class Session {
   // Bytes that have come, in any order once the file is open.
   #take(bytes, offset) {
     if (this.#closed) return;
+    if (offset <= this.#came) this.#came = Math.max(this.#came, offset + bytes.length);
     if (this.#file) {
       this.#file.feed(bytes, offset);
       this.#changed();
@@ -151,14 +153,15 @@ export class Session {
     if (this.source.ranged === false) return null; // everything came with the first request
     const most = Math.min(MOST_REQUEST, Math.max(LEAST_REQUEST, this.#speed * REQUEST_SECONDS));
     let found = null;
-    for (const range of this.#wanted()) {
-      const size = Math.min(range.size, (this.source.total ?? Infinity) - range.offset);
-      if (size <= 0 || this.#isUnderway(range)) {
+    for (const { offset, size } of this.#wanted()) {
+      const from = Math.max(offset, Math.min(this.#came, offset + size)); // the beginning of a chunk may be here
+      const range = { offset: from, size: Math.min(offset + size, this.source.total ?? Infinity) - from };
+      if (range.size <= 0 || this.#isUnderway(range)) {
         if (found) break;
         continue;
       }
-      if (!found) found = { offset: range.offset, size };
-      else if (range.offset === found.offset + found.size) found.size += size;
+      if (!found) found = range;
+      else if (range.offset === found.offset + found.size) found.size += range.size;
       else break;
       if (found.size >= most) break;
     }

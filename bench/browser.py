@@ -1,0 +1,35 @@
+"""Chromium for measurements and tests of the viewer: Debian's, driven by Playwright, drawing in software."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+BROWSER_VARIABLE = "ATHCODEC_CHROMIUM"
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+         "--ignore-gpu-blocklist"]
+INSTALL = "apt-get install chromium && pip install playwright"
+
+
+class MissingBrowser(Exception):
+    """One line for the user."""
+
+
+@contextmanager
+def chromium() -> Iterator:
+    """A Playwright browser. Raises MissingBrowser."""
+    path = os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        raise MissingBrowser(f"package playwright: got none, expected it: {INSTALL}") from None
+    if path is None:
+        raise MissingBrowser(f"chromium: got none on PATH or in {BROWSER_VARIABLE}: {INSTALL}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        try:
+            yield browser
+        finally:
+            browser.close()

@@ -1,0 +1,459 @@
+"""What who looks at a plant relies on: the page comes with all that it needs, from a server or as one file; plays from
+the first bytes on, shows the bits of every depth, and says what is wrong with a file.
+
+Tests with the marker `browser` look at the page in Chromium (Debian: apt-get install chromium; pip install playwright).
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plants import clip_of, tube
+
+import athcodec
+from athcodec import cli, view
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
+
+from bench.browser import chromium  # noqa: E402
+from bench.line import WEB, Line  # noqa: E402
+from bench.trees.plant import grow  # noqa: E402
+
+VIEWER = ROOT / "athcodec" / "viewer"
+MOST_BYTES = 150_000
+
+
+# ---- the server and the page ----
+
+
+@contextmanager
+def viewing(path: str):
+    """The address that `athcodec view` prints for a file or URL."""
+    command = [sys.executable, "-m", "athcodec", "view", path, "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        yield process.stdout.readline().split()[0]
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def served(sample_ath):
+    """Address of the viewer with the sample."""
+    with viewing(str(sample_ath)) as address:
+        yield address
+
+
+def get(url: str, **headers: str):
+    return urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=20)
+
+
+def test_view_serves_the_page_and_ranges_of_the_file(served, sample_ath):
+    base, file = served.split("?file=")
+    data = sample_ath.read_bytes()
+    assert base.startswith("http://127.0.0.1:")
+    with get(base) as page:
+        named = re.findall(r'(?:href|src)="([\w.]+)"', page.read().decode())
+    for name in {*named, "ath_worker.js"}:
+        with get(base + name) as answer:
+            assert answer.read() == (WEB / name).read_bytes(), name
+    with get(base + file, Range="bytes=100-299") as answer:
+        assert answer.status == 206 and answer.headers["Content-Range"] == f"bytes 100-299/{len(data)}"
+        assert answer.read() == data[100:300]
+    with get(base + file) as answer:
+        assert answer.read() == data
+
+
+def test_nothing_else_of_the_computer_is_served(served):
+    base, file = served.split("?file=")
+    for path in (file.rsplit("/", 1)[1], "../view.py", "..%2fview.py", "file/guess/" + file.rsplit("/", 1)[1], "file"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            get(base + path)
+        refused.value.close()
+        assert refused.value.code in (403, 404), path
+
+
+def test_a_file_behind_a_url_is_passed_on_range_by_range(sample_ath):
+    data = sample_ath.read_bytes()
+    with Line({"tree.ath": data}) as line, viewing(f"{line.address}tree.ath") as address:
+        line.log.clear()
+        with get(address.replace("?file=", ""), Range="bytes=5-9") as answer:
+            assert (answer.status, answer.read()) == (206, data[5:10])
+        assert line.log == [["tree.ath", 5, 5]]
+
+
+def test_an_exported_page_holds_everything(sample_ath, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert cli.main(["view", str(sample_ath), "--export", str(page)]) == 0
+    assert str(page) in capsys.readouterr().out
+    text = page.read_text("utf-8")
+    file = re.search(r'id="ath-file" data-name="sample.ath">([^<]*)<', text)[1]
+    assert base64.b64decode(file) == sample_ath.read_bytes()
+    modules = json.loads(re.search(r'<script type="importmap">(.*?)</script>', text)[1])["imports"]
+    for url in modules.values():
+        kind, _, body = url.partition(",")
+        assert kind == "data:text/javascript;base64"
+        assert base64.b64decode(body) in {path.read_bytes() for path in WEB.glob("*.js")}
+    outside = re.sub(r"<script.*?</script>|<style.*?</style>", "", text, flags=re.DOTALL)
+    assert not re.search(r'(?:src|href)="(?!data:)', outside)
+    assert "connect-src 'none'" in outside
+
+
+def test_what_cannot_be_shown_is_one_line(sample_ath, tmp_path, monkeypatch, capsys):
+    broken = tmp_path / "broken.ath"
+    broken.write_bytes(b"no plant at all")
+    for arguments in (["view", str(broken)], ["view", str(broken), "--export", str(tmp_path / "x.html")],
+                      ["view", str(tmp_path / "none.ath")], ["view", "ftp://example.org/tree.ath"]):
+        assert cli.main(arguments) == 1
+        error = capsys.readouterr().err.strip()
+        assert error.startswith("athcodec: error: ") and "\n" not in error and arguments[1] in error
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    assert cli.main(["view", str(sample_ath)]) == 1
+    error = capsys.readouterr().err.strip()
+    assert 'pip install "athcodec[view]"' in error and "\n" not in error
+    assert cli.main(["view", str(sample_ath), "--export", str(tmp_path / "x.html")]) == 0
+
+
+def test_the_page_allows_no_scripts_but_its_own():
+    text = (WEB / "index.html").read_text("utf-8")
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
+    scripts = re.findall(r"<script(?: [^>]*)?>([^<]+)</script>", text)
+    digests = [f"'sha256-{base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()}'" for each in scripts]
+    assert re.search(r"script-src ([^;]*);", policy)[1].split() == ["'self'", "'wasm-unsafe-eval'", *digests]
+    assert "unsafe-inline" not in policy and not re.search(r'\son\w+="|style="', text)
+
+
+def test_the_bundles_are_small_and_their_licences_are_there():
+    assert sum((WEB / name).stat().st_size for name in ("ATHLoader.js", "ath_worker.js", "viewer.js")) <= MOST_BYTES
+    licences = (WEB / "LICENSES.txt").read_text("utf-8")
+    assert re.search(r"three 0\.187\.0.*The MIT License.*three\.js authors", licences, re.DOTALL)
+    assert "fzstd" in licences
+
+
+@pytest.mark.programs
+def test_the_bundles_are_what_the_sources_make():
+    done = subprocess.run([sys.executable, str(VIEWER / "build_viewer.py"), "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+PACKED = """
+import { ATHLoader, ATHForest, ATHMotion, injectMotion } from "athcodec-three";
+import { AthFile } from "athcodec-three/decoder";
+import { createRequire } from "node:module";
+const worker = createRequire(import.meta.url).resolve("athcodec-three/ath_worker.js");
+const loader = new ATHLoader().setWorkerLimit(2).setDecoderPath("/x/");
+const found = [typeof loader.loadAsync, typeof AthFile.open, worker.endsWith("ath_worker.js"), loader.workerURL];
+console.log(JSON.stringify(found));
+"""
+
+
+@pytest.mark.programs
+def test_the_npm_package_installs_from_its_tarball(tmp_path):
+    def npm(*words: str, cwd: Path) -> str:
+        done = subprocess.run(["npm", *words], cwd=cwd, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    tarball = npm("pack", "--silent", "--pack-destination", str(tmp_path), cwd=VIEWER).split()[-1]
+    (tmp_path / "package.json").write_text('{"type": "module", "private": true}')
+    npm("install", "--silent", "--no-audit", "--no-fund", f"./{tarball}", "three@0.187.0", "typescript@5.9.3",
+        "@types/three", cwd=tmp_path)
+    (tmp_path / "use.mjs").write_text(PACKED)
+    done = subprocess.run(["node", "use.mjs"], cwd=tmp_path, capture_output=True, text=True)
+    assert json.loads(done.stdout) == ["function", "function", True, "/x/ath_worker.js"], done.stderr
+    (tmp_path / "use.ts").write_text(TYPED)
+    command = ["npx", "tsc", "--noEmit", "--strict", "--target", "es2022", "--module", "esnext",
+               "--moduleResolution", "bundler", "use.ts"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+TYPED = """
+import { PerspectiveCamera, Scene } from "three";
+import { ATHForest, ATHLoader } from "athcodec-three";
+const ath = await new ATHLoader().setWorkerLimit(2).loadAsync("tree.ath");
+new Scene().add(ath.object);
+ath.motion.setDepth("auto").setTime(2).addEventListener("depth", (event) => { const depth: number = event.depth; });
+new ATHForest(ath).update(new PerspectiveCamera(), 100, 1);
+const xyz: Float32Array = await ath.motion.positions(1, 0);
+"""
+
+
+# ---- in a browser ----
+
+browser_test = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def opened(browser):
+    """A function that opens an address and waits for a condition; the page must not have logged an error at the end."""
+    pages, errors = [], []
+
+    def visit(address: str, until: str = "athcodecViewer.motion?.complete", **options):
+        page = browser.new_page(viewport={"width": 1000, "height": 700}, **options)
+        pages.append(page)
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address)
+        page.wait_for_function(f"() => {until}", timeout=60_000)
+        return page
+
+    yield visit
+    for page in pages:
+        page.close()
+    assert errors == []
+
+
+@pytest.fixture(scope="module")
+def gusty_tree():
+    """An .ath file of 8,000 vertices whose branches sway, each in its own time."""
+    plant, rng, time_ = grow(8000, 2, 12.0, 5), np.random.default_rng(3), np.arange(120) / 30
+    positions = np.repeat(plant.position[None], len(time_), axis=0)
+    height = (plant.position[:, 1] / plant.height) ** 2
+    positions[:, :, 0] += 0.6 * height * np.sin(2.3 * time_)[:, None]
+    positions[:, :, 2] += 0.4 * height * np.sin(1.7 * time_ + 1)[:, None]
+    for branch in range(1, len(plant.branch_parent)):
+        mine = np.flatnonzero(plant.branch == branch)
+        gust = 1 + 0.4 * np.sin(0.9 * time_ + rng.uniform(0, 6))
+        swing = gust * np.sin(rng.uniform(3, 9) * time_ + rng.uniform(0, 6))
+        along = np.linspace(0, 1, len(mine)) ** 2
+        positions[:, mine] += swing[:, None, None] * along[:, None] * rng.normal(size=3) * 0.15
+    return clip_of(positions, plant.position, plant.branch, plant.branch_parent, edges=plant.edges,
+                   attributes={"radius": plant.radius.astype(np.float32)}, metadata={"unit": "m", "up_axis": "y"})
+
+
+@pytest.fixture(scope="module")
+def gusty_ath(gusty_tree, tmp_path_factory):
+    path = tmp_path_factory.mktemp("gusty") / "gusty.ath"
+    athcodec.encode(gusty_tree, path, rel_error=1e-4, effort="fast")
+    return path
+
+
+def positions_of(page, call: str) -> np.ndarray:
+    return np.array(page.evaluate(call), float).reshape(-1, 3)
+
+
+@browser_test
+def test_every_depth_shows_the_positions_that_python_decodes(opened, sample_ath):
+    """In the worker, in the texture, and as the vertex shader reads it."""
+    with Line({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
+        page = opened(line.page("tree.ath"))
+        size = float(np.ptp(decoder.positions(0), axis=0).max())
+        for depth in range(decoder.level_count):
+            for frame in (0, 41, decoder.frame_count - 1):
+                wanted = decoder.positions(frame, depth)
+                seconds = float(decoder.time[frame] - decoder.time[0])
+                decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {depth})")
+                assert np.array_equal(decoded.astype(np.float32), wanted.astype(np.float32))
+                assert page.evaluate(f"athcodecViewer.shown({seconds}, {depth})")["depth"] == depth
+                for way in ("uploaded", "onGraphics"):
+                    shown = positions_of(page, f"athcodecViewer.{way}()")
+                    assert np.abs(shown - wanted).max() < 1e-6 * size, (depth, frame, way)
+
+
+@browser_test
+def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
+    data = gusty_ath.read_bytes()
+    with Line({"tree.ath": data}, rate=60_000) as line:
+        page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
+        first = page.evaluate("athcodecViewer.counters.firstMotion")
+        assert first["bytes"] <= 0.15 * len(data)
+        assert line.log[0][1] == 0 and line.sent("tree.ath") < len(data)
+        page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
+        assert line.sent("tree.ath") <= 1.01 * len(data) and len(line.log) > 3
+
+
+@browser_test
+def test_only_the_depth_that_is_looked_at_is_fetched(opened, gusty_ath):
+    data = gusty_ath.read_bytes()
+    with Line({"tree.ath": data}, rate=100_000) as line, athcodec.open(gusty_ath) as decoder:
+        page = opened(line.page("tree.ath"), "athcodecViewer.motion")
+        page.evaluate("athcodecViewer.setDepth('1')")
+        page.wait_for_function(
+            "() => athcodecViewer.motion.readyDepth >= 1 && athcodecViewer.plants[0].ath.attributes.radius")
+        time.sleep(1)
+        assert page.evaluate("athcodecViewer.motion.depth") == 1
+        assert line.sent("tree.ath") < 0.6 * len(data) and decoder.level_count > 2
+
+
+@browser_test
+def test_a_server_without_ranges_sends_a_download_that_plays_while_it_grows(opened, gusty_ath):
+    data = gusty_ath.read_bytes()
+    with Line({"tree.ath": data}, rate=60_000, ranges=False) as line:
+        page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
+        assert page.evaluate("athcodecViewer.counters.firstMotion.bytes") < 0.5 * len(data)
+        page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
+        page.wait_for_function("() => athcodecViewer.plants[0].ath.attributes.radius", timeout=60_000)
+        assert len(line.log) == 1 and line.sent("tree.ath") == len(data)
+
+
+def cut_after(path: Path, level: int) -> bytes:
+    """The file up to the end of a level."""
+    with athcodec.open(path) as decoder:
+        return path.read_bytes()[: decoder.info()["depths"][level]["bytes"]]
+
+
+@browser_test
+@pytest.mark.parametrize("ranges", [True, False])
+def test_a_truncated_file_plays_to_its_depth(opened, sample_ath, ranges):
+    data = cut_after(sample_ath, 1) + b"xx"
+    with Line({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
+        page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyDepth === 1")
+        page.wait_for_function("() => athcodecViewer.counters.pictures > 8")
+        assert page.evaluate("athcodecViewer.motion.depth") == 1
+        shown = positions_of(page, "athcodecViewer.decoded(1, 1)")
+        with athcodec.open(sample_ath) as whole:
+            frame = int(np.argmin(np.abs(whole.time - whole.time[0] - 1)))
+        assert np.abs(shown - decoder.positions(frame, 1)).max() < 0.05
+
+
+@browser_test
+@pytest.mark.parametrize("damage, words", [
+    (lambda data: b"<!doctype html>" + data[15:], "not an .ath file"), (lambda data: data[:40], "cut off"),
+    (lambda data: data[:900] + bytes([data[900] ^ 1]) + data[901:], "damaged"), (lambda data: b"", "not an .ath file"),
+    (None, "cannot be fetched")])
+def test_a_file_that_cannot_be_shown_is_said_to_be(opened, sample_ath, damage, words):
+    files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
+    with Line(files) as line:
+        page = opened(line.page("tree.ath"), "document.getElementById('message').checkVisibility()")
+        assert words in page.inner_text("#message h2") and page.inner_text("#message p").strip()
+
+
+@browser_test
+def test_what_is_whole_of_a_damaged_file_plays(opened, sample_ath):
+    parts = sample_ath.read_bytes()
+    with athcodec.open(sample_ath) as decoder:
+        at = decoder.info()["depths"][1]["bytes"] + 50
+    damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1:]
+    with Line({"tree.ath": damaged}) as line:
+        page = opened(line.page("tree.ath"), "!document.getElementById('note').hidden")
+        assert "damaged" in page.inner_text("#note")
+        page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
+        assert page.evaluate("athcodecViewer.motion.depth") >= 1
+
+
+@browser_test
+def test_an_exported_page_plays_from_the_disk(opened, sample_ath, tmp_path):
+    page_file = tmp_path / "page.html"
+    view.export_page(sample_ath, page_file)
+    page = opened(page_file.as_uri(), "athcodecViewer.counters.firstMotion")
+    assert page.inner_text("#name") == "sample.ath"
+
+
+@browser_test
+def test_a_thousand_instances_are_drawn_each_at_its_depth(opened, sample_ath):
+    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+        page.evaluate("athcodecViewer.forestOf(1000)")
+        forest = "athcodecViewer.state.forest"
+        page.wait_for_function(f"() => {forest}?.children.length === athcodecViewer.motion.depthCount")
+        page.wait_for_function(f"() => {forest}.counts.reduce((a, b) => a + b, 0) > 300", timeout=60_000)
+        counts = page.evaluate(f"[...{forest}.counts, {forest}.culled]")
+        assert sum(counts) == 1000 and sum(count > 0 for count in counts[:-1]) > 1
+        assert ink(page) > 0.1
+
+
+INK = """() => {
+  const { stage } = athcodecViewer, copy = new OffscreenCanvas(320, 240), pen = copy.getContext("2d");
+  stage.render();
+  pen.drawImage(stage.canvas, 0, 0, 320, 240);
+  const { data } = pen.getImageData(0, 0, 320, 240);
+  let drawn = 0;
+  for (let i = 0; i < data.length; i += 4) drawn += Math.abs(data[i + 1] - data[1]) > 60;
+  return drawn / (320 * 240);
+}"""
+
+
+def ink(page) -> float:
+    """Share of the picture's pixels that are neither background nor shadow."""
+    return page.evaluate(INK)
+
+
+@browser_test
+def test_meshes_are_drawn_with_normals_that_turn(opened, tmp_path):
+    """Faces of four corners; of different sizes; uv per corner."""
+    clip = tube(40, 12, 30)
+    quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
+                      for r in range(39) for k in range(12)], np.int32)
+    mixed = {"face_vertex_counts": np.full(len(quads), 4, np.int32), "face_vertex_indices": quads.ravel()}
+    mixed["face_vertex_counts"][0] = 3
+    mixed["face_vertex_indices"] = np.delete(quads.ravel(), 3)
+    uv = np.linspace(0, 1, 2 * quads.size, dtype=np.float32).reshape(-1, 2)
+    cases = {"quads.ath": (quads, {}, {}), "mixed.ath": (None, mixed, {}),
+             "corners.ath": (quads, {"uv": uv}, {"domains": {"uv": "corner"}})}
+    files = {}
+    for name, (clip.faces, clip.attributes, clip.metadata) in cases.items():
+        clip.metadata = clip.metadata | {"up_axis": "z"}
+        clip.check()
+        athcodec.encode(clip, tmp_path / name, rel_error=1e-3)
+        files[name] = (tmp_path / name).read_bytes()
+    with Line(files) as line:
+        for name in files:
+            page = opened(line.page(name))
+            page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.index.count > 0")
+            mesh = page.evaluate("""() => {
+              const { index, attributes: { position, normal, uv } } = athcodecViewer.plants[0].ath.geometry;
+              return { index: index.count, vertices: position.count, uv: uv?.count ?? 0, normal: normal.count };
+            }""")
+            triangles = 2 * len(quads) - (name == "mixed.ath")
+            vertices = quads.size if name == "corners.ath" else clip.vertex_count
+            assert mesh == {"index": 3 * triangles, "vertices": vertices, "normal": vertices,
+                            "uv": vertices if name == "corners.ath" else 0}
+            page.wait_for_function("() => athcodecViewer.counters.pictures > 5")
+            assert ink(page) > 0.01, name
+
+
+@browser_test
+def test_the_page_works_by_keyboard(opened, sample_ath):
+    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+
+        def pressed(key: str, then: str):
+            page.keyboard.press(key)
+            return page.evaluate(then)
+
+        assert pressed("Space", "athcodecViewer.state.playing") is False
+        pressed("Home", "0")
+        assert pressed("ArrowRight", "athcodecViewer.state.time") == pytest.approx(1 / 30, rel=1e-3)
+        assert pressed("-", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.depthCount") - 1
+        assert pressed("a", "athcodecViewer.motion.automatic") is True
+        assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Node"
+        assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Skeleton"
+        assert pressed("l", "athcodecViewer.state.loop") is False
+        assert pressed("d", "athcodecViewer.plants.length") == 2
+        assert pressed("f", "Boolean(athcodecViewer.state.forest) && athcodecViewer.plants.length === 1") is True
+        with page.expect_download() as download:
+            page.keyboard.press("p")
+        assert Path(download.value.path()).read_bytes()[:4] == b"\x89PNG"
+
+
+@browser_test
+@pytest.mark.parametrize("size, scheme", [((390, 800), "light"), ((390, 800), "dark"), ((1280, 800), "dark")])
+def test_nothing_runs_out_of_the_screen(opened, sample_ath, size, scheme):
+    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), color_scheme=scheme)
+        page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        for name in ("header", "footer", "#toggle-panel", "#play", "#time", "#speed"):
+            box = page.locator(name).bounding_box()
+            assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["y"] + box["height"] <= size[1], name
