@@ -91,8 +91,9 @@ async function open(source, name, beside = false) {
     for (const each of opened.splice(1)) each.dispose();
   }
   opened.push(ath);
-  ath.motion.addEventListener("stopped", ({ message }) => note(message));
-  ath.motion.addEventListener("damaged", ({ message }) => note(`Shown without what is damaged: ${message}`));
+  const tell = ({ type, message }) => note(type === "damaged" ? `Shown without what is damaged: ${message}` : message);
+  for (const type of ["stopped", "damaged"]) ath.motion.addEventListener(type, tell);
+  if (ath.motion.failure) tell(ath.motion.failure);
   compare.set(beside ? "file" : "off");
   stage.moved = false;
   await breath();

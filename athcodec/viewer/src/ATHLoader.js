@@ -13,6 +13,7 @@ let files = 0;
 class Channel {
   views = new Map();
   state = { fetched: 0, requests: 0, ready: new Int8Array(1).fill(-1) };
+  failure = null;
   #asked = new Map(); // what is under way: key: resolve
   #nextView = 1;
   #nextBake = 1;
@@ -52,7 +53,8 @@ class Channel {
     } else if (type === "baked") {
       this.#asked.get(`bake ${message.id}`)(message);
     } else {
-      this.#tell(message); // "stopped", "damaged"
+      this.failure = { type, level: message.level ?? null, message: message.message, codeName: message.codeName };
+      this.#tell(this.failure); // "stopped", "damaged"
     }
   }
 
@@ -338,7 +340,9 @@ export class ATHLoader extends Loader {
   }
 
   #start() {
-    const worker = this.workerURL ? new Worker(this.workerURL, { type: "module" })
+    // a page from the disk may have no module as a worker from its own memory; the bundle is both
+    const type = this.workerURL?.startsWith("blob:") ? "classic" : "module";
+    const worker = this.workerURL ? new Worker(this.workerURL, { type })
       : new Worker(new URL("./ath_worker.js", import.meta.url), { type: "module" }); // as bundlers expect it
     Object.assign(worker, { files: 0, channels: new Map() });
     worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);

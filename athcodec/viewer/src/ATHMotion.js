@@ -70,6 +70,11 @@ export class ATHMotion extends EventDispatcher {
     return this.info.levelCount;
   }
 
+  /** The last of the events "stopped" and "damaged", null where there was none. */
+  get failure() {
+    return this.#channel.failure;
+  }
+
   get bytesFetched() {
     return this.#channel.state.fetched;
   }

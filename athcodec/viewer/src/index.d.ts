@@ -147,6 +147,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** The deepest depth that is here for all of the time; -1: none. */
   readonly readyDepth: number;
   readonly complete: boolean;
+  /** The last of the events "stopped" and "damaged", of which one may have come before there was a listener. */
+  readonly failure: { type: "stopped" | "damaged"; message: string; codeName: string; level: number | null } | null;
   readonly bytesFetched: number;
   readonly bytesTotal: number;
   readonly requests: number;

@@ -76,6 +76,7 @@ export class Session {
       const have = this.#front.length;
       await this.source.read(have, needed - have, (bytes, offset) => this.#take(bytes, offset));
       if (this.#file) return;
+      if (this.#front.length === 0) throw Object.assign(new Error("NOT_AN_ATH_FILE: got no bytes"), { codeName: "NOT_AN_ATH_FILE" });
       if (this.#front.length < needed) AthFile.open(this.#front); // throws what is missing
       needed = Math.max(AthFile.front(this.#front).needed, this.#front.length + 1);
     }
