@@ -11,11 +11,27 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench import data, decode, hierarchy, levels, memory, paper, picture, quick, rd, report, scale, sizes, speed, tables
+from bench import (
+    data,
+    decode,
+    hierarchy,
+    levels,
+    memory,
+    paper,
+    picture,
+    quick,
+    rd,
+    report,
+    scale,
+    sizes,
+    speed,
+    tables,
+    viewer,
+)
 
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
-         "picture": picture, "hierarchy": hierarchy}
+         "picture": picture, "hierarchy": hierarchy, "viewer": viewer}
 
 
 def main(argv: Sequence[str]) -> int:

@@ -366,7 +366,7 @@ def test_a_thousand_instances_are_drawn_each_at_its_depth(opened, sample_ath):
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(1000)")
         forest = "athcodecViewer.state.forest"
-        page.wait_for_function(f"() => {forest}?.children.length === athcodecViewer.motion.depthCount")
+        page.wait_for_function(f"() => {forest}?.baked.length === athcodecViewer.motion.depthCount")
         page.wait_for_function(f"() => {forest}.counts.reduce((a, b) => a + b, 0) > 300", timeout=60_000)
         counts = page.evaluate(f"[...{forest}.counts, {forest}.culled]")
         assert sum(counts) == 1000 and sum(count > 0 for count in counts[:-1]) > 1

@@ -150,9 +150,15 @@ function pictured(plant) {
   state.dirty = true;
   if (plant !== plants.at(-1)) return;
   counters.pictures++;
-  counters.firstPicture ??= { ms: performance.now() - counters.started, bytes: plant.motion.bytesFetched };
-  if (counters.pictures > 1 && plant.motion.frame > 0)
-    counters.firstMotion ??= { ms: performance.now() - counters.started, bytes: plant.motion.bytesFetched };
+}
+
+// When the first picture was drawn, and the first that differs from it.
+function markFirst() {
+  const { motion } = plants.at(-1);
+  if (motion.depth < 0 || counters.firstMotion) return;
+  const now = { ms: performance.now() - counters.started, bytes: motion.bytesFetched, frame: motion.frame };
+  counters.firstPicture ??= now;
+  if (motion.frame !== counters.firstPicture.frame) counters.firstMotion = now;
 }
 
 // The world's box of all rest poses.
@@ -447,6 +453,7 @@ function draw() {
   state.dirty = false;
   const start = performance.now();
   stage.render();
+  markFirst();
   counters.frames++;
   counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
 }
@@ -583,6 +590,18 @@ globalThis.athcodecViewer = {
   decoded: async (seconds, level) => [...await plants.at(-1).motion.positions(seconds, level)],
   uploaded: () => [...plants.at(-1).motion.uploaded()],
   onGraphics: () => [...readback(stage.renderer, plants.at(-1).ath, plants.at(-1).motion)],
+  /** Milliseconds from choosing what to draw until it is drawn, by instance counts: the median of some frames. */
+  timeForest(frames) {
+    const gl = stage.renderer.getContext(), pixel = new Uint8Array(4), times = [];
+    for (let i = 0; i < frames; i++) {
+      const start = performance.now();
+      state.forest.update(stage.camera, stage.pixels, state.time + i / 30);
+      stage.render();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits for the picture
+      times.push(performance.now() - start);
+    }
+    return { ms: times.sort((a, b) => a - b)[frames >> 1], counts: state.forest.counts, unseen: state.forest.culled, vertices: state.forest.vertices };
+  },
   forestOf(count, levelOfDetail = true) {
     state.forestCount = count;
     $("forest-lod").checked = levelOfDetail;

@@ -11,9 +11,12 @@ import { injectMotion, motionUniforms } from "./shader.js";
 const MOST_TEXELS = 4 << 20; // of one depth: 64 MiB; longer clips are played at fewer frames a second
 const TALLEST = 4096;        // rows of a texture that every device has
 const CELL = 1.5;            // side of the cells of simplified geometry, in pixels' worth of error
+const COARSER = 2;           // from one geometry to the next
+const FEWER = 0.85;          // of the vertices before, for a geometry to be worth it
 
 const plainMaterial = (lines) => (lines ? new LineBasicMaterial({ color: 0x6b5b45 })
   : new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
+const breath = () => new Promise((done) => { setTimeout(done); });
 
 export class ATHForest extends Group {
   levelOfDetail = true;
@@ -21,9 +24,10 @@ export class ATHForest extends Group {
   counts = [];     // instances drawn, by depth
   vertices = 0;    // drawn, all instances
   culled = 0;
+  baked = [];      // depths that can be drawn
 
   #ath;
-  #depths = [];    // per depth: {uniforms, mesh, place, turn} once it is baked
+  #bins = [];      // {level, tolerance, drawn, place, turn, size, uniforms, filled}, the finest first
   #baking = new Set();
   #places = new Float32Array(0);
   #turns = new Float32Array(0);
@@ -49,7 +53,7 @@ export class ATHForest extends Group {
     const upIsZ = this.#ath.metadata.up_axis === "z" ? 1 : 0;
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
     this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds }) => [Math.cos(angle), Math.sin(angle), seconds, upIsZ]));
-    for (const depth of this.#depths) if (depth) this.#makeRoom(depth);
+    for (const bin of this.#bins) this.#makeRoom(bin);
   }
 
   /** Gets a depth ready to be drawn; all bytes of it have to be here. */
@@ -59,7 +63,7 @@ export class ATHForest extends Group {
     const { motion, channel } = this.#ath, known = await channel.parts(level), { frameCount } = motion.info;
     const step = Math.max(1, Math.ceil(frameCount * known.texels / Math.min(MOST_TEXELS, 1024 * TALLEST)));
     const baked = await channel.bake(level, step);
-    if (!baked.data) {
+    if (!baked.data || !this.#ath) {
       this.#baking.delete(level);
       return;
     }
@@ -67,72 +71,90 @@ export class ATHForest extends Group {
     uniforms.athData.value = dataTexture(baked.data);
     uniforms.athClip.value.set(baked.texels, baked.rows, motion.duration / baked.rows, 0);
     uniforms.athStride.value = exactCount > 0 ? (known.texels - 3 * nodeCount) / exactCount : 1;
-    const depth = { level, uniforms, ...this.#draw(level, known, uniforms) };
-    this.#makeRoom(depth);
-    this.add(depth.drawn);
-    this.#depths[level] = depth;
+    await this.#draw(level, known, uniforms);
+    this.baked.push(level);
     this.dispatchEvent({ type: "depth", level });
   }
 
-  #draw(level, known, uniforms) {
-    const { channel, motion } = this.#ath, whole = this.#geometry, lines = !whole.hasAttribute("normal");
-    const deepest = level === motion.depthCount - 1;
-    const parts = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
-    parts.forEach((part, vertex) => { if (texel[vertex] < 0) parts[vertex] = -1; }); // exact runs: one space
-    const less = deepest ? whole : clustered(whole, this.#ath.rest, CELL * motion.error(level).max, parts);
-    const geometry = new InstancedBufferGeometry();
-    geometry.setIndex(less.index);
-    for (const [name, attribute] of Object.entries(less.attributes))
+  // Geometries of a depth: the finest for where its error is a pixel, coarser ones up to where the depth before takes over.
+  async #draw(level, known, uniforms) {
+    const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.depthCount - 1;
+    const least = motion.error(level).max, most = level > 0 ? motion.error(level - 1).max : sphere.radius / 4;
+    const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
+    node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
+    const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), uniforms, true);
+    const place = (geometry, tolerance) => this.#addBin(level, geometry, tolerance, texel, uniforms, material);
+    let before = deepest ? this.#geometry : clustered(this.#geometry, rest, CELL * least, node);
+    place(before, least);
+    for (let tolerance = Math.max(COARSER * least, sphere.radius / 2000); tolerance < most; tolerance *= COARSER) {
+      await breath();
+      if (!this.#ath) return;
+      const less = clustered(this.#geometry, rest, CELL * tolerance, node);
+      if (less.userData.source.length > FEWER * before.userData.source.length) continue;
+      place(less, tolerance);
+      before = less;
+    }
+  }
+
+  #addBin(level, base, tolerance, texel, uniforms, material) {
+    const geometry = new InstancedBufferGeometry(), { source } = base.userData, lines = !base.hasAttribute("normal");
+    geometry.setIndex(base.index);
+    for (const [name, attribute] of Object.entries(base.attributes))
       if (name !== "athPart") geometry.setAttribute(name, attribute);
-    geometry.setAttribute("athPart", new BufferAttribute(
-      gather(new Float32Array(less.userData.source.length), texel, less.userData.source, 1), 1));
-    geometry.instanceCount = 0;
-    const material = injectMotion(this.#material(lines, level), uniforms, true);
+    geometry.setAttribute("athPart", new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
     drawn.userData.depth = level;
     drawn.frustumCulled = false; // instances are, one by one
-    return { drawn, geometry, size: less.userData.source.length };
+    const bin = { level, tolerance, drawn, uniforms, size: source.length, filled: 0 };
+    this.#makeRoom(bin);
+    this.add(drawn);
+    this.#bins.push(bin);
+    this.#bins.sort((a, b) => a.tolerance - b.tolerance);
   }
 
-  #makeRoom(depth) {
-    const { geometry } = depth;
+  // A geometry keeps the number of instances that it was first drawn with: another number takes another one.
+  #makeRoom(bin) {
+    const old = bin.drawn.geometry, geometry = new InstancedBufferGeometry();
+    geometry.setIndex(old.index);
+    for (const [name, attribute] of Object.entries(old.attributes)) geometry.setAttribute(name, attribute);
     for (const [key, name] of [["place", "athPlace"], ["turn", "athTurn"]]) {
-      geometry.deleteAttribute(name);
-      depth[key] = new InstancedBufferAttribute(new Float32Array(Math.max(4, this.#places.length)), 4).setUsage(DynamicDrawUsage);
-      geometry.setAttribute(name, depth[key]);
+      bin[key] = new InstancedBufferAttribute(new Float32Array(Math.max(4, this.#places.length)), 4);
+      geometry.setAttribute(name, bin[key].setUsage(DynamicDrawUsage));
     }
+    geometry.instanceCount = 0;
+    bin.drawn.geometry = geometry;
+    old.dispose();
   }
 
   /** Chooses what to draw: once per frame. height: of the screen, in pixels. */
   update(camera, height, seconds) {
-    const filled = this.#depths.map(() => 0), sphere = new Sphere(), view = new Frustum();
-    const place = new Vector3(), eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+    const bins = this.#bins, sphere = new Sphere(), view = new Frustum(), place = sphere.center, reach = this.#reach();
     this.updateWorldMatrix(true, false);
-    const inverse = new Matrix4().copy(this.matrixWorld).invert();
-    eye.applyMatrix4(inverse);
+    const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(new Matrix4().copy(this.matrixWorld).invert());
     view.setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(this.matrixWorld));
-    const there = this.#depths.flatMap((depth, level) => (depth ? [level] : []));
+    const pixel = 2 * Math.tan(camera.fov * Math.PI / 360) / height; // at distance 1
     this.culled = 0;
-    const half = 2 * Math.tan(camera.fov * Math.PI / 360) / height;
-    const reach = this.#reach();
-    for (let i = 0; i < this.#places.length && there.length > 0; i += 4) {
+    for (const bin of bins) bin.filled = 0;
+    for (let i = 0; i < this.#places.length && bins.length > 0; i += 4) {
       const size = this.#places[i + 3];
       place.fromArray(this.#places, i);
-      sphere.center.copy(place);
       sphere.radius = reach * size;
       if (!view.intersectsSphere(sphere)) {
         this.culled++;
         continue;
       }
       const distance = Math.max(eye.distanceTo(place) - 0.5 * reach * size, 1e-6);
-      const depth = this.#depths[this.#choose(there, size / (half * distance))];
-      depth.place.array.set(this.#places.subarray(i, i + 4), 4 * filled[depth.level]);
-      depth.turn.array.set(this.#turns.subarray(i, i + 4), 4 * filled[depth.level]++);
+      const bin = bins[this.levelOfDetail ? this.#choose(this.pixels * pixel * distance / size) : 0];
+      for (let k = 0; k < 4; k++) {
+        bin.place.array[4 * bin.filled + k] = this.#places[i + k];
+        bin.turn.array[4 * bin.filled + k] = this.#turns[i + k];
+      }
+      bin.filled++;
     }
-    this.counts = Array.from({ length: this.#ath.motion.depthCount }, (_, level) => filled[level] ?? 0);
+    this.counts = new Array(this.#ath.motion.depthCount).fill(0);
     this.vertices = 0;
-    for (const depth of this.#depths) if (depth) this.#show(depth, filled[depth.level], seconds);
+    for (const bin of bins) this.#show(bin, seconds);
   }
 
   // How far from its place an instance of size 1 can be seen: the rest pose's sphere, whatever the turn, and room to move.
@@ -141,30 +163,34 @@ export class ATHForest extends Group {
     return center.length() + 1.2 * radius;
   }
 
-  #choose(there, perUnit) {
-    if (!this.levelOfDetail) return there.at(-1);
-    return there.find((level) => this.#ath.motion.error(level).max * perUnit <= this.pixels) ?? there.at(-1);
+  // The coarsest that is good enough; the finest where none is.
+  #choose(tolerance) {
+    let chosen = 0;
+    while (chosen + 1 < this.#bins.length && this.#bins[chosen + 1].tolerance <= tolerance) chosen++;
+    return chosen;
   }
 
-  #show(depth, count, seconds) {
-    depth.geometry.instanceCount = count;
-    depth.drawn.visible = count > 0;
-    depth.uniforms.athClip.value.w = seconds;
-    this.vertices += count * depth.size;
-    for (const attribute of [depth.place, depth.turn]) {
+  #show(bin, seconds) {
+    const { filled, drawn, uniforms } = bin;
+    drawn.geometry.instanceCount = filled;
+    drawn.visible = filled > 0;
+    uniforms.athClip.value.w = seconds;
+    this.counts[bin.level] += filled;
+    this.vertices += filled * bin.size;
+    for (const attribute of [bin.place, bin.turn]) {
       attribute.clearUpdateRanges();
-      attribute.addUpdateRange(0, 4 * count);
-      attribute.needsUpdate = count > 0;
+      attribute.addUpdateRange(0, 4 * filled);
+      attribute.needsUpdate = filled > 0;
     }
   }
 
   dispose() {
-    for (const depth of this.#depths) {
-      if (!depth) continue;
-      depth.uniforms.athData.value.dispose();
-      depth.geometry.dispose();
-      depth.drawn.material.dispose();
+    for (const { uniforms, drawn } of this.#bins) {
+      uniforms.athData.value.dispose();
+      drawn.geometry.dispose();
+      drawn.material.dispose();
     }
-    this.#depths = [];
+    this.#bins = [];
+    this.#ath = null;
   }
 }

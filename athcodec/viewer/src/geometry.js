@@ -108,15 +108,17 @@ export function clustered(geometry, rest, size, partOf) {
   const { source } = geometry.userData, corners = geometry.index.array, lines = !geometry.getAttribute("normal");
   const cells = new Map(), step = lines ? 2 : 3, out = [], seen = new Set();
   const cell = (vertex) => {
-    const at = 3 * source[vertex];
-    const key = `${partOf[source[vertex]]},${[0, 1, 2].map((k) => Math.floor(rest[at + k] / size)).join()}`;
+    const at = 3 * source[vertex], place = (k) => Math.floor(rest[at + k] / size) & 0xfff; // far cells may share a number
+    const key = (((partOf[source[vertex]] + 1) & 0xffff) * 4096 + place(0)) * 16777216 + place(1) * 4096 + place(2);
     if (!cells.has(key)) cells.set(key, vertex);
     return cells.get(key);
   };
   for (let i = 0; i < corners.length; i += step) {
     const all = Array.from(corners.subarray(i, i + step), cell);
-    const key = [...all].sort((a, b) => a - b).join();
-    if (new Set(all).size < step || seen.has(key)) continue;
+    const [a, b, c] = all;
+    if (a === b || (!lines && (b === c || c === a))) continue;
+    const [low, middle, high] = [...all].sort((p, q) => p - q), key = lines ? low * 2 ** 26 + middle : `${low},${middle},${high}`;
+    if (seen.has(key)) continue;
     seen.add(key);
     out.push(...all);
   }

@@ -197,6 +197,8 @@ export class ATHForest extends Group {
   /** Error on the screen that is allowed, in pixels. */
   pixels: number;
   readonly count: number;
+  /** Depths that can be drawn. */
+  readonly baked: number[];
   /** Instances drawn, by depth; those out of view; vertices drawn. */
   readonly counts: number[];
   readonly culled: number;

@@ -1,0 +1,228 @@
+"""The viewer in Chromium: time to first motion on a slow line, long tasks, size of the bundles, forests.
+
+The page is open and empty when a file is asked for, as it is when a viewer opens one file after the other, and as it
+is taken to be for the formats beside it. Those count as shown when their last byte is here: reading them comes on top.
+Drawing is in software: of frame times only the ratios tell anything about a graphics processor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from bench.browser import chromium
+from bench.clips import add_clips, add_rel_error
+from bench.line import WEB, Line
+from bench.tables import table
+
+MEGABIT = 125_000
+OURS = ("ATHLoader.js", "ath_worker.js", "viewer.js")
+MOST_BYTES = 150_000
+MOST_SECONDS, MOST_SHARE, LONGEST_TASK = 0.5, 0.1, 50
+
+OBSERVE = """new Promise((found) => {
+  globalThis.longTasks = [];
+  new PerformanceObserver((list) => longTasks.push(...list.getEntries().map(({ duration }) => duration)))
+    .observe({ type: "longtask" });
+  found();
+})"""
+FETCH = """async (name) => {
+  const start = performance.now(), answer = await fetch(name);
+  const size = (await answer.arrayBuffer()).byteLength;
+  return { seconds: (performance.now() - start) / 1000, size };
+}"""
+MODES = """async ([name, mode, depths, frames]) => {
+  const { ATHLoader } = await import("athcodec-three"), loader = new ATHLoader().setMode(mode);
+  const ath = await loader.loadAsync(name), { stage } = athcodecViewer, gl = stage.renderer.getContext();
+  const { motion } = ath, scene = stage.scene([ath.object]), pixel = new Uint8Array(4), found = [];
+  while (!motion.complete) await new Promise((done) => setTimeout(done, 20));
+  for (let depth = 0; depth < depths; depth++) {
+    const ms = [], worker = [];
+    for (let i = 0; i < frames; i++) {
+      const start = performance.now();
+      await motion.show(i / 30, depth);
+      stage.renderer.render(scene, stage.camera);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      ms.push(performance.now() - start);
+      worker.push(motion.milliseconds);
+    }
+    const median = (values) => values.sort((a, b) => a - b)[frames >> 1];
+    const bytes = mode === "matrices" ? motion.uniforms.athData.value.image.data.byteLength : 12 * motion.info.vertexCount;
+    found.push({ depth, mode, ms: median(ms), worker: median(worker), bytes });
+  }
+  ath.dispose();
+  loader.dispose();
+  return found;
+}"""
+
+NOTE_START = """
+Seconds from asking for the file until a picture has been drawn, and until one has that differs from it (motion), medians;
+bytes: that had come by then. Raw and GLB: until their last byte is here.
+"""
+NOTE_TASKS = "Tasks of the page's main thread while a file streams in until all of it is shown, as its long-task observer has them."
+NOTE_FOREST = "Milliseconds from choosing depths until the picture is drawn, in software; vertices are those drawn."
+NOTE_MODES = """
+Milliseconds from asking the worker for a frame until it is drawn, medians; bytes: that go to the graphics processor for
+it. Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_clips(parser)
+    add_rel_error(parser)
+    parser.add_argument("--line", type=float, default=10.0, metavar="MBIT", help="megabits a second (default 10)")
+    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="how often a file is opened (default 5)")
+    parser.add_argument("--instances", type=int, nargs="+", default=[10, 30, 100, 300, 1000], metavar="N")
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    starts, tasks, forests, modes, broken = [], [], [], [], []
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
+        for path in args.clips:
+            files = _files(path, Path(folder), args.rel_error)
+            found = _starts(browser, files, args)
+            starts += [{"clip": path.stem} | row for row in found["starts"]]
+            tasks.append({"clip": path.stem} | found["tasks"])
+            broken += _promises(path.stem, found)
+            forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
+            modes += [{"clip": path.stem} | row for row in _modes(browser, files["tree.ath"])]
+    sizes = [{"file": name, "bytes": (WEB / name).stat().st_size} for name in (*OURS, "three.js", "OrbitControls.js")]
+    own = sum(row["bytes"] for row in sizes[:3])
+    if own > MOST_BYTES:
+        broken.append(f"bundle: got {own:,} bytes, expected at most {MOST_BYTES:,}")
+    return {"tables": [
+        table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
+        table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
+        table(f"Bundles; loader, worker with decoder and page together {own:,} bytes", sizes),
+        table("Forest", forests, NOTE_FOREST),
+        table("Ways of moving the vertices", modes, NOTE_MODES),
+    ], "broken": broken}
+
+
+def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:
+    """The clip as .ath, as raw float32 and as a GLB with morph targets."""
+    with athcodec.read_hdf5(path) as clip:
+        athcodec.encode(clip, folder / "tree.ath", rel_error=rel_error)
+        positions = clip.block(0, clip.frame_count).astype("<f4")
+        return {"tree.ath": (folder / "tree.ath").read_bytes(), "tree.raw": positions.tobytes(),
+                "tree.glb": _glb(positions, clip.time)}
+
+
+def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
+    """Points with a morph target per frame, and the animation that shows one after the other."""
+    frames, count = positions.shape[:2]
+    arrays = [positions[0], *(positions - positions[0]), time.astype("<f4"), np.eye(frames, dtype="<f4")]
+    views, accessors, body = [], [], b""
+    for array in arrays:
+        views.append({"buffer": 0, "byteOffset": len(body), "byteLength": array.nbytes})
+        vectors = array.ndim == 2 and array.shape[1] == 3
+        accessors.append({"bufferView": len(views) - 1, "componentType": 5126, "type": "VEC3" if vectors else "SCALAR",
+                          "count": len(array) if vectors else array.size,
+                          **({"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if vectors else {})})
+        body += array.tobytes()
+    sampler = {"input": frames + 1, "output": frames + 2}
+    targets = [{"POSITION": 1 + frame} for frame in range(frames)]
+    head = json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0, "targets": targets}]}],
+        "animations": [{"samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}],
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(body)}]}).encode()
+    head += b" " * (-len(head) % 4)
+    parts = struct.pack("<II", len(head), 0x4E4F534A) + head + struct.pack("<II", len(body), 0x004E4942) + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
+
+
+def _page(browser, line: Line, name: str | None = None):
+    page = browser.new_page(viewport={"width": 960, "height": 600})
+    page.goto(line.page(name))
+    page.wait_for_function("() => globalThis.athcodecViewer")
+    page.wait_for_timeout(1000)
+    return page
+
+
+def _starts(browser, files: dict[str, bytes], args: argparse.Namespace) -> dict[str, Any]:
+    with Line(files, rate=args.line * MEGABIT) as line:
+        rounds = [_open(browser, line) for _ in range(args.rounds)]
+        page = _page(browser, line)
+        others = {name: page.evaluate(FETCH, name) for name in ("tree.raw", "tree.glb")}
+        page.close()
+    motion = [each["motion"]["ms"] / 1000 for each in rounds]
+    ath = {"file": ".ath", "size": len(files["tree.ath"]),
+           "picture": statistics.median(each["picture"]["ms"] for each in rounds) / 1000,
+           "motion": statistics.median(motion), "slowest": max(motion), "bytes": rounds[0]["motion"]["bytes"],
+           "share": rounds[0]["motion"]["bytes"] / len(files["tree.ath"]),
+           "all": statistics.median(each["all"] for each in rounds)}
+    rows = [ath] + [{"file": name, "size": found["size"], "motion": found["seconds"]} for name, found in others.items()]
+    longest = [max(each["tasks"], default=0) for each in rounds]
+    return {"starts": rows, "tasks": {"rounds": args.rounds, "longest of each round": longest,
+                                      "over 50 ms": sum(ms > LONGEST_TASK for each in rounds for ms in each["tasks"])}}
+
+
+def _open(browser, line: Line) -> dict[str, Any]:
+    page = _page(browser, line)
+    page.evaluate(OBSERVE)
+    page.evaluate("athcodecViewer.open('/tree.ath', 'tree.ath')")
+    page.wait_for_function("() => athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion")
+    done = page.evaluate("(performance.now() - athcodecViewer.counters.started) / 1000")
+    page.wait_for_timeout(500)
+    counters = page.evaluate("athcodecViewer.counters")
+    tasks = page.evaluate("longTasks")
+    page.close()
+    return {"picture": counters["firstPicture"], "motion": counters["firstMotion"], "all": done, "tasks": tasks}
+
+
+def _promises(clip: str, found: dict[str, Any]) -> list[str]:
+    ath, *others = found["starts"]
+    broken = []
+    if ath["motion"] > MOST_SECONDS:
+        broken.append(f"{clip}: first motion: got {ath['motion']:.2f} s, expected at most {MOST_SECONDS} s")
+    for other in others:
+        if ath["motion"] > MOST_SHARE * other["motion"]:
+            broken.append(f"{clip}: first motion: got {ath['motion']:.2f} s, expected at most a tenth of {other['file']}'s "
+                          f"{other['motion']:.2f} s")
+    if found["tasks"]["over 50 ms"]:
+        longest = statistics.median(found["tasks"]["longest of each round"])
+        broken.append(f"{clip}: main thread: got tasks of {longest:.0f} ms (median of the longest), expected none over 50 ms")
+    return broken
+
+
+def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
+    rows = []
+    with Line({"tree.ath": data}) as line:
+        page = _page(browser, line, "tree.ath")
+        page.wait_for_function("() => athcodecViewer.motion?.complete")
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        page.evaluate("athcodecViewer.forestOf(10)")
+        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.depthCount")
+        for count in counts:
+            both = {}
+            for detail in (True, False):
+                page.evaluate(f"athcodecViewer.forestOf({count}, {json.dumps(detail)})")
+                page.evaluate("athcodecViewer.timeForest(1)")
+                both[detail] = page.evaluate("athcodecViewer.timeForest(3)")
+            on, off = both[True], both[False]
+            rows.append({"instances": count, "in view": count - on["unseen"], "by depth": on["counts"], "detail on": on["ms"],
+                         "detail off": off["ms"], "off / on": off["ms"] / on["ms"], "vertices on": on["vertices"],
+                         "vertices off": off["vertices"]})
+        page.close()
+    return rows
+
+
+def _modes(browser, data: bytes) -> list[dict[str, Any]]:
+    with Line({"tree.ath": data}) as line:
+        page = _page(browser, line, "tree.ath")
+        page.wait_for_function("() => athcodecViewer.motion?.complete")
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        depths = page.evaluate("athcodecViewer.motion.depthCount")
+        rows = [row for mode in ("matrices", "positions")
+                for row in page.evaluate(MODES, ["/tree.ath", mode, depths, 21])]
+        page.close()
+    return sorted(rows, key=lambda row: row["depth"])
