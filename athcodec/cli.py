@@ -56,6 +56,8 @@ READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip ins
 LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 
+DEMO_PAGE = "athcodec_demo.html"
+
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
 Report = Callable[[str, float], None]
@@ -244,9 +246,21 @@ def _demo(args: argparse.Namespace) -> int:
             with _open(encoded, strict=True) as decoder:
                 meters = [_decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
                 _print_demo(_facts(encoded, decoder), meters)
+        _export_demo(encoded, Path(args.keep or ".", DEMO_PAGE))
         if args.keep is not None:
             print(f"The file and its decoded levels are in {folder}.")
     return 0
+
+
+def _export_demo(encoded: Path, page: Path) -> None:
+    from athcodec import view
+
+    try:
+        view.export_page(encoded, page)
+    except OSError as error:  # a folder that is read-only is no reason to fail at the end
+        _say("warning", f"no page to look at: {_one_line(error)}")
+    else:
+        print(f"The sample moves in {page.resolve()}: open it in a browser.")
 
 
 # ---- what they do with clips and decoders ----
@@ -628,7 +642,10 @@ def _parser() -> argparse.ArgumentParser:
         "view", _view, "play an .ath file in a browser",
         "Serves the viewer on this computer only, until it is interrupted.",
     ))
-    _demo_arguments(verb("demo", _demo, "encode the included sample, decode and measure every depth"))
+    _demo_arguments(verb(
+        "demo", _demo, "encode the included sample, decode and measure every depth",
+        f"Ends with a page that shows it, {DEMO_PAGE}, in DIR or in the current folder.",
+    ))
     return parser
 
 

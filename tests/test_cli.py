@@ -163,13 +163,15 @@ def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, caps
 
 def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_where_told(tmp_path, capsys):
     assert run("demo", "--keep", tmp_path / "new") == 0
+    assert "ath-file" in (tmp_path / "new" / "athcodec_demo.html").read_text("utf-8")
     out, err = capsys.readouterr()
     assert err == ""
     rows = [line.split() for line in out.splitlines() if re.match(r"\d ", line)]
     assert [row[0] for row in rows] == ["0", "1", "2", "3"]
     assert float(rows[-1][6]) <= 1e-4 < float(rows[0][6])
     names = sorted(path.name for path in (tmp_path / "new").iterdir())
-    assert names == ["tree_1k_120f.ath", *(f"tree_1k_120f_level_{level}.h5" for level in range(4))]
+    levels = [f"tree_1k_120f_level_{level}.h5" for level in range(4)]
+    assert names == ["athcodec_demo.html", "tree_1k_120f.ath", *levels]
 
 
 # ---- damaged files ----
