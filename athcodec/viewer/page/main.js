@@ -99,7 +99,9 @@ async function open(source, name, beside = false) {
   await breath();
   prepareLimbs(ath);
   await breath();
-  arrange();
+  const plant = beside ? null : new Plant(ath);
+  await breath();
+  arrange(plant);
   await breath();
   frameView();
 }
@@ -116,14 +118,14 @@ function describe() {
 
 // ---- what is on the stage ----
 
-// Plants and panes for the files that are open and what is chosen.
-function arrange() {
+// Plants and panes for the files that are open and what is chosen. `first`: that of the first file, if there is one.
+function arrange(first = null) {
   for (const plant of plants) {
     plant.dispose();
     if (plant.motion !== plant.ath.motion) plant.motion.dispose();
   }
   const [ath] = opened;
-  plants = [new Plant(ath)];
+  plants = [first ?? new Plant(ath)];
   if (compare.value === "depths") plants = [new Plant(ath, ath.motion.clone()), ...plants];
   if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
   for (const plant of plants) {

@@ -73,6 +73,7 @@ export class HttpSource {
     this.requests++;
     const answer = await fetch(this.url, {
       headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
+      cache: "no-store", // browsers' caches let ranges of one file wait for each other, and ask for some twice
     });
     if (answer.status === 416) return this.#beyond(answer);
     if (answer.status >= 500 || answer.status === 429) throw new TypeError(`status ${answer.status}`);
