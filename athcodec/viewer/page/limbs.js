@@ -1,28 +1,31 @@
 // A plant that is lines, drawn as wood: each edge is a strip that faces the camera, as wide as the branch, lit as a
 // cylinder. Widths are the attribute "radius" or, without one, follow from how much grows beyond an edge.
 
-import { BufferAttribute, BufferGeometry, ShaderMaterial, Vector2 } from "three";
+import { BufferAttribute, InstancedBufferAttribute, InstancedBufferGeometry, ShaderMaterial, Vector2 } from "three";
 import { MOTION_PARS } from "athcodec-three";
 
+// One instance per edge, of four corners: `position` says which end, and which side. Attributes of the far end have
+// "Other" in their names.
 const VERTEX = /* glsl */`
-attribute vec3 other;
-attribute float athPartOther, radius, side;
-attribute vec3 color;
+attribute vec3 rest, restOther, color, colorOther;
+attribute float athPartOther, radius, radiusOther;
 uniform vec2 screen;
 varying vec3 vColor;
 varying float vSide;
 varying vec3 vAcross;
 ${MOTION_PARS}
 void main() {
-  vec4 p = modelViewMatrix * vec4(athMoved(position, athPart), 1.0);
-  vec4 q = modelViewMatrix * vec4(athMoved(other, athPartOther), 1.0);
-  vec2 along = (p.xy / -p.z - q.xy / -q.z) * sign(side);
+  bool far = position.x > 0.5;
+  vec4 p = modelViewMatrix * vec4(athMoved(rest, athPart), 1.0);
+  vec4 q = modelViewMatrix * vec4(athMoved(restOther, athPartOther), 1.0);
+  vec2 along = p.xy / -p.z - q.xy / -q.z;
   vec2 across = length(along) > 1e-9 ? normalize(vec2(-along.y, along.x)) : vec2(1.0, 0.0);
+  if (far) p = q;
   float pixel = -p.z * 2.0 / (projectionMatrix[1][1] * screen.y);
-  p.xy += across * sign(side) * (abs(side) > 1.5 ? -1.0 : 1.0) * max(radius, 0.55 * pixel);
+  p.xy += across * position.y * max(far ? radiusOther : radius, 0.55 * pixel);
   gl_Position = projectionMatrix * p;
-  vColor = color;
-  vSide = sign(side) * (abs(side) > 1.5 ? -1.0 : 1.0);
+  vColor = far ? colorOther : color;
+  vSide = position.y;
   vAcross = vec3(across, 0.0);
 }`;
 
@@ -52,42 +55,21 @@ export function radii(ath) {
   return beyond.map((value) => thick * Math.sqrt(value / most));
 }
 
-/** Does ahead of limbGeometry() what takes longest of it. */
-export function prepareLimbs(ath) {
-  if (!ath.hasFaces) ath.limbs = limbs(ath);
-}
-
-/** Four vertices per edge. */
+/** The edges as limbs. */
 export function limbGeometry(ath, radius) {
-  const geometry = ath.limbs ?? limbs(ath);
-  ath.limbs = null;
-  setRadii(geometry, radius);
-  return geometry;
-}
-
-function limbs(ath) {
-  const edges = ath.skeleton, count = edges.length / 2, source = new Uint32Array(4 * count), other = new Uint32Array(4 * count);
-  const side = new Float32Array(4 * count), index = new Uint32Array(6 * count);
-  for (let e = 0, at = 0, corner = 0; e < edges.length; e += 2, at += 4) {
-    source[at] = source[at + 1] = other[at + 2] = other[at + 3] = edges[e];
-    other[at] = other[at + 1] = source[at + 2] = source[at + 3] = edges[e + 1];
-    side[at] = 1; // sign: which end; size: which side
-    side[at + 1] = 2;
-    side[at + 2] = -2;
-    side[at + 3] = -1;
-    index[corner++] = at;
-    index[corner++] = at + 1;
-    index[corner++] = at + 2;
-    index[corner++] = at + 2;
-    index[corner++] = at + 1;
-    index[corner++] = at + 3;
+  const edges = ath.skeleton, count = edges.length / 2, source = new Uint32Array(count), other = new Uint32Array(count);
+  for (let e = 0; e < count; e++) {
+    source[e] = edges[2 * e];
+    other[e] = edges[2 * e + 1];
   }
-  const geometry = new BufferGeometry();
-  geometry.setIndex(new BufferAttribute(index, 1));
-  geometry.setAttribute("position", pointsOf(ath.rest, source));
-  geometry.setAttribute("other", pointsOf(ath.rest, other));
-  geometry.setAttribute("side", new BufferAttribute(side, 1));
+  const geometry = new InstancedBufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(Float32Array.of(0, 1, 0, 0, -1, 0, 1, 1, 0, 1, -1, 0), 3));
+  geometry.setIndex([0, 1, 2, 2, 1, 3]);
+  geometry.setAttribute("rest", pointsOf(ath.rest, source));
+  geometry.setAttribute("restOther", pointsOf(ath.rest, other));
+  geometry.instanceCount = count;
   geometry.userData = { source, other };
+  setRadii(geometry, radius);
   return geometry;
 }
 
@@ -99,14 +81,15 @@ function pointsOf(rest, vertices) {
     out[to++] = rest[from + 1];
     out[to++] = rest[from + 2];
   }
-  return new BufferAttribute(out, 3);
+  return new InstancedBufferAttribute(out, 3);
 }
 
 export function setRadii(geometry, perVertex) {
-  const { source } = geometry.userData;
-  const out = new Float32Array(source.length);
-  for (let i = 0; i < source.length; i++) out[i] = perVertex[source[i]];
-  geometry.setAttribute("radius", new BufferAttribute(out, 1));
+  for (const [name, vertices] of [["radius", geometry.userData.source], ["radiusOther", geometry.userData.other]]) {
+    const out = new Float32Array(vertices.length);
+    for (let i = 0; i < vertices.length; i++) out[i] = perVertex[vertices[i]];
+    geometry.setAttribute(name, new InstancedBufferAttribute(out, 1));
+  }
 }
 
 export function limbMaterial(uniforms) {

@@ -4,7 +4,7 @@ import { Box3, BufferGeometry, Color, DoubleSide, LineBasicMaterial, LineSegment
 import { ATHForest, ATHLoader, dataTexture, injectMotion, motionUniforms } from "athcodec-three";
 
 import { heatGradient, nodeColour } from "./colours.js";
-import { limbMaterial, prepareLimbs } from "./limbs.js";
+import { limbMaterial } from "./limbs.js";
 import { lineMaterial, meshMaterial, Plant } from "./plant.js";
 import { readback } from "./readback.js";
 import { Stage } from "./stage.js";
@@ -97,9 +97,8 @@ async function open(source, name, beside = false) {
   compare.set(beside ? "file" : "off");
   stage.moved = false;
   await breath();
-  prepareLimbs(ath);
-  await breath();
   const plant = beside ? null : new Plant(ath);
+  plant?.prepare(1, 1);
   await breath();
   arrange(plant);
   await breath();
@@ -129,8 +128,8 @@ function arrange(first = null) {
   if (compare.value === "depths") plants = [new Plant(ath, ath.motion.clone()), ...plants];
   if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
   for (const plant of plants) {
-    plant.setShow(show.value);
-    plant.setColour(colour.value);
+    if (plant.show !== show.value) plant.setShow(show.value);
+    if (plant.colour !== colour.value) plant.setColour(colour.value);
     plant.onPaint = () => { state.dirty = true; };
     plant.motion.addEventListener("frame", () => pictured(plant));
     plant.motion.addEventListener("ready", () => { state.dirty = true; });

@@ -1,6 +1,6 @@
 // One plant on the stage: what of it is drawn, and in which colours, for one motion of a loaded file.
 
-import { BufferAttribute, BufferGeometry, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
+import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { limbGeometry, limbMaterial, radii, setRadii } from "./limbs.js";
@@ -19,6 +19,9 @@ function sharing(geometry) {
   copy.userData = geometry.userData;
   return copy;
 }
+
+// Attributes for colours, and the vertices that they are of.
+const coloured = ({ userData: { source, other } }) => [["color", source], ...(other ? [["colorOther", other]] : [])];
 
 export class Plant {
   root = new Group();
@@ -92,7 +95,8 @@ export class Plant {
       object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));
     }
     const { geometry } = object;
-    geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * geometry.userData.source.length), 3));
+    const Colours = geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute;
+    for (const [name, list] of coloured(geometry)) geometry.setAttribute(name, new Colours(new Float32Array(3 * list.length), 3));
     object.frustumCulled = false;
     this.#drawn.push({ kind, geometry, object });
     this.root.add(object);
@@ -122,7 +126,8 @@ export class Plant {
   }
 
   get vertices() {
-    return this.#drawn.reduce((sum, { object, geometry }) => sum + (object.visible ? geometry.userData.source.length : 0), 0);
+    return this.#drawn.reduce((sum, { object, geometry }) => sum + (object.visible
+      ? geometry.userData.source.length * (geometry.isInstancedBufferGeometry ? 4 : 1) : 0), 0);
   }
 
   setShow(show) {
@@ -184,15 +189,17 @@ export class Plant {
     const line = this.show === "both" && this.colour === "plain" ? OVER : null;
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible) continue;
-      const { source } = geometry.userData, colour = geometry.getAttribute("color"), out = colour.array;
-      const fixed = kind === "skeleton" ? line : leafy && !stored ? LEAF : null;
-      for (let i = 0, at = 0; i < source.length; i++, at += 3) {
-        const value = fixed ?? (leafy && kind === "mesh" ? stored.array.subarray(i * stored.itemSize) : colourOf(source[i]));
-        out[at] = value[0];
-        out[at + 1] = value[1];
-        out[at + 2] = value[2];
+      const fixed = kind === "skeleton" ? line : leafy && !stored ? LEAF : null, own = leafy && kind === "mesh";
+      for (const [name, source] of coloured(geometry)) {
+        const colour = geometry.getAttribute(name), out = colour.array;
+        for (let i = 0, at = 0; i < source.length; i++, at += 3) {
+          const value = fixed ?? (own ? stored.array.subarray(i * stored.itemSize) : colourOf(source[i]));
+          out[at] = value[0];
+          out[at + 1] = value[1];
+          out[at + 2] = value[2];
+        }
+        colour.needsUpdate = true;
       }
-      colour.needsUpdate = true;
     }
   }
 

@@ -28,7 +28,12 @@ export class Stage {
     this.controls.addEventListener("change", changed);
     this.controls.addEventListener("start", () => { this.moved = true; });
     this.dark = matchMedia("(prefers-color-scheme: dark)");
-    this.dark.addEventListener("change", () => { this.#tint(); changed(); });
+    this.dark.addEventListener("change", () => {
+      this.#readBack();
+      this.#tint();
+      changed();
+    });
+    this.#readBack();
     this.changed = changed;
     this.resized = resized;
     new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
@@ -40,6 +45,11 @@ export class Stage {
     if (!this.#resize()) return;
     this.resized();
     this.changed();
+  }
+
+  // The page's own background; once, as it makes the page lay itself out.
+  #readBack() {
+    this.back = getComputedStyle(document.documentElement).getPropertyValue("--back").trim() || "#ffffff";
   }
 
   #resize() {
@@ -90,9 +100,8 @@ export class Stage {
   }
 
   #tint(scenes = this.panes.map(({ scene }) => scene)) {
-    const style = getComputedStyle(document.documentElement);
     for (const scene of scenes) {
-      scene.background = new Color(style.getPropertyValue("--back").trim() || "#ffffff");
+      scene.background = new Color(this.back);
       scene.fog?.color.copy(scene.background);
       const { tint, strength } = scene.getObjectByName("ground").material.uniforms;
       tint.value.set(0, 0, 0);

@@ -1,7 +1,8 @@
 // The motion of one loaded plant: what time and depth it shows, what of it is here, and how it gets into a material.
 // Decoding is the worker's; this holds the textures that the vertex shaders read.
 
-import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
+import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, InstancedBufferAttribute,
+  MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
 import { injectMotion, motionUniforms } from "./shader.js";
@@ -314,7 +315,7 @@ export class ATHMotion extends EventDispatcher {
     const parts = this.depth >= 0 ? this.#partOfVertices(this.depth) : null;
     if (parts) for (let i = 0; i < source.length; i++) array[i] = parts[source[i]];
     if (there) there.needsUpdate = true;
-    else geometry.setAttribute(name, new BufferAttribute(array, 1));
+    else geometry.setAttribute(name, new (geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute)(array, 1));
   }
 
   // athPart of every vertex in source order: 1 + first texel of its node's matrix, or minus that of its position.
