@@ -66,14 +66,14 @@ MODES = """async ([name, mode, depths, frames]) => {
 }"""
 
 NOTE_START = """
-Seconds from asking for the file until a picture has been drawn, until one has that differs from it (motion), and until
-all is here, medians. Bytes: that had come at first motion on a line so slow that they count. Raw and GLB: until their last
-byte is here.
+Seconds from asking for the file until a picture has been drawn, until one has that differs from it (motion), and
+until all is here, medians. Bytes: that had come at first motion on a line so slow that they count. Raw and GLB: until
+their last byte is here.
 """
 NOTE_TASKS = """
-The longest task of the page's main thread in each round, while a file streams in until all of it is shown: by the clock,
-as the long-task observer has it (0: none over 50 ms), and in processor time of that thread, to which other programs on
-the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
+The longest task of the page's main thread in each round, while a file streams in until all of it is shown: by the
+clock, as the long-task observer has it (0: none over 50 ms), and in processor time of that thread, to which other
+programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
 NOTE_FOREST = "Milliseconds from choosing depths until the picture is drawn, in software; vertices are those drawn."
 NOTE_MODES = """

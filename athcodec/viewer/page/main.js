@@ -130,6 +130,7 @@ function arrange(first = null) {
   for (const plant of plants) {
     if (plant.show !== show.value) plant.setShow(show.value);
     if (plant.colour !== colour.value) plant.setColour(colour.value);
+    plant.beside = plants;
     plant.onPaint = () => { state.dirty = true; };
     plant.motion.addEventListener("frame", () => pictured(plant));
     plant.motion.addEventListener("ready", () => { state.dirty = true; });
@@ -178,17 +179,18 @@ function place() {
 }
 
 function frameView() {
-  const all = box(), centre = all.getCenter(new Vector3()), radius = 0.5 * all.min.distanceTo(all.max);
-  if (state.forest) {
-    const reach = Math.max(forestRadius(), radius);
-    stage.look(new Vector3(0, all.min.y + radius * 0.4, 0), Math.min(reach, 5 * radius), { ground: all.min.y, groundSize: 2.6 * reach / Math.min(reach, 5 * radius) });
-    stage.controls.maxDistance = 6 * reach;
-    stage.camera.far = 12 * reach + 20 * radius;
-    stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * radius);
+  const all = box(), size = all.getSize(new Vector3()), most = Math.max(size.x, size.y, size.z);
+  if (!state.forest) {
+    stage.fog(0, 0);
+    stage.look(all, { height: all.min.y, size: 1.9 * most });
     return;
   }
-  stage.fog(0, 0);
-  stage.look(centre, radius, { ground: all.min.y, groundSize: 2.8 });
+  const reach = Math.max(forestRadius(), most), near = Math.min(reach, 2.2 * most);
+  const part = new Box3(new Vector3(-near, all.min.y, -near), new Vector3(near, all.max.y, near));
+  stage.look(part, { height: all.min.y, size: 2.6 * reach });
+  stage.controls.maxDistance = 6 * reach;
+  stage.camera.far = 12 * reach + 20 * most;
+  stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * most);
 }
 
 // ---- depth, colour, what is shown ----
@@ -484,7 +486,8 @@ function tell() {
   $("depth-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
     : motion.depth < motion.target ? `Depth ${motion.target} is still on its way` : `No vertex is further off than ${lengthText(error, unit)}`;
   if (motion.automatic) $("depth").value = motion.target;
-  $("scale-title").textContent = `Distance from the full depth, depth ${shown}`;
+  $("scale-title").textContent = "Distance from the full depth";
+  $("scale-middle").textContent = lengthText(main.heatMost / 4, unit);
   $("scale-high").textContent = lengthText(main.heatMost, unit);
   $("time").max = limit();
   if (document.activeElement !== $("time") || state.playing) $("time").value = state.time;

@@ -28,6 +28,7 @@ export class Plant {
   colour = "plain";
   show = "mesh";
   heatMost = 0;
+  beside = [this]; // plants on one scale of colours
   #orders;
   #node = null;
   #radii;
@@ -167,7 +168,7 @@ export class Plant {
     }
     if (colour === "distance") {
       const { distances } = motion;
-      this.heatMost = motion.depth < 0 ? 0 : motion.error(motion.depth).max;
+      this.heatMost = Math.max(...this.beside.map((plant) => (plant.motion.depth < 0 ? 0 : plant.motion.error(plant.motion.depth).max)));
       return (vertex) => heat(distances && this.heatMost ? Math.sqrt(distances[vertex] / this.heatMost) : 0);
     }
     return this.#barks();

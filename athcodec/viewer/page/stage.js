@@ -115,16 +115,17 @@ export class Stage {
     this.changed();
   }
 
-  /** The whole of a sphere (in the world) in view; `up` is the height of the ground. */
-  look(centre, radius, { near = 1, ground = 0, groundSize = 4 } = {}) {
-    const aspect = Math.min(1, (this.width - this.inset) / this.height / Math.max(1, this.panes.length));
-    const distance = near * 1.12 * radius / Math.sin(this.camera.fov * Math.PI / 360) / aspect;
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
+  /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
+  look(box, ground) {
+    const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
+    const aspect = (this.width - this.inset) / this.height / Math.max(1, this.panes.length);
+    const distance = 0.35 * across + 0.68 * Math.max(size.y, 0.9 * across / aspect, 1e-6) / half;
+    box.getCenter(this.controls.target);
+    this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;
     this.controls.maxDistance = distance * 20;
-    this.placeGround(ground, groundSize * radius);
+    this.placeGround(ground.height, ground.size);
     this.controls.update();
     this.changed();
   }
