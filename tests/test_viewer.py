@@ -390,7 +390,7 @@ def ink(page) -> float:
 
 
 @browser_test
-def test_meshes_are_drawn_with_normals_that_turn(opened, tmp_path):
+def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
     """Faces of four corners; of different sizes; uv per corner."""
     clip = tube(40, 12, 30)
     quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
@@ -421,6 +421,36 @@ def test_meshes_are_drawn_with_normals_that_turn(opened, tmp_path):
                             "uv": vertices if name == "corners.ath" else 0}
             page.wait_for_function("() => athcodecViewer.counters.pictures > 5")
             assert ink(page) > 0.01, name
+
+
+def smooth_normals(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Each quad's normal, by its diagonals, added to its corners."""
+    a, b, c, d = (positions[quads[:, k]] for k in range(4))
+    normals = np.zeros_like(positions)
+    for k in range(4):
+        np.add.at(normals, quads[:, k], np.cross(c - a, d - b))
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+@browser_test
+def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
+    clip = tube(40, 12, 30)
+    quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
+                      for r in range(39) for k in range(12)], np.int32)
+    clip.positions = clip.positions * np.float32(1)
+    clip.positions[..., 0] += 0.06 * clip.rest[:, 2] ** 2  # so that it has turned far
+    clip.faces = quads
+    clip.check()
+    athcodec.encode(clip, tmp_path / "tube.ath", rel_error=1e-3)
+    with Line({"tube.ath": (tmp_path / "tube.ath").read_bytes()}) as line, athcodec.open(tmp_path / "tube.ath") as decoder:
+        page = opened(line.page("tube.ath"))
+        page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
+        for depth in range(decoder.level_count):
+            page.evaluate(f"athcodecViewer.shown({decoder.time[20] - decoder.time[0]}, {depth})")
+            shown = positions_of(page, "athcodecViewer.onGraphics('normals')")
+            wanted = smooth_normals(decoder.positions(20, depth).astype(float), quads)
+            turned = np.abs(wanted - smooth_normals(clip.rest.astype(float), quads)).max()
+            assert turned > 0.3 and (shown * wanted).sum(axis=1).min() > np.cos(np.radians(8)), depth
 
 
 @browser_test

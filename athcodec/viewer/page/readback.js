@@ -6,10 +6,12 @@ import { MOTION_PARS } from "athcodec-three";
 
 const WIDTH = 256;
 
-/** 3 numbers per vertex in source order, of the picture that `motion` shows. */
-export function readback(renderer, ath, motion) {
+/** 3 numbers per vertex in source order, of the picture that `motion` shows: positions, or where `normals` (of the rest
+ * pose, likewise) are given, what becomes of those. */
+export function readback(renderer, ath, motion, normals = null) {
   const count = ath.rest.length / 3, height = Math.ceil(count / WIDTH), geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(ath.rest, 3));
+  geometry.setAttribute("normal", new BufferAttribute(normals ?? ath.rest, 3));
   geometry.setAttribute("pixel", new BufferAttribute(Float32Array.from({ length: 2 * count }, (_, i) =>
     (i % 2 ? (Math.floor(i / 2 / WIDTH) + 0.5) / height : ((i / 2) % WIDTH + 0.5) / WIDTH) * 2 - 1), 2));
   geometry.userData.source = Uint32Array.from({ length: count }, (_, i) => i);
@@ -17,7 +19,7 @@ export function readback(renderer, ath, motion) {
   const material = new ShaderMaterial({
     uniforms: motion.uniforms, depthTest: false,
     vertexShader: `attribute vec2 pixel; varying vec3 moved; ${MOTION_PARS}
-      void main() { moved = athMoved(position, athPart); gl_Position = vec4(pixel, 0.0, 1.0); gl_PointSize = 1.0; }`,
+      void main() { moved = ${normals ? "normalize(athTurned(normal, athPart))" : "athMoved(position, athPart)"}; gl_Position = vec4(pixel, 0.0, 1.0); gl_PointSize = 1.0; }`,
     fragmentShader: "varying vec3 moved; void main() { gl_FragColor = vec4(moved, 1.0); }",
   });
   const points = new Points(geometry, material), scene = new Scene();
