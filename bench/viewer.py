@@ -25,6 +25,7 @@ from bench.tables import table
 
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
+ROUNDS = 7
 OURS = ("ATHLoader.js", "ath_worker.js", "viewer.js")
 MOST_BYTES = 150_000
 MOST_SECONDS, MOST_SHARE, LONGEST_TASK = 0.5, 0.1, 50
@@ -76,7 +77,8 @@ clock, as the long-task observer has it (0: none over 50 ms), and in processor t
 programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
 NOTE_FOREST = """
-Milliseconds from choosing depths until the picture is drawn, in software, the fastest of five; vertices are those drawn.
+Milliseconds from choosing depths until the picture is drawn, in software, the fastest of seven, by turns;
+vertices are those drawn.
 """
 NOTE_MODES = """
 Milliseconds from asking the worker for a frame until it is drawn, medians; bytes: that go to the graphics processor for
@@ -184,7 +186,8 @@ def _open(browser, line: Line) -> dict[str, Any]:
     page.evaluate(OBSERVE)
     browser.start_tracing(page=page, categories=["toplevel"])
     page.evaluate("athcodecViewer.open('/tree.ath', 'tree.ath')")
-    page.wait_for_function("() => athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion", timeout=120_000)
+    page.wait_for_function("() => athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion",
+                           timeout=120_000)
     done = page.evaluate("(performance.now() - athcodecViewer.counters.started) / 1000")
     page.wait_for_timeout(500)
     counters = page.evaluate("athcodecViewer.counters")
@@ -228,12 +231,13 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
         page.evaluate("athcodecViewer.forestOf(10)")
         page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.depthCount")
         for count in counts:
-            both = {}
-            for detail in (True, False):
-                page.evaluate(f"athcodecViewer.forestOf({count}, {json.dumps(detail)})")
-                page.evaluate("athcodecViewer.timeForest(1)")
-                both[detail] = page.evaluate("athcodecViewer.timeForest(5)")
-            on, off = both[True], both[False]
+            page.evaluate(f"athcodecViewer.forestOf({count})")
+            both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
+            for _ in range(ROUNDS):  # by turns: what else the machine does meets both
+                for detail, found in both.items():
+                    page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
+                    found.append(page.evaluate("athcodecViewer.timeForest(1)"))
+            on, off = (min(found, key=lambda each: each["ms"]) for found in both.values())
             rows.append({"instances": count, "in view": count - on["unseen"], "by depth": on["counts"],
                          "detail on": on["ms"], "detail off": off["ms"], "off / on": off["ms"] / on["ms"],
                          "vertices on": on["vertices"], "vertices off": off["vertices"]})

@@ -441,8 +441,9 @@ def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
     clip.positions[..., 0] += 0.06 * clip.rest[:, 2] ** 2  # so that it has turned far
     clip.faces = quads
     clip.check()
-    athcodec.encode(clip, tmp_path / "tube.ath", rel_error=1e-3)
-    with Line({"tube.ath": (tmp_path / "tube.ath").read_bytes()}) as line, athcodec.open(tmp_path / "tube.ath") as decoder:
+    path = tmp_path / "tube.ath"
+    athcodec.encode(clip, path, rel_error=1e-3)
+    with Line({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
         for depth in range(decoder.level_count):
