@@ -259,7 +259,9 @@ export class ATHMotion extends EventDispatcher {
       old?.dispose();
       this.#textures.set(depth, dataTexture(data));
     }
+    const { texels, parts: { nodeCount, exactCount } } = this.#parts.get(depth);
     this.uniforms.athData.value = this.#textures.get(depth);
+    this.uniforms.athStride.value = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
   }
 
   #write(data) {
