@@ -3,18 +3,22 @@
 The source is read twice: once for what needs all frames (bounding box, TAM), once to code. What the file promises is
 checked on what a decoder will output: every level of every segment is decoded and measured, and what is beyond the
 bound at the last level is corrected before it is written. Settings come from search.py, the streams of a segment from
-coding.py.
+coding.py. `encode` does all of it; `draft`, `code_segments` and `write` are its three steps, for several processes that
+work on one clip.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import math
 import tempfile
 from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -31,7 +35,7 @@ from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.search import EFFORTS, Progress, Search
 from athcodec.shapes import Shapes
-from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, Plan
+from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
@@ -90,32 +94,78 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     memory grows with it. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError,
     ValueError, OSError.
     """
+    report = progress or _silent
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
-    report = progress or (lambda stage, fraction: None)
     check_target(path)  # before any work
-    clip.check()
-    if not clip.has_branches:
-        report("branches", 0.0)
-        clip = with_branches(clip, _best_branches(clip, rel_error or DEFAULT_REL_ERROR))
-    if weights is not None:
-        clip, weights = _weighted(clip, weights)
-    hierarchy = hierarchy_of(clip)
-    _check_limits(clip, hierarchy)
-    seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
-    source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
-                    None if weights is None else weights[hierarchy.vertex_source])
-    job = _Job(source, tam, attributes == "all", effort, report, lossless, jobs)
-    if target_size is not None:
-        bound = _bound_for_size(job, target_size)
-    else:
-        bound = max_error if max_error is not None else _relative_bound(rel_error, job)
+    job = _Job.begin(clip, report, jobs, rel_error=rel_error, segment_frames=segment_frames, tam=tam,
+                     exact_rest=exact_rest, lossless=lossless, weights=weights, attributes=attributes, effort=effort)
+    bound = job.bound(max_error, rel_error, target_size)
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-        result = job.encode(bound, ct.ChunkStore(spool))
-        chunks = result.store.write(out, result.header, result.errors)
-        with Decoder(out, strict=True) as decoder:  # before the file gets its name
-            summary = _summary(Path(path), job, result, chunks, decoder)
-    report("done", 1.0)
-    return summary
+        decided = job.decide(bound)
+        return job.write(path, out, spool, decided, job.coded(decided, range(job.segment_count)))
+
+
+@dataclass(frozen=True)
+class Draft:
+    """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
+
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `mark` tells
+    a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
+    """
+
+    settings: Settings
+    shapes: Shapes | None
+    seen: Survey
+    segment_count: int
+    found: Found | None  # branches, for a clip without
+    weights: str | np.ndarray | None
+    options: dict  # what _Job takes besides
+    mark: str
+
+
+@dataclass(frozen=True)
+class CodedSegment:
+    """One segment: chunks {(level, kind): payload}, and (levels, 2) errors of stopping at each level."""
+
+    index: int
+    chunks: dict[tuple[int, int], bytes]
+    errors: np.ndarray
+
+
+def draft(clip: MotionClip, *, max_error: float | None = None, rel_error: float | None = None,
+          target_size: int | None = None, segment_frames: int | None = None, attributes: str = "all",
+          effort: str = "default", jobs: int | None = None, progress: Progress | None = None, **options) -> Draft:
+    """The first step of `encode`, whose options it takes: branches, survey, and the search for settings."""
+    _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
+    with clip.watched():
+        job = _Job.begin(clip, progress or _silent, jobs, rel_error=rel_error, segment_frames=segment_frames,
+                         attributes=attributes, effort=effort, **options)
+        return job.draft(job.decide(job.bound(max_error, rel_error, target_size)))
+
+
+def code_segments(clip: MotionClip, draft: Draft, segments: Iterable[int], *, jobs: int | None = None,
+                  progress: Progress | None = None) -> Iterator[CodedSegment]:
+    """The second step: some of the segments 0 to draft.segment_count - 1, in ascending order, one after the other.
+
+    Raises ClipError where the clip is not the one that the draft was made of, as far as that shows.
+    """
+    job = _Job.resume(clip, draft, progress or _silent, jobs)
+    with clip.watched():
+        yield from job.coded(job.decided(draft), list(segments))
+
+
+def write(clip: MotionClip, draft: Draft, coded: Iterable[CodedSegment], path, *,
+          progress: Progress | None = None) -> Summary:
+    """The third step: the file that `encode` writes, of all segments, which may come in any order. Raises as
+    `code_segments` does, and ValueError where segments are missing."""
+    check_target(path)
+    job = _Job.resume(clip, draft, progress or _silent)
+    with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+        return job.write(path, out, spool, job.decided(draft), coded)
+
+
+def _silent(stage: str, fraction: float) -> None:
+    pass
 
 
 def _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs) -> None:
@@ -167,13 +217,21 @@ def _trial_size(clip: MotionClip, fraction: float, longer: float) -> float:
     """Bytes of a file of a clip that is so many times longer."""
     hierarchy = hierarchy_of(clip)
     source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=False)
-    job = _Job(source, None, False, "default", lambda stage, done: None, False)
+    job = _Job(source, None, False, "default", False)
     with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         try:
             entries = job.encode(_relative_bound(fraction, job), ct.ChunkStore(spool)).store.entries
         except BoundError:
             return math.inf
     return sum(chunk.length * (longer if chunk.is_motion and chunk.kind != ct.SHAPES else 1) for chunk, _ in entries)
+
+
+def _completed(clip: MotionClip, found: Found | None,
+               weights: str | np.ndarray | None) -> tuple[MotionClip, np.ndarray | None]:
+    """The clip on branches that were found for it, and its weights, which it then names."""
+    if found is not None:
+        clip = with_branches(clip, found)
+    return (clip, None) if weights is None else _weighted(clip, weights)
 
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
@@ -215,13 +273,24 @@ def _survey_options(tam: Thresholds | None) -> dict:
 
 
 @dataclass
+class _Decided:
+    """What the streams of a file depend on: settings, and what follows from them."""
+
+    ath: Ath
+    settings: Settings
+    shape: Shape
+    shapes: Shapes | None
+
+    @property
+    def mark(self) -> str:
+        return hashlib.sha256(self.shape.hierarchy_stream + self.shape.rest_chunk.stream).hexdigest()
+
+
+@dataclass
 class _Result:
     store: ct.ChunkStore
     header: ct.Header
     errors: np.ndarray
-    ath: Ath
-    plan: Plan
-    settings: Settings
 
 
 @dataclass
@@ -232,9 +301,43 @@ class _Job:
     tam: Thresholds | None
     keep_static: bool
     effort: str
-    report: Progress
     lossless: bool
+    report: Progress = _silent
     jobs: int | None = None
+    found: Found | None = None
+    weights: str | np.ndarray | None = None
+
+    @classmethod
+    def begin(cls, clip: MotionClip, report: Progress, jobs: int | None, *, rel_error: float | None = None,
+              segment_frames: int | None = None, tam: Thresholds | None = None, exact_rest: bool = False,
+              lossless: bool = False, weights: str | np.ndarray | None = None, attributes: str = "all",
+              effort: str = "default") -> _Job:
+        """With branches found, where the clip has none, and all frames seen."""
+        clip.check()
+        found = None
+        if not clip.has_branches:
+            report("branches", 0.0)
+            found = _best_branches(clip, rel_error or DEFAULT_REL_ERROR)
+        clip, factors = _completed(clip, found, weights)
+        hierarchy = hierarchy_of(clip)
+        _check_limits(clip, hierarchy)
+        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
+        source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
+                        None if factors is None else factors[hierarchy.vertex_source])
+        return cls(source, tam, attributes == "all", effort, lossless, report, jobs, found, weights)
+
+    @classmethod
+    def resume(cls, clip: MotionClip, draft: Draft, report: Progress, jobs: int | None = None) -> _Job:
+        """As far as the job was that made the draft. Raises ClipError."""
+        seen, hierarchy = draft.seen, draft.seen.hierarchy
+        got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, hierarchy.vertex_count)
+        if got != expected:
+            raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
+        clip, factors = _completed(clip, draft.found, draft.weights)
+        options = dict(draft.options)
+        source = Source(clip, hierarchy, seen, options.pop("segment_frames"), options.pop("exact_rest"),
+                        None if factors is None else factors[hierarchy.vertex_source])
+        return cls(source, **options, report=report, jobs=jobs, found=draft.found, weights=draft.weights)
 
     @property
     def clip(self) -> MotionClip:
@@ -244,27 +347,70 @@ class _Job:
     def seen(self) -> Survey:
         return self.source.seen
 
+    @property
+    def segment_count(self) -> int:
+        return len(self.source.segments)
+
     def thresholds(self, bound: float) -> Thresholds:
         return self.tam or Thresholds(bound, 0, bound, 0)
 
-    def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
+    def bound(self, max_error: float | None, rel_error: float | None, target_size: int | None) -> float:
+        if target_size is not None:
+            return _bound_for_size(self, target_size)
+        return max_error if max_error is not None else _relative_bound(rel_error, self)
+
+    def decide(self, bound: float) -> _Decided:
+        """Searches for settings."""
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
                        self.source.reach)
         ath = self.seen.ath(self.thresholds(bound))
         search = Search(self.source, ath, bound, self.effort, self.report, self.jobs)
         settings = search.best()
         shape = Shape(self.source, ath, settings)
-        shapes = search.shapes(shape.plan, settings)
-        self._add_prelude(store, shape, ath)
-        for level, stream in entropy.encode_shapes(shape.plan, shapes).items():
+        return _Decided(ath, settings, shape, search.shapes(shape.plan, settings))
+
+    def draft(self, decided: _Decided) -> Draft:
+        options = {"tam": self.tam, "keep_static": self.keep_static, "effort": self.effort, "lossless": self.lossless,
+                   "segment_frames": self.source.segment_frames, "exact_rest": self.source.exact_rest}
+        return Draft(decided.settings, decided.shapes, self.seen, self.segment_count, self.found, self.weights, options,
+                     decided.mark)
+
+    def decided(self, draft: Draft) -> _Decided:
+        """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
+        ath = self.seen.ath(self.thresholds(draft.settings.bound))
+        decided = _Decided(ath, draft.settings, Shape(self.source, ath, draft.settings), draft.shapes)
+        if decided.mark != draft.mark:
+            raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
+                            "on machines that calculate alike")
+        return decided
+
+    def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
+        decided = self.decide(bound)
+        return self.fill(store, decided, self.coded(decided, range(self.segment_count)))
+
+    def write(self, path, out: BinaryIO, spool: BinaryIO, decided: _Decided,
+              coded: Iterable[CodedSegment]) -> Summary:
+        """The whole file into `out`, which is to become `path`."""
+        result = self.fill(ct.ChunkStore(spool), decided, coded)
+        chunks = result.store.write(out, result.header, result.errors)
+        with Decoder(out, strict=True) as decoder:  # before the file gets its name
+            summary = _summary(Path(path), self, decided, result, chunks, decoder)
+        self.report("done", 1.0)
+        return summary
+
+    def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
+        """All chunks of a file."""
+        shape = decided.shape
+        self._add_prelude(store, shape, decided.ath)
+        for level, stream in entropy.encode_shapes(shape.plan, decided.shapes).items():
             store.add(ct.SHAPES, stream, level)
-        errors = self._add_motion(store, shape, settings, shapes)
+        errors = self._add_motion(store, shape, coded)
         self._add_static(store)
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
-                           len(self.source.segments), len(errors), len(errors),
-                           0.0 if self.lossless else self.source.largest_bound(bound),
+                           self.segment_count, len(errors), len(errors),
+                           0.0 if self.lossless else self.source.largest_bound(decided.settings.bound),
                            self.clip.dtype == np.float64)
-        return _Result(store, header, errors, ath, shape.plan, settings)
+        return _Result(store, header, errors)
 
     def _add_prelude(self, store: ct.ChunkStore, shape: Shape, ath: Ath) -> None:
         limits = ath.thresholds
@@ -294,28 +440,39 @@ class _Job:
             for name, array in self.clip.attributes.items():
                 store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
 
-    def _add_motion(self, store: ct.ChunkStore, shape: Shape, settings: Settings,
-                    shapes: Shapes | None) -> np.ndarray:
-        """Codes all segments, a few at a time; returns (levels, segments, 2) errors."""
-        count = len(self.source.segments)
-        errors = np.zeros((shape.plan.level_count + self.lossless, count, 2))
+    def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
+        """Some segments, coded a few at a time."""
         with ThreadPoolExecutor(threads(self.jobs)) as pool:
-            pending: deque[Future] = deque()
-            for index in range(count):
+            pending: deque[tuple[int, Future]] = deque()
+            for index in segments:
                 if len(pending) == threads(self.jobs):
-                    self._collect(store, errors, index - len(pending), pending.popleft())
+                    yield _coded(*pending.popleft())
                 block = self.source.block(index)
                 exact = self.source.exact(block) if self.lossless else None
-                pending.append(pool.submit(code_segment, shape, settings, self.source.relative(block), shapes, exact))
+                pending.append((index, pool.submit(code_segment, decided.shape, decided.settings,
+                                                   self.source.relative(block), decided.shapes, exact)))
             while pending:
-                self._collect(store, errors, count - len(pending), pending.popleft())
+                yield _coded(*pending.popleft())
+
+    def _add_motion(self, store: ct.ChunkStore, shape: Shape, coded: Iterable[CodedSegment]) -> np.ndarray:
+        """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
+        errors = np.zeros((shape.plan.level_count + self.lossless, self.segment_count, 2))
+        missing = set(range(self.segment_count))
+        for segment in coded:
+            if segment.index not in missing:
+                raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
+            missing.remove(segment.index)
+            errors[:, segment.index] = segment.errors
+            for (level, kind), payload in segment.chunks.items():
+                store.add(kind, payload, level, segment.index)
+            self.report("motion", 1 - len(missing) / self.segment_count)
+        if missing:
+            raise ValueError(f"segments: got {self.segment_count - len(missing)}, expected all {self.segment_count}")
         return errors
 
-    def _collect(self, store: ct.ChunkStore, errors: np.ndarray, index: int, future) -> None:
-        chunks, errors[:, index] = future.result()
-        for (level, kind), payload in chunks.items():
-            store.add(kind, payload, level, index)
-        self.report("motion", (index + 1) / len(self.source.segments))
+
+def _coded(index: int, future: Future) -> CodedSegment:
+    return CodedSegment(index, *future.result())
 
 
 def _bound_for_size(job: _Job, target: int) -> float:
@@ -362,14 +519,15 @@ def _next_guess(low: float, high: float, sizes: dict[float, float], target: int)
     return min(max(guess, low * 1.01), high if high not in sizes else high / 1.01)
 
 
-def _summary(path: Path, job: _Job, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:
+def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: list[ct.Chunk],
+             decoder: Decoder) -> Summary:
     depths = [LevelSummary(d.depth, d.nodes, d.bytes, d.max_error, d.rms_error) for d in decoder.depths]
     sizes: dict[str, int] = {}
     for chunk in chunks:
         name = ct.KIND_NAMES[chunk.kind]
         sizes[name] = sizes.get(name, 0) + chunk.length
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
-    settings, bound = result.settings, result.settings.bound
+    settings, bound = decided.settings, decided.settings.bound
     choices = {"step_ratio": settings.step / bound, "rest_step_ratio": settings.rest_step / bound,
                "rotations": list(settings.omega), "learned": list(settings.learned),
                "sheets": int(settings.sheet.sum()),

@@ -131,7 +131,7 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
     False. Raises OSError."""
     path = check_target(path)
     directory, name = os.path.split(path)
-    with _part_folder(path) as folder:
+    with scratch_folder(path) as folder:
         yield folder
         made = sorted(os.listdir(folder), key=lambda each: (each == name, each))
         if named and name not in made:
@@ -147,13 +147,13 @@ def new_folder(path: str | os.PathLike[str]) -> Iterator[str]:
     path = check_target(path)
     if os.path.lexists(path):
         raise FileExistsError(f"{path}: exists, expected the name of a new folder")
-    with _part_folder(path) as folder:
+    with scratch_folder(path) as folder:
         yield folder
         os.rename(folder, path)
 
 
 @contextmanager
-def _part_folder(path: str) -> Iterator[str]:
+def scratch_folder(path: str) -> Iterator[str]:
     """A locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that names no
     file names `path`."""
     remove_leftovers(path)
