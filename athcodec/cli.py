@@ -113,6 +113,48 @@ def _encode(args: argparse.Namespace) -> int:
     return 0
 
 
+def _batch(args: argparse.Namespace) -> int:
+    from athcodec import batch
+    from athcodec.batch.show import show_of_terminal
+
+    inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
+    items = batch.find(inputs, args.out, settings=_batch_settings(args),
+                       patterns=batch.load_settings(args.settings) if args.settings else None)
+    where = {"manifest": args.manifest, "redo": args.redo}
+    if args.dry_run:
+        _print_preview(batch.preview(items, args.out, **where), args.json)
+        return 0
+    outcome = batch.run(items, args.out, **where, workers=args.workers, scheduler=args.scheduler, split=args.split,
+                        verify=args.verify, show=show_of_terminal())
+    _print_outcome(outcome, args)
+    return 1 if outcome.failed else 0
+
+
+def _listed(path: str) -> list[str]:
+    """Inputs from a file, one per line; "-" is stdin."""
+    with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
+        return [line.rstrip("\r\n") for line in file if line.strip()]
+
+
+def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
+    """The settings of a clip that options of the command line give."""
+    from athcodec.batch.settings import BOUNDS, READING
+
+    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights")
+    given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+    given |= {name: True for name in ("exact_rest", "lossless") if getattr(args, name)}
+    given |= {name: getattr(args, name) for name, usual in (("attributes", "all"), ("effort", "default"))
+              if getattr(args, name) != usual}
+    if given.get("rest") == "auto":
+        del given["rest"]
+    if args.max_error is not None:
+        given["max_error"] = str(args.max_error) if args.max_error.unit else args.max_error.value
+    if args.tam is not None:
+        epsilon, eta, xi, lam = args.tam
+        given["tam"] = [str(epsilon), eta, str(xi), lam]
+    return given
+
+
 def _hierarchy(args: argparse.Namespace) -> int:
     if args.save:
         _check_output(args.save, args.input)
@@ -508,6 +550,30 @@ def _print_verdict(result: dict[str, Any]) -> None:
         print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
 
 
+def _print_preview(todo: Sequence[Any], as_json: bool) -> None:
+    if as_json:
+        _print_json({"clips": [{"input": each.item.shown, "output": each.item.output, "settings": each.item.settings,
+                                "reason": each.reason or None} for each in todo]})
+        return
+    rows = [[each.item.name, each.reason or "kept", each.item.output,
+             ", ".join(f"{name}={value}" for name, value in each.item.settings.items()) or "default"] for each in todo]
+    _print_table(["clip", "why", "output", "settings"], rows, "left")
+    print(f"{_count(sum(bool(each.reason) for each in todo), 'clip')} of {len(todo):,} to do.")
+
+
+def _print_outcome(outcome: Any, args: argparse.Namespace) -> None:
+    if args.json:
+        failed = [{name: record[name] for name in ("input", "output", "reason")} for record in outcome.failed]
+        _print_json({"done": len(outcome.done), "kept": len(outcome.kept), "failed": failed, "bytes": outcome.bytes,
+                     "raw_bytes": outcome.raw_bytes, "seconds": outcome.seconds})
+    else:
+        ratio = f", {outcome.raw_bytes / outcome.bytes:.1f} to 1" if outcome.bytes else ""
+        print(f"{args.out}: {_count(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
+              f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s")
+    for record in outcome.failed:
+        _say("failed", f"{record['output']}: {record['reason']}")
+
+
 def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
     for index, name in enumerate(columns):
@@ -622,6 +688,10 @@ def _parser() -> argparse.ArgumentParser:
         "encode", _encode, "compress a motion into an .ath file",
         f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}.",
     ))
+    _batch_arguments(verb(
+        "batch", _batch, "compress many motions, by several processes", "An interrupted run goes on where it ended when "
+        "the command is given again. Exit code 1 where a clip failed; the others are done all the same.",
+    ))
     _decode_arguments(verb(
         "decode", _decode, "write the motion of an .ath file in another format",
         "A file that was cut off is decoded to its deepest complete level, with a warning.",
@@ -653,6 +723,35 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
     _source_arguments(verb)
+    _coding_arguments(verb)
+    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4); "
+                      "the file is the same whatever their number")
+    verb.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def _batch_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("inputs", metavar="IN", nargs="*", help="files, directories, patterns such as 'trees/**/*.h5', or "
+                      "URLs of them that fsspec knows (a directory's ends in a slash)")
+    verb.add_argument("--list", metavar="FILE", help="a file with further inputs, one per line; - is stdin")
+    verb.add_argument("--out", metavar="DIR", required=True, help="directory of the .ath files and of the manifest")
+    verb.add_argument("--settings", metavar="FILE.toml", help='settings by pattern of the clip\'s name: ["oaks/*"] and '
+                      'below it options of encode, such as max_error = "1mm"; they come before those given here')
+    verb.add_argument("--workers", metavar="N", type=_argument(_jobs), help="processes (default: one per core)")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a running Dask cluster that sees the same paths, in "
+                      "place of processes on this machine")
+    verb.add_argument("--split", metavar="SEGMENTS", type=_argument(_jobs), default=4, help="clips of more segments are "
+                      "coded so many at a time by whatever worker is free (default 4)")
+    verb.add_argument("--manifest", metavar="FILE.jsonl", help="what is done and what failed (default: "
+                      "athcodec-batch.jsonl in DIR)")
+    verb.add_argument("--redo", action="store_true", help="encode everything again")
+    verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
+    verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
+    _source_arguments(verb)
+    _coding_arguments(verb)
+    verb.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
         "--max-error", metavar="LENGTH", type=_argument(_positive_length),
@@ -695,14 +794,11 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "--effort", choices=EFFORTS, default="default",
         help="how long to look for a smaller file (default: default)",
     )
-    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4); "
-                      "the file is the same whatever their number")
     verb.add_argument(
         "--rest", choices=("auto", "first", "mean"), default="auto",
         help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all "
         "(default auto)",
     )
-    verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def _source_arguments(verb: argparse.ArgumentParser) -> None:

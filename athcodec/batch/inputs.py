@@ -1,0 +1,205 @@
+"""Which clips a batch has: files, globs, directories and URLs become items, each with a name, settings and an output.
+
+An item is called by its path below the directory that was given, or before the first wildcard; a plain file by its
+name. Its output has that name with the suffix .ath. In directories files with the suffixes of readable formats are
+taken, but not those of formats that have one file per frame, which take a pattern of their own (walk_####.obj).
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+import posixpath
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from athcodec.batch.settings import Settings, check_settings, settings_of
+from athcodec.errors import ClipError, MissingExtra, RemoteError
+from athcodec.files import is_url
+from athcodec.remote import _one_line, _without_secrets
+from athcodec.sources import FORMATS, is_pattern
+from athcodec.sources.sequence import sequence_files
+
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
+SUFFIXES = tuple(suffix for each in FORMATS for suffix in each.suffixes if suffix not in FRAME_SUFFIXES)
+TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified", "mtime", "md5Hash", "generation",
+        "created")  # what file systems say of a file that changes with it
+
+
+@dataclass(frozen=True)
+class Item:
+    """A clip of a batch: its name, where it is (absolute path or URL), its file (absolute path), its settings."""
+
+    name: str
+    input: str
+    output: str
+    settings: Settings
+
+    @property
+    def shown(self) -> str:
+        """The input as messages and the manifest show it."""
+        return _without_secrets(self.input) if is_url(self.input) else self.input
+
+
+def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
+         settings: Mapping[str, Any] | None = None,
+         patterns: Mapping[str, Mapping[str, Any]] | None = None) -> list[Item]:
+    """The clips that `inputs` name, by name, with outputs in the directory `output`.
+
+    settings: those of all clips; patterns: further ones by pattern, see settings.py. Raises ClipError where an input
+    names nothing, settings do not exist, or two inputs would have one output; OSError.
+    """
+    default = check_settings(settings or {})
+    patterns = {pattern: check_settings(each, f'["{pattern}"]') for pattern, each in (patterns or {}).items()}
+    items: dict[str, Item] = {}
+    for name, path in _named(inputs):
+        target = os.path.abspath(os.path.join(output, os.path.splitext(_plain(name))[0] + ".ath"))
+        item = Item(name, path, target, settings_of((name, path), default, patterns))
+        other = items.setdefault(target, item)
+        if other.input != path:
+            raise ClipError(f"{item.shown}: would be {target}, as would {other.shown}; expected a name of its own")
+    if not items:
+        raise ClipError("inputs: got no clips, expected at least one")
+    return sorted(items.values(), key=lambda item: item.name)
+
+
+def _plain(name: str) -> str:
+    """A name without the marks of a numbered series: walk_####.obj is walk.ath."""
+    head, tail = posixpath.split(name)
+    stem, suffix = os.path.splitext(tail)
+    return posixpath.join(head, (stem.rstrip("#_.-") or "frames") + suffix) if "#" in stem else name
+
+
+def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]]:
+    for given in inputs:
+        given = os.fspath(given)
+        count = 0
+        for count, pair in enumerate(_remote(given) if is_url(given) else _local(given), 1):
+            yield pair
+        if not count:
+            raise ClipError(f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits "
+                            "some")
+
+
+def _local(given: str) -> Iterator[tuple[str, str]]:
+    if os.path.isdir(given):
+        yield from _below(given, (os.path.join(folder, name) for folder, folders, names in os.walk(given)
+                                  for _ in [folders.sort()] for name in sorted(names) if _is_clip(name)))
+    elif os.path.exists(given) or is_pattern(given):
+        yield os.path.basename(given), os.path.abspath(given)
+    elif glob.has_magic(given):
+        yield from _below(_fixed_part(given, os.sep), (
+            path for path in sorted(glob.glob(given, recursive=True)) if os.path.isfile(path)))
+    else:
+        raise FileNotFoundError(f"{given}: No such file or directory")
+
+
+def _below(folder: str, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
+    for path in paths:
+        yield Path(os.path.relpath(path, folder or ".")).as_posix(), os.path.abspath(path)
+
+
+def _is_clip(name: str) -> bool:
+    return not name.startswith(".") and name.lower().endswith(SUFFIXES)
+
+
+def _fixed_part(pattern: str, separator: str) -> str:
+    """The directory before the first wildcard."""
+    parts = pattern.split(separator)
+    first = next(place for place, part in enumerate(parts) if glob.has_magic(part))
+    return separator.join(parts[:first]) or (separator if pattern.startswith(separator) else "")
+
+
+# ---- URLs ----
+
+
+def _remote(url: str) -> Iterator[tuple[str, str]]:
+    shown = _without_secrets(url)
+    is_folder = url.endswith("/")
+    if not is_folder and not glob.has_magic(url.partition("?")[0]):
+        yield posixpath.basename(url.partition("?")[0].partition("::")[0]), url
+        return
+    if "::" in url:
+        raise ClipError(f"{shown}: got a pattern in a chain of file systems, expected a single file")
+    system, path = file_system(url)
+    try:
+        found = system.find(path) if is_folder else system.glob(path)
+    except Exception as error:  # each file system has errors of its own
+        raise RemoteError(f"{shown}: {type(error).__name__}: {_one_line(error)}") from None
+    base = path.rstrip("/") if is_folder else _fixed_part(path, "/")
+    for each in sorted(found):
+        if not is_folder or _is_clip(posixpath.basename(each)):
+            yield posixpath.relpath(each, base) if base else each, system.unstrip_protocol(each)
+
+
+def file_system(url: str) -> tuple[Any, str]:
+    """fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
+    try:
+        import fsspec
+
+        return fsspec.core.url_to_fs(url)
+    except ImportError as error:
+        raise MissingExtra(f'{_without_secrets(url)}: {_one_line(error)}: pip install "athcodec[remote]"') from None
+    except ValueError as error:
+        raise RemoteError(f"{_without_secrets(url)}: {_one_line(error)}") from None
+
+
+def download(url: str, path: str) -> str:
+    """Fetches a file, whole; its SHA-256. Raises RemoteError, OSError."""
+    system, source = file_system(url)
+    try:
+        system.get_file(source, path)
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno and error.filename == path:
+            raise  # of the local disk
+        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+    return sha256(path)
+
+
+# ---- what an input is known again by ----
+
+
+def identity(item: Item) -> dict[str, Any]:
+    """Size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats that
+    spread over several files, others than numbered series, only the named file counts. Raises OSError."""
+    if is_url(item.input):
+        known = _remote_identity(item.input)
+    else:
+        known = _files_identity(_frames(item.input))
+    others = [item.settings[name] for name in ("mesh", "hierarchy") if os.path.isabs(item.settings.get(name, ""))]
+    return known | ({"with": [_files_identity([path]) for path in others]} if others else {})
+
+
+def is_telling(known: dict[str, Any]) -> bool:
+    """Whether an identity would show that a file has changed, though not its size."""
+    return any(name in known for name in ("mtime_ns", *TAGS))
+
+
+def _frames(path: str) -> list[str]:
+    if path.lower().endswith(FRAME_SUFFIXES) or is_pattern(path):
+        return [str(file) for file in sequence_files(path).values()]
+    return [path]
+
+
+def _files_identity(paths: list[str]) -> dict[str, Any]:
+    stats = [os.stat(path) for path in paths]
+    known = {"size": sum(each.st_size for each in stats), "mtime_ns": max(each.st_mtime_ns for each in stats)}
+    return known | ({"files": len(stats)} if len(stats) > 1 else {})
+
+
+def _remote_identity(url: str) -> dict[str, Any]:
+    system, path = file_system(url)
+    try:
+        info = system.info(path)
+    except Exception as error:
+        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+    return {"size": info.get("size")} | {name: str(info[name]) for name in TAGS if info.get(name)}
+
+
+def sha256(path: str | os.PathLike[str]) -> str:
+    """Of a file's content. Raises OSError."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

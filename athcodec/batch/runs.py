@@ -1,0 +1,267 @@
+"""A run of a batch, as the process sees it that was started: what is left to do, workers, results, the manifest.
+
+Only this process writes the manifest, and only when a clip's file is in its place. Clips that fail are noted and
+do not stop the others. Drafts and coded segments of long clips, and inputs that were downloaded, lie in a folder
+beside the outputs, which goes when the run ends, or when the next one begins.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import queue
+import secrets
+import shutil
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from athcodec.batch import tasks
+from athcodec.batch.inputs import Item, identity, is_telling, sha256
+from athcodec.batch.manifest import Manifest, Record, read_records
+from athcodec.batch.show import Show
+from athcodec.batch.tasks import Result, one_line
+from athcodec.errors import AthError, MissingExtra
+from athcodec.files import is_url, remove_leftovers, scratch_folder
+
+MANIFEST = "athcodec-batch.jsonl"
+SCRATCH = "athcodec-batch"
+SPLIT = 4  # segments
+PATIENCE = 0.25  # seconds between looks at the scheduler
+CONNECTING = 30  # seconds
+
+
+class SchedulerError(AthError):
+    """The scheduler, or all of its workers, cannot be reached."""
+
+
+@dataclass
+class Outcome:
+    """What a run did: the records it added to the manifest, and the clips that were as they should be."""
+
+    done: list[Record] = field(default_factory=list)
+    failed: list[Record] = field(default_factory=list)
+    kept: list[Item] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def bytes(self) -> int:
+        return sum(record["bytes"] for record in self.done)
+
+    @property
+    def raw_bytes(self) -> int:
+        return sum(record["raw_bytes"] for record in self.done)
+
+
+@dataclass(frozen=True)
+class Todo:
+    """A clip, why it has to be encoded ("" where it is as it should be), and its record where only the content of its
+    input can tell whether it has changed."""
+
+    item: Item
+    reason: str
+    known: Record | None = None
+
+
+def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
+            redo: bool = False) -> list[Todo]:
+    """What `run` would do with each clip. Nothing is written."""
+    records = read_records(manifest or os.path.join(output, MANIFEST))
+    return [_todo(item, records.get(_key(item, output)), redo) for item in items]
+
+
+def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
+        workers: int | None = None, scheduler: str | None = None, split: int = SPLIT, verify: bool = False,
+        redo: bool = False, show: Show | None = None) -> Outcome:
+    """Encodes what is left to do of some items, whose outputs are in the directory `output`.
+
+    manifest: its file (default: athcodec-batch.jsonl in `output`); clips that it has as done, with the same settings
+    and input, and whose file has the checksum that it says, are kept. workers: processes on this machine (default: one
+    per core); scheduler: the address of a scheduler of Dask to use instead, whose workers have the same athcodec and
+    see inputs and outputs under the same paths. split: a clip of more segments is coded that many at a time, in any
+    workers. verify: each file is opened and every level decoded before it is noted. redo: keep nothing. Raises
+    MissingExtra, ManifestError, SchedulerError, OSError; what goes wrong with a clip is in the outcome.
+    """
+    if find_spec("distributed") is None:
+        raise MissingExtra('batch: needs dask.distributed: pip install "athcodec[batch]"')
+    output, start, outcome = os.path.abspath(output), time.monotonic(), Outcome()
+    os.makedirs(output, exist_ok=True)
+    show = show or Show()
+    with (Manifest(manifest or os.path.join(output, MANIFEST)) as notes,
+          scratch_folder(os.path.join(output, SCRATCH)) as folder):
+        todo = []
+        for item in items:
+            each = _todo(item, notes.records.get(_key(item, output)), redo)
+            todo.append(each) if each.reason else outcome.kept.append(item)
+        show.begin([each.item for each in todo], len(outcome.kept))
+        try:
+            if todo:
+                with _client(workers, scheduler, len(todo)) as client:
+                    _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
+        finally:
+            for each in todo:
+                remove_leftovers(each.item.output)  # of workers that were stopped
+            show.end()
+    outcome.seconds = time.monotonic() - start
+    return outcome
+
+
+def _key(item: Item, output: str | os.PathLike[str]) -> str:
+    """What the manifest calls an output: the directory may be moved with it."""
+    return Path(os.path.relpath(item.output, output)).as_posix()
+
+
+def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
+    if redo or record is None:
+        return Todo(item, "to be redone" if record else "new")
+    if record["status"] != "done":
+        return Todo(item, "failed before")
+    if record["settings"] != item.settings:
+        return Todo(item, "other settings")
+    if not os.path.exists(item.output):
+        return Todo(item, "output is missing")
+    if os.path.getsize(item.output) != record["bytes"] or sha256(item.output) != record["sha256"]:
+        return Todo(item, "output was changed")
+    return _todo_by_input(item, record)
+
+
+def _todo_by_input(item: Item, record: Record) -> Todo:
+    before = {name: value for name, value in record["source"].items() if name != "sha256"}
+    try:
+        now = identity(item)
+    except (OSError, AthError):
+        return Todo(item, "input is missing")
+    if record["input"] != item.shown or before != now:
+        return Todo(item, "other input")
+    if is_url(item.input) and not is_telling(now):
+        return Todo(item, "input to be compared", record)
+    return Todo(item, "")
+
+
+# ---- workers ----
+
+
+@contextmanager
+def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[Any]:
+    """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
+    import distributed
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die are no news: the manifest tells
+    if scheduler is None:
+        cluster = distributed.LocalCluster(n_workers=workers or os.cpu_count() or 1, threads_per_worker=1,
+                                           processes=True, dashboard_address=None, silence_logs=logging.CRITICAL)
+        with cluster, distributed.Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = distributed.Client(scheduler, timeout=CONNECTING)
+    except (OSError, ValueError) as error:
+        raise SchedulerError(f"{scheduler}: {one_line(error)}, expected the address of a scheduler") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECTING)
+        except TimeoutError:
+            raise SchedulerError(f"{scheduler}: got no worker within {CONNECTING} s, expected at least one") from None
+        yield client
+
+
+class _Run:
+    """Clips on their way through the workers."""
+
+    def __init__(self, client: Any, output: str, folder: str, notes: Manifest, outcome: Outcome, show: Show, split: int,
+                 verify: bool):
+        self.client, self.output, self.folder, self.notes = client, output, folder, notes
+        self.outcome, self.show, self.split, self.verify = outcome, show, split, verify
+        self.topic = f"{SCRATCH}-{secrets.token_hex(8)}"
+        self.finished: queue.SimpleQueue = queue.SimpleQueue()
+        self.pending: dict[str, tuple[Item, str, Any]] = {}  # by key: the clip, what is done with it, the future
+        self.parts: dict[str, list[Any]] = {}  # futures of a long clip's segments, by output
+
+    def all(self, todo: Sequence[Todo]) -> None:
+        """Until each clip is in the manifest."""
+        self.client.subscribe_topic(self.topic, lambda event: self.show.stage(**event[1]))
+        try:
+            for each in todo:
+                os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
+                self._submit(each.item, "begin", tasks.begin, self._folder(each.item), split=self.split,
+                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=each.known)
+            while self.pending:
+                self._take()
+        finally:
+            self.client.unsubscribe_topic(self.topic)
+
+    def _folder(self, item: Item) -> str:
+        """Of one clip in the scratch folder."""
+        return os.path.join(self.folder, hashlib.sha256(_key(item, self.output).encode()).hexdigest()[:16])
+
+    def _submit(self, item: Item, what: str, function: Any, *arguments: Any, **options: Any) -> Any:
+        """Of clips that were begun the rest comes first."""
+        future = self.client.submit(function, item, *arguments, **options, pure=False, priority=what != "begin")
+        self.pending[future.key] = item, what, future
+        future.add_done_callback(self.finished.put)
+        return future
+
+    def _take(self) -> None:
+        """One result, if one comes soon."""
+        try:
+            future = self.finished.get(timeout=PATIENCE)
+        except queue.Empty:
+            if self.client.status != "running":
+                raise SchedulerError("scheduler: the connection was lost, expected one until the end; the same command "
+                                     "goes on where this one ended") from None
+            return
+        item, what, _ = self.pending.pop(future.key)
+        result = self._result(future, item)
+        if "draft" in result:
+            self._code(item, result["draft"])
+        elif what == "code":
+            done = self.parts.get(item.output, [future])
+            left = sum(part.key in self.pending for part in done)
+            self.show.stage(item.output, "motion", 1 - left / len(done))
+        else:
+            self._note(item, result)
+
+    def _result(self, future: Any, item: Item) -> Result:
+        import distributed
+
+        try:
+            return future.result()
+        except distributed.scheduler.KilledWorker as error:
+            times = getattr(error, "allowed_failures", 0) + 1
+            return {"failed": f"{item.shown}: {times} workers died that worked on it, expected none to; perhaps there "
+                              "is too little memory"}
+        except Exception as error:
+            if future.status == "cancelled":
+                raise SchedulerError("scheduler: the connection was lost, expected one until the end; the same command "
+                                     "goes on where this one ended") from None
+            return {"failed": one_line(error)}
+
+    def _code(self, item: Item, segments: int) -> None:
+        """A long clip, some segments at a time, and its file when all are there."""
+        folder = self._folder(item)
+        groups = [list(range(first, min(first + self.split, segments))) for first in range(0, segments, self.split)]
+        parts = [self._submit(item, "code", tasks.code, folder, group) for group in groups]
+        self.parts[item.output] = parts  # kept until the file is there: a worker that dies may take results with it
+        self._submit(item, "finish", tasks.finish, folder, parts, verify=self.verify, topic=self.topic)
+
+    def _note(self, item: Item, result: Result) -> None:
+        """A clip that is finished, or failed."""
+        self.parts.pop(item.output, None)
+        shutil.rmtree(self._folder(item), ignore_errors=True)
+        if "kept" in result:
+            self.outcome.kept.append(item)
+            self.show.kept(item)
+            return
+        status = "done" if "done" in result else "failed"
+        record = {"output": _key(item, self.output), "input": item.shown, "status": status, "settings": item.settings,
+                  "version": athcodec.__version__}
+        record |= result.get("done") or {"reason": result["failed"]}
+        self.notes.add(record)
+        (self.outcome.done if "done" in result else self.outcome.failed).append(record)
+        self.show.finished(item, record)

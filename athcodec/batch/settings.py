@@ -1,0 +1,198 @@
+"""Settings of a clip in a batch: what may be said in a TOML file or on the command line, and what encoding and reading
+make of it. They are plain JSON, for they are kept in the manifest and compared with those of the next run.
+
+A file is a table of patterns (fnmatch) to settings; of all patterns that a clip's name fits, later ones win:
+
+    ["*"]
+    rel_error = 1e-4
+    ["oaks/*.abc"]
+    max_error = "1mm"
+    effort = "best"
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from athcodec import discovery
+from athcodec.ath import Thresholds
+from athcodec.errors import ClipError
+from athcodec.files import is_url
+from athcodec.search import EFFORTS
+from athcodec.sources import format_named
+from athcodec.transform import MAX_SEGMENT, MIN_SEGMENT
+from athcodec.units import parse_length, parse_size
+
+BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
+READING = ("source_format", "rest", "fps", "mesh", "field", "only", "unit", "up_axis")
+
+Settings = dict[str, Any]
+
+
+def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
+    """Settings by pattern, in the file's order; paths in it are relative to its folder. Raises ClipError, OSError."""
+    with open(path, "rb") as file:
+        try:
+            content = tomllib.load(file)
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ClipError(f"{os.fspath(path)}: got no TOML: {error}") from None
+    for pattern, settings in content.items():
+        where = f'{os.fspath(path)}: ["{pattern}"]'
+        if not isinstance(settings, dict):
+            raise ClipError(f"{where}: got {settings!r}, expected a table of settings under a pattern")
+        content[pattern] = check_settings(settings, where, Path(path).resolve().parent)
+    return content
+
+
+def check_settings(settings: Mapping[str, Any], where: str = "settings",
+                   folder: str | os.PathLike[str] = ".") -> Settings:
+    """Settings as they are compared: paths absolute, numbers as numbers. Raises ClipError."""
+    checked = {}
+    for name, value in settings.items():
+        if name not in _CHECKS:
+            raise ClipError(f"{where}: got the unknown setting {name!r}, expected one of {', '.join(_CHECKS)}")
+        try:
+            checked[name] = _CHECKS[name](value)
+        except (ValueError, TypeError, ArithmeticError) as error:
+            raise ClipError(f"{where}: {name}: got {value!r}: {error}") from None
+        if name == "mesh" or name == "hierarchy" and value not in ("auto", *discovery.METHODS):
+            checked[name] = os.path.abspath(os.path.join(folder, checked[name]))
+    given = [name for name in BOUNDS if name in checked]
+    if len(given) > 1:
+        raise ClipError(f"{where}: got {' and '.join(given)}, expected one of them")
+    return checked
+
+
+def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str, Settings]) -> Settings:
+    """Those of a clip that is called any of `names`: what all patterns say that one of them fits."""
+    merged = dict(default)
+    for pattern, settings in patterns.items():
+        if any(fnmatchcase(name, pattern) for name in names):
+            if any(bound in settings for bound in BOUNDS):
+                merged = {name: value for name, value in merged.items() if name not in BOUNDS}
+            merged |= settings
+    return merged
+
+
+def reading_options(settings: Settings) -> dict[str, Any]:
+    """Keywords of athcodec.read."""
+    options = {name: settings[name] for name in READING if name in settings}
+    if "source_format" in options:
+        options["format"] = options.pop("source_format")
+    return options
+
+
+def coding_options(settings: Settings, unit: Any) -> dict[str, Any]:
+    """Keywords of athcodec.encode, for a clip whose metadata says `unit`. Raises BoundError."""
+    options = {name: value for name, value in settings.items() if name not in READING and name != "hierarchy"}
+    if "max_error" in options:
+        options["max_error"] = _length(options["max_error"], unit)
+    if "target_size" in options:
+        options["target_size"] = parse_size(str(options["target_size"]))
+    if "tam" in options:
+        epsilon, eta, xi, lam = options["tam"]
+        options["tam"] = Thresholds(_length(epsilon, unit), eta, _length(xi, unit), lam)
+    return options
+
+
+def _length(value: float | str, unit: Any) -> float:
+    return parse_length(str(value)).in_scene_units(unit)
+
+
+def _positive_length(value: Any) -> float | str:
+    if isinstance(value, bool) or not parse_length(str(value)).value > 0:
+        raise ValueError("expected a length above 0")
+    return value
+
+
+def _fraction(value: Any) -> float:
+    if isinstance(value, bool) or not 0 < float(value) < 1:
+        raise ValueError("expected a number between 0 and 1")
+    return float(value)
+
+
+def _size(value: Any) -> int:
+    if isinstance(value, bool):
+        raise ValueError("expected a size in bytes")
+    return parse_size(str(value))
+
+
+def _whole(low: int, high: int) -> Callable[[Any], int]:
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ValueError(f"expected a whole number, {low} to {high}")
+        return value
+
+    return check
+
+
+def _tam(value: Any) -> list[Any]:
+    parts = value.split(",") if isinstance(value, str) else list(value)
+    if len(parts) != 4:
+        raise ValueError("expected four values: EPS, ETA, XI, LAMBDA")
+    epsilon, eta, xi, lam = parts
+    for length in (epsilon, xi):
+        parse_length(str(length))
+    eta, lam = int(eta), int(lam)
+    if min(eta, lam) < 0:
+        raise ValueError("expected ETA and LAMBDA to be whole numbers, 0 or more")
+    return [epsilon, eta, xi, lam]
+
+
+def _rate(value: Any) -> float:
+    rate = float(Fraction(value)) if isinstance(value, str) else float(value)
+    if isinstance(value, bool) or not 0 < rate < math.inf:
+        raise ValueError("expected a number above 0 or a fraction such as 24000/1001")
+    return rate
+
+
+def _format(value: Any) -> str:
+    return format_named(value).name
+
+
+def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:
+    def check(value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise ValueError(f"expected {words}")
+        return value
+
+    return check
+
+
+def _one_of(*names: str) -> Callable[[Any], str]:
+    def check(value: Any) -> str:
+        if value not in names:
+            raise ValueError(f"expected one of {', '.join(names)}")
+        return value
+
+    return check
+
+
+def _patterns(value: Any) -> list[str]:
+    patterns = [value] if isinstance(value, str) else list(value)
+    if not all(isinstance(each, str) for each in patterns):
+        raise ValueError("expected a pattern or a list of them")
+    return patterns
+
+
+def _path(value: Any) -> str:
+    if not isinstance(value, (str, os.PathLike)) or is_url(value):
+        raise ValueError("expected a local file")
+    return os.fspath(value)
+
+
+_BOOL, _TEXT = _of_kind(bool, "true or false"), _of_kind(str, "text")
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "max_error": _positive_length, "rel_error": _fraction, "target_size": _size,
+    "segment_frames": _whole(MIN_SEGMENT, MAX_SEGMENT), "tam": _tam, "hierarchy": _path, "exact_rest": _BOOL,
+    "lossless": _BOOL, "weights": _TEXT, "attributes": _one_of("all", "none"), "effort": _one_of(*EFFORTS),
+    "source_format": _format, "rest": _one_of("auto", "first", "mean"), "fps": _rate, "mesh": _path, "field": _TEXT,
+    "only": _patterns, "unit": _TEXT, "up_axis": _one_of("x", "y", "z"),
+}

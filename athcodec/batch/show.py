@@ -1,0 +1,122 @@
+"""How a run of a batch is followed: a live table on a terminal, plain lines elsewhere, or nothing."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from athcodec.batch.inputs import Item
+
+ROWS = 20  # of the live table
+
+
+class Show:
+    """What a run tells while it lasts; nothing is shown. Stages come from another thread than the rest."""
+
+    def begin(self, items: Sequence[Item], kept: int) -> None:
+        """Before the first clip; `kept` are as they should be already."""
+
+    def stage(self, output: str, stage: str, fraction: float) -> None:
+        """How far a clip is."""
+
+    def finished(self, item: Item, record: dict[str, Any]) -> None:
+        """A clip that is done or has failed."""
+
+    def kept(self, item: Item) -> None:
+        """A clip that turned out to be as it should be."""
+
+    def end(self) -> None:
+        """After the last clip, or an interruption."""
+
+
+class Lines(Show):
+    """A line per clip on stderr."""
+
+    def begin(self, items: Sequence[Item], kept: int) -> None:
+        self.count, self.total = 0, len(items)
+        if kept:
+            self._print(f"{kept} kept, {self.total} to do")
+
+    def finished(self, item: Item, record: dict[str, Any]) -> None:
+        self.count += 1
+        self._print(f"[{self.count}/{self.total}] {item.name}: {_said(record)}")
+
+    def kept(self, item: Item) -> None:
+        self.count += 1
+        self._print(f"[{self.count}/{self.total}] {item.name}: kept")
+
+    def _print(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+
+class LiveTable(Show):
+    """A table on a terminal: the clips that are worked on, and the last that are not any more."""
+
+    def begin(self, items: Sequence[Item], kept: int) -> None:
+        self.names = {item.output: item.name for item in items}
+        self.rows: dict[str, tuple[str, str]] = {}  # state and figures by output
+        self.counts, self.total = {"done": 0, "failed": 0, "kept": kept}, len(items)
+        self.bytes, self.start = 0, time.monotonic()
+        self.lock = threading.Lock()
+        self.live = Live(get_renderable=self._table, console=Console(stderr=True), refresh_per_second=4, transient=True)
+        self.live.start()
+
+    def stage(self, output: str, stage: str, fraction: float) -> None:
+        with self.lock:
+            if self.rows.get(output, ("", ""))[0] not in ("done", "failed", "kept"):
+                self.rows[output] = stage, f"{fraction:.0%}"
+
+    def finished(self, item: Item, record: dict[str, Any]) -> None:
+        with self.lock:
+            self.counts[record["status"]] += 1
+            self.bytes += record.get("bytes", 0)
+            self._ended(item.output, record["status"], _said(record))
+
+    def kept(self, item: Item) -> None:
+        with self.lock:
+            self.counts["kept"] += 1
+            self._ended(item.output, "kept", "")
+
+    def end(self) -> None:
+        if hasattr(self, "live"):
+            self.live.stop()
+
+    def _ended(self, output: str, state: str, said: str) -> None:
+        self.rows.pop(output, None)
+        ended = [each for each, (state, _) in self.rows.items() if state in ("done", "failed", "kept")]
+        for each in ended[: max(0, len(ended) - ROWS // 2)]:
+            del self.rows[each]
+        self.rows[output] = state, said
+
+    def _table(self) -> Table:
+        with self.lock:
+            rows, counts = list(self.rows.items())[-ROWS:], dict(self.counts)
+        title = (f"{counts['done'] + counts['failed']} of {self.total}: {counts['done']} done, {counts['failed']} "
+                 f"failed, {counts['kept']} kept, {self.bytes:,} bytes, {time.monotonic() - self.start:.0f} s")
+        table = Table(box=SIMPLE_HEAD, title=Text(title), title_justify="left", pad_edge=False)
+        for name in ("clip", "state", ""):
+            table.add_column(name, no_wrap=True)
+        for output, (state, figures) in rows:
+            table.add_row(Text(self.names.get(output, output)), Text(state), Text(figures))
+        return table
+
+
+def show_of_terminal() -> Show:
+    """The table where stderr is a terminal, else lines."""
+    return LiveTable() if sys.stderr.isatty() else Lines()
+
+
+def _said(record: dict[str, Any]) -> str:
+    if record["status"] == "failed":
+        return f"failed: {record['reason']}"
+    return f"{record['bytes']:,} bytes, {record['raw_bytes'] / record['bytes']:.1f} to 1"

@@ -1,0 +1,216 @@
+"""What workers do: encode a clip, or the three steps of a long one, and say what came of it as plain dictionaries.
+
+`begin` encodes a clip of few segments, and of others makes the draft, `code` some of its segments, `finish` the file.
+Draft and coded segments lie as files in the run's scratch folder, beside the outputs, which all workers see under the
+same path; only names and figures go between tasks. A task that is run again, for its worker died, finds what it has
+finished. Whatever goes wrong with a clip is its result, in one line: nothing is raised but what ends the worker.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import athcodec
+from athcodec import container as ct
+from athcodec import discovery, encoder
+from athcodec.batch.inputs import Item, download, identity, is_telling, sha256
+from athcodec.batch.settings import coding_options, reading_options
+from athcodec.clip import MotionClip
+from athcodec.encoder import CodedSegment, Draft
+from athcodec.errors import AthError, ClipError
+from athcodec.files import is_url
+from athcodec.transform import DEFAULT_SEGMENT, split_segments
+
+BETWEEN_REPORTS = 0.3  # seconds
+
+Result = dict[str, Any]
+"""Of a task: "failed" with a reason, or "done" with figures, "draft" with the number of segments, "kept", "part"."""
+
+Report = Callable[[str, float], None]
+
+
+def begin(item: Item, folder: str, *, split: int, verify: bool, version: str, topic: str | None = None,
+          known: dict[str, Any] | None = None) -> Result:
+    """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
+    folder. known: the record of an output that is as it should be, where only the input's content can tell whether it
+    has to be made again."""
+    return _result(lambda: _begin(item, folder, split, verify, version, _reporter(item, topic), known), item, folder)
+
+
+def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
+    """Some segments of a long clip."""
+    return _result(lambda: _code(item, folder, segments), item, folder)
+
+
+def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool, topic: str | None = None) -> Result:
+    """The file of a long clip, from the results of `code`."""
+    failed = [part for part in parts if "failed" in part]
+    if failed:
+        return failed[0]
+    return _result(lambda: _finish(item, folder, parts, verify, _reporter(item, topic)), item, folder)
+
+
+def _begin(item: Item, folder: str, split: int, verify: bool, version: str, report: Report,
+           known: dict[str, Any] | None) -> Result:
+    if version != athcodec.__version__:
+        raise AthError(f"worker: has athcodec {athcodec.__version__}, expected {version} as where the run was started")
+    start = time.perf_counter()
+    path = os.path.join(folder, "draft")
+    if os.path.exists(path):
+        return {"draft": _unpickled(path)[0].segment_count}
+    source = _source(item, folder)
+    if known is not None and source.get("sha256") == known["source"].get("sha256"):
+        return {"kept": True, "source": source}
+    with _opened(item, folder, source) as clip:
+        options = coding_options(item.settings, clip.metadata.get("unit"))
+        if _segment_count(clip, options) <= split:
+            summary = athcodec.encode(clip, item.output, jobs=1, progress=report, **options)
+            return _done(item, source, summary, verify, start)
+        draft = encoder.draft(clip, jobs=1, progress=report, **options)
+    _pickle(path, [(draft, source, time.perf_counter() - start)])
+    return {"draft": draft.segment_count}
+
+
+def _code(item: Item, folder: str, segments: Sequence[int]) -> Result:
+    start = time.perf_counter()
+    path = os.path.join(folder, f"segments_{segments[0]}")
+    if os.path.exists(path):
+        return {"part": path, "seconds": 0.0}
+    draft, source, _ = _unpickled(os.path.join(folder, "draft"))
+    with _opened(item, folder, source) as clip:
+        _pickle(path, encoder.code_segments(clip, draft, segments, jobs=1))
+    return {"part": path, "seconds": time.perf_counter() - start}
+
+
+def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, report: Report) -> Result:
+    start = time.perf_counter()
+    draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
+    with _opened(item, folder, source) as clip:
+        summary = encoder.write(clip, draft, _coded(parts), item.output, progress=report)
+    return _done(item, source, summary, verify, start - seconds - sum(part["seconds"] for part in parts))
+
+
+def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: bool, start: float) -> Result:
+    if verify:
+        with athcodec.open(item.output, strict=True) as decoder:
+            decoder.check()
+    last = summary.depths[-1]
+    return {"done": {
+        "source": source, "bytes": summary.bytes, "raw_bytes": summary.raw_bytes,
+        "max_error_bound": summary.max_error_bound, "relative_bound": summary.relative_bound,
+        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.depths),
+        "sha256": sha256(item.output), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
+
+
+# ---- the clip ----
+
+
+@contextmanager
+def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
+    """The clip on the branches that its settings ask for. Raises ClipError where it is another than `source` was, at
+    the beginning or at the end."""
+    _check_source(item, source)
+    path = _local_path(item, folder)
+    if is_url(item.input) and (not os.path.exists(path) or sha256(path) != source["sha256"]):
+        raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
+    with athcodec.read(path, **reading_options(item.settings)) as clip:
+        yield _with_branches(clip, item.settings.get("hierarchy"))
+    _check_source(item, source)
+
+
+def _source(item: Item, folder: str) -> dict[str, Any]:
+    """The input's identity; of a URL, which is fetched, with its SHA-256."""
+    source = identity(item)
+    if is_url(item.input):
+        source["sha256"] = download(item.input, _local_path(item, folder))
+    return source
+
+
+def _check_source(item: Item, source: dict[str, Any]) -> None:
+    if is_url(item.input) and not is_telling(source):
+        return
+    if identity(item) != {name: value for name, value in source.items() if name != "sha256"}:
+        raise ClipError(f"{item.shown}: was changed while it was read, expected it to stay as it is")
+
+
+def _local_path(item: Item, folder: str) -> str:
+    return os.path.join(folder, os.path.basename(item.name)) if is_url(item.input) else item.input
+
+
+def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
+    if hierarchy is None:
+        return clip
+    if hierarchy == "auto" or hierarchy in discovery.METHODS:
+        return discovery.with_branches(clip, discovery.find_branches(clip, hierarchy))
+    return discovery.with_branches(clip, discovery.load(hierarchy))
+
+
+def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:
+    longest = options.get("segment_frames") or DEFAULT_SEGMENT
+    return len(split_segments(clip.frame_count, clip.vertex_count, longest, ct.Limits.memory_bytes))
+
+
+# ---- files in the scratch folder ----
+
+
+def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
+    """One after the other into a file that is there whole or not at all, also where two workers write it."""
+    temporary = f"{path}.{os.getpid()}.{time.monotonic_ns()}"
+    with open(temporary, "wb") as file:
+        for each in objects:
+            pickle.dump(each, file, pickle.HIGHEST_PROTOCOL)
+    os.replace(temporary, path)
+
+
+def _unpickled(path: str) -> tuple[Draft, dict[str, Any], float]:
+    with open(path, "rb") as file:
+        return pickle.load(file)
+
+
+def _coded(parts: Sequence[Result]) -> Iterator[CodedSegment]:
+    for part in parts:
+        with open(part["part"], "rb") as file, suppress(EOFError):
+            while True:
+                yield pickle.load(file)
+
+
+# ---- results and reports ----
+
+
+def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
+    try:
+        with suppress(FileExistsError):
+            os.mkdir(folder)  # the run's own is there as long as the run
+        return work()
+    except Exception as error:
+        return {"failed": one_line(error).replace(_local_path(item, folder), item.shown)}
+
+
+def one_line(error: BaseException) -> str:
+    """What went wrong; an error that nobody foresaw is named by its class."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    text = " ".join(str(error).split())
+    return text if text and isinstance(error, (AthError, OSError)) else f"{type(error).__name__}: {text}"
+
+
+def _reporter(item: Item, topic: str | None) -> Report:
+    """Sends stages and fractions to whoever listens to the topic, now and then."""
+    if topic is None:
+        return lambda stage, fraction: None
+    from distributed import get_worker
+
+    worker, last = get_worker(), 0.0
+
+    def report(stage: str, fraction: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= BETWEEN_REPORTS:
+            last = time.monotonic()
+            worker.log_event(topic, {"output": item.output, "stage": stage, "fraction": fraction})
+
+    return report

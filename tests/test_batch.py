@@ -1,0 +1,423 @@
+"""Many clips at once: every clip is there once, whole and the same as alone, whatever dies, fills up or is broken."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import distributed
+import psutil
+import pytest
+
+import athcodec
+from athcodec import batch, cli
+from athcodec.batch import manifest, runs
+from athcodec.batch.manifest import Manifest, ManifestError
+from athcodec.errors import ClipError, MissingExtra
+from plants import plant
+
+FAST = {"effort": "fast", "segment_frames": 16}
+BATCH = [sys.executable, "-m", "athcodec", "batch"]
+WORDS = ["--effort", "fast", "--segment-frames", "16"]
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """The address of a scheduler with two workers, processes, that some tests share."""
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.fixture
+def clips(tmp_path):
+    """A folder with three short clips, one of them in a folder of its own, and a long one of 13 segments."""
+    folder = tmp_path / "in"
+    (folder / "sub").mkdir(parents=True)
+    for name, frames in (("a", 20), ("b", 40), ("sub/c", 20), ("long", 200)):
+        athcodec.write_hdf5(folder / f"{name}.h5", plant(seed=frames, branches=5, longest=4, frames=frames))
+    return folder
+
+
+def alone(path: Path, folder: Path, **options) -> bytes:
+    with athcodec.read(path) as clip:
+        return athcodec.encode(clip, folder / "alone.ath", **options).path.read_bytes()
+
+
+def lines(out: Path) -> list[dict]:
+    return [json.loads(line) for line in (out / runs.MANIFEST).read_text().splitlines()]
+
+
+def done_once(out: Path) -> set[str]:
+    """Outputs that have one line that they are done, and the file that it tells of."""
+    done = [line for line in lines(out) if line["status"] == "done"]
+    assert len({line["output"] for line in done}) == len(done)
+    for line in done:
+        with athcodec.open(out / line["output"], strict=True) as decoder:
+            decoder.check()
+        assert batch.inputs.sha256(out / line["output"]) == line["sha256"]
+    return {line["output"] for line in done}
+
+
+def leftovers(out: Path) -> list[Path]:
+    return [path for path in out.rglob("*") if path.name.endswith(".part")]
+
+
+# ---- what comes out ----
+
+
+def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(clips, tmp_path, cluster):
+    out = tmp_path / "out"
+    items = batch.find([clips], out, settings=FAST)
+    outcome = batch.run(items, out, scheduler=cluster, split=3, verify=True)
+    assert len(outcome.done) == 4 and not outcome.failed and not leftovers(out)
+    for item in items:
+        assert Path(item.output).read_bytes() == alone(Path(item.input), tmp_path, **FAST), item.name
+    assert done_once(out) == {"a.ath", "b.ath", "long.ath", "sub/c.ath"}
+
+
+@pytest.mark.parametrize("settings", [{"lossless": True}, {"target_size": "9kB"}, {"weights": "radius"},
+                                      {"max_error": "1mm", "tam": "1mm,2,1cm,3"}], ids=str)
+def test_a_long_clip_is_the_same_under_settings_of_all_kinds(settings, tmp_path, cluster, sample_file):
+    items = batch.find([sample_file], tmp_path / "out", settings=settings | FAST)
+    [record] = batch.run(items, tmp_path / "out", scheduler=cluster, split=2).done
+    with athcodec.read(sample_file) as clip:
+        options = batch.settings.coding_options(items[0].settings, clip.metadata["unit"])
+    assert Path(items[0].output).read_bytes() == alone(sample_file, tmp_path, **options)
+    assert record["bytes"] == Path(items[0].output).stat().st_size
+
+
+def test_a_line_of_the_manifest_says_what_was_made_of_what(clips, tmp_path, cluster):
+    out = tmp_path / "out"
+    items = batch.find([clips / "a.h5"], out, settings=FAST)
+    batch.run(items, out, scheduler=cluster)
+    [line] = lines(out)
+    stat = (clips / "a.h5").stat()
+    assert (line["input"], line["output"], line["settings"]) == (str(clips / "a.h5"), "a.ath", FAST)
+    assert line["source"] == {"size": stat.st_size, "mtime_ns": stat.st_mtime_ns}
+    assert line["version"] == athcodec.__version__ and line["bytes"] == (out / "a.ath").stat().st_size
+    assert 0 < line["rms_error"] < line["max_error"] <= line["max_error_bound"]
+
+
+# ---- what is done again ----
+
+
+def reasons(items, out) -> dict[str, str]:
+    return {each.item.name: each.reason for each in batch.preview(items, out)}
+
+
+def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster):
+    out = tmp_path / "out"
+    items = batch.find([clips], out, settings=FAST)
+    batch.run(items, out, scheduler=cluster)
+    before = (out / runs.MANIFEST).read_bytes()
+    outcome = batch.run(items, out, scheduler="tcp://127.0.0.1:1")  # nobody there, and nobody needed
+    assert not outcome.done and len(outcome.kept) == 4 and (out / runs.MANIFEST).read_bytes() == before
+
+    data = bytearray((out / "a.ath").read_bytes())
+    data[-1] ^= 1
+    (out / "a.ath").write_bytes(data)
+    (out / "long.ath").unlink()
+    os.utime(clips / "b.h5", ns=(0, 0))
+    items = batch.find([clips], out, settings=FAST, patterns={"sub/*": {"rel_error": 1e-3}})
+    assert reasons(items, out) == {"a.h5": "output was changed", "long.h5": "output is missing",
+                                   "b.h5": "other input", "sub/c.h5": "other settings"}
+    assert len(batch.run(items, out, scheduler=cluster).done) == 4
+    assert set(reasons(items, out).values()) == {""} and len(lines(out)) == 8
+    assert (out / "sub/c.ath").read_bytes() == alone(clips / "sub/c.h5", tmp_path, rel_error=1e-3, **FAST)
+
+
+def test_an_output_directory_may_be_moved_with_its_manifest(clips, tmp_path, cluster):
+    batch.run(batch.find([clips / "a.h5"], tmp_path / "out"), tmp_path / "out", scheduler=cluster)
+    (tmp_path / "out").rename(tmp_path / "there")
+    assert reasons(batch.find([clips / "a.h5"], tmp_path / "there"), tmp_path / "there") == {"a.h5": ""}
+
+
+@pytest.mark.parametrize("cut", [1, 10, 11, 60, 10_000])
+def test_a_torn_last_line_is_removed_and_its_clip_done_again(cut, tmp_path):
+    path = tmp_path / "m.jsonl"
+    with Manifest(path) as notes:
+        notes.add({"output": "a", "status": "done"})
+        whole = path.read_bytes()
+        notes.add({"output": "b", "status": "done", "reason": "long " * 30})
+    path.write_bytes(path.read_bytes()[: max(len(whole), path.stat().st_size - cut)])
+    assert manifest.read_records(path).keys() == {"a"}
+    with Manifest(path) as notes:
+        assert notes.records.keys() == {"a"} and path.read_bytes() == whole
+        notes.add({"output": "c", "status": "done"})
+    assert manifest.read_records(path).keys() == {"a", "c"}
+
+
+@pytest.mark.parametrize("rest", [b"\0" * 50, b"\0" * 50 + b"\n", b'{"outp', b'{"output": "b", "st\n'])
+def test_zeros_and_halves_at_the_end_are_torn_lines_too(rest, tmp_path):
+    path = tmp_path / "m.jsonl"
+    path.write_bytes(b'{"output": "a", "status": "done"}\n' + rest)
+    with Manifest(path) as notes:
+        assert notes.records.keys() == {"a"}
+    assert path.read_bytes() == b'{"output": "a", "status": "done"}\n'
+
+
+@pytest.mark.parametrize("content", [b"[1, 2]", b'{"name": "package"}', b"text\nmore\n", b'{"output": 3}\n{}\n', b"{"
+                                     b'"output": "a"}\nnotes\n{"output": "b"}\n'])
+def test_a_file_that_is_no_manifest_is_refused_and_left_alone(content, tmp_path):
+    path = tmp_path / "notes.txt"
+    path.write_bytes(content)
+    with pytest.raises(ManifestError, match="notes.txt: line . is no line of a manifest"):
+        Manifest(path)
+    assert path.read_bytes() == content
+
+
+def test_two_runs_on_one_manifest_are_refused(clips, tmp_path, capsys):
+    out = tmp_path / "out"
+    out.mkdir()
+    with Manifest(out / runs.MANIFEST):
+        assert cli.main(["batch", str(clips), "--out", str(out)]) == 1
+        assert "another run has this manifest open" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == [runs.MANIFEST]
+
+
+def test_a_dry_run_says_what_would_be_done_and_writes_nothing(clips, tmp_path, capsys):
+    assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--dry-run", "--max-error", "1mm"]) == 0
+    out = capsys.readouterr().out
+    assert "sub/c.h5" in out and "max_error=1mm" in out and "4 clips of 4 to do" in out
+    assert not (tmp_path / "out").exists()
+
+
+# ---- inputs and settings ----
+
+
+def names(*inputs, out="out") -> list[str]:
+    return [item.name for item in batch.find(inputs, out)]
+
+
+def test_inputs_are_files_folders_and_patterns(clips, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (clips / "notes.txt").touch()
+    (clips / "frame_01.obj").touch()
+    assert names("in") == names("in/**/*.h5") == ["a.h5", "b.h5", "long.h5", "sub/c.h5"]
+    assert names("in/sub", "in/a.h5") == ["a.h5", "c.h5"]
+    assert names("in/[ab].h5", "in/a.h5") == ["a.h5", "b.h5"]
+    [item] = batch.find(["in/frame_##.obj"], "out")
+    assert item.output == str(tmp_path / "out" / "frame.ath")
+
+
+def test_inputs_that_name_nothing_or_one_output_twice_are_refused(clips, tmp_path):
+    (clips / "a.npz").touch()
+    for wrong, message in (([clips / "none.h5"], "none.h5"), ([clips / "*.abc"], "got no clips"),
+                           ([clips], "expected a name of its own")):
+        with pytest.raises((ClipError, FileNotFoundError), match=message):
+            batch.find(wrong, tmp_path / "out")
+
+
+def test_later_patterns_win_and_their_bound_takes_the_place_of_another(tmp_path):
+    (tmp_path / "s.toml").write_text('["*"]\nrel_error = 1e-3\neffort = "fast"\n["sub/*"]\nmax_error = "1 mm"\n'
+                                     '["*.npz"]\nmesh = "m.obj"\nfps = "24000/1001"\n')
+    patterns = batch.load_settings(tmp_path / "s.toml")
+    of = functools.partial(batch.settings.settings_of, default={"lossless": True, "effort": "best"}, patterns=patterns)
+    assert of(("a.h5",)) == {"lossless": True, "rel_error": 1e-3, "effort": "fast"}
+    assert of(("sub/b.h5",)) == {"lossless": True, "max_error": "1 mm", "effort": "fast"}
+    assert of(("c.npz",))["mesh"] == str(tmp_path / "m.obj") and of(("c.npz",))["fps"] == 24000 / 1001
+
+
+@pytest.mark.parametrize("text, message", [
+    ("rel_error = 1e-4", "expected a table of settings under a pattern"),
+    ('["*"]\nquality = 3', "unknown setting 'quality', expected one of max_error"),
+    ('["*"]\nrel_error = 2', "rel_error: got 2"), ('["*"]\nmax_error = "1 mile"', "max_error: got '1 mile'"),
+    ('["*"]\neffort = "much"', "expected one of fast"), ('["*"]\nlossless = 1', "expected true or false"),
+    ('["*"]\nsegment_frames = 8', "expected a whole number, 16 to"), ('["*"]\ntam = [1, 2]', "expected four values"),
+    ('["*"]\nsource_format = "zip"', "source_format: got 'zip'"), ('["*"', "got no TOML"),
+    ('["*"]\nrel_error = 1e-3\nmax_error = 1', "expected one of them")])
+def test_settings_that_do_not_exist_or_make_no_sense_are_refused_by_name(text, message, tmp_path, capsys, clips):
+    (tmp_path / "s.toml").write_text(text)
+    words = ["batch", str(clips), "--out", str(tmp_path / "out"), "--settings", str(tmp_path / "s.toml")]
+    assert cli.main(words) == 1
+    err = capsys.readouterr().err
+    assert message in err and "s.toml" in err and err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_) -> None:
+        pass
+
+
+@pytest.fixture
+def served(clips):
+    """The URL of the clips."""
+    handler = functools.partial(Quiet, directory=str(clips))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path, cluster):
+    out = tmp_path / "out"
+    urls = [f"{served}/a.h5", f"{served}/long.h5", f"file://{clips}/sub/*.h5", f"{served}/none.h5"]
+    items = batch.find(urls, out, settings=FAST)
+    outcome = batch.run(items, out, scheduler=cluster)
+    assert [record["output"] for record in outcome.failed] == ["none.ath"] and "none.h5" in outcome.failed[0]["reason"]
+    for name in ("a", "long", "sub/c"):
+        assert (out / f"{Path(name).name}.ath").read_bytes() == alone(clips / f"{name}.h5", tmp_path, **FAST)
+    assert not leftovers(out)
+    os.utime(clips / "a.h5", ns=(0, 0))  # Last-Modified
+    assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
+
+
+# ---- what goes wrong ----
+
+
+def test_one_broken_clip_among_many_is_named_and_the_others_are_done(clips, tmp_path, cluster, capsys):
+    out = tmp_path / "out"
+    whole = (clips / "b.h5").read_bytes()
+    (clips / "b.h5").write_bytes(whole[:3000])
+    words = ["batch", str(clips), "--out", str(out), *WORDS, "--scheduler", cluster]
+    assert cli.main(words) == 1
+    printed = capsys.readouterr()
+    assert "3 clips done, 0 kept, 1 failed" in printed.out
+    assert printed.err.splitlines()[-1].startswith(f"athcodec: failed: b.ath: {clips / 'b.h5'}: ")
+    assert done_once(out) == {"a.ath", "long.ath", "sub/c.ath"} and not (out / "b.ath").exists()
+    (clips / "b.h5").write_bytes(whole)
+    assert cli.main([*words, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["done"], result["kept"], result["failed"]) == (1, 3, [])
+    assert len(done_once(out)) == 4
+
+
+def test_without_dask_the_command_that_installs_it_is_named(clips, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtra, match=r'pip install "athcodec\[batch\]"'):
+        batch.run(batch.find([clips], tmp_path / "out"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(clips, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(runs, "CONNECTING", 0.5)
+    assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "expected the address of a scheduler" in err
+
+
+# ---- processes that die and disks that are full ----
+
+
+@pytest.fixture
+def many(tmp_path):
+    """Twelve clips that take a while, one of them long."""
+    folder = tmp_path / "many"
+    folder.mkdir()
+    for seed in range(11):
+        athcodec.write_hdf5(folder / f"c{seed:02}.h5", plant(seed=seed, branches=20, longest=8, frames=48))
+    athcodec.write_hdf5(folder / "long.h5", plant(seed=99, branches=20, longest=8, frames=300))
+    return folder
+
+
+ALL = {*(f"c{seed:02}.ath" for seed in range(11)), "long.ath"}
+
+
+def start(source: Path, out: Path, *words: str, **options) -> subprocess.Popen:
+    command = [*BATCH, str(source), "--out", str(out), *WORDS, "--workers", "2", "--split", "3", *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def finished(process: subprocess.Popen) -> tuple[int, str]:
+    _, err = process.communicate(timeout=120)
+    return process.returncode, err
+
+
+def workers_of(process: subprocess.Popen) -> list[psutil.Process]:
+    return [each for each in psutil.Process(process.pid).children() if "spawn_main" in " ".join(each.cmdline())]
+
+
+def wait_for(happened, process: subprocess.Popen) -> None:
+    while not happened():
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.01)
+
+
+def lines_so_far(out: Path) -> int:
+    path = out / runs.MANIFEST
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0, 3, 8])
+def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many, out, "--verify")
+    wait_for(lambda: lines_so_far(out) >= after and workers_of(process) and leftovers(out), process)
+    workers_of(process)[0].kill()
+    code, err = finished(process)
+    assert code == 0, err
+    assert done_once(out) == ALL and len(lines(out)) == 12 and not leftovers(out)
+    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", tmp_path, **FAST)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0, 2, 7])
+def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many, out)
+    wait_for(lambda: lines_so_far(out) >= after and workers_of(process), process)
+    workers = workers_of(process)
+    process.kill()
+    process.communicate()
+    psutil.wait_procs(workers, timeout=30)
+    before = lines(out)
+    assert after <= len(before) < 12
+    code, err = finished(start(many, out, "--verify"))
+    assert code == 0, err
+    assert lines(out)[: len(before)] == before and len(lines(out)) == 12
+    assert done_once(out) == ALL and not leftovers(out)
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_leaves_whole_files_only(many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many, out, start_new_session=True)
+    wait_for(lambda: lines_so_far(out) >= 2, process)
+    process.send_signal(signal.SIGINT)
+    code, err = finished(process)
+    assert code == 130 and "Traceback" not in err, err
+    assert not leftovers(out) and done_once(out) == {line["output"] for line in lines(out)} < ALL
+    assert finished(start(many, out))[0] == 0 and done_once(out) == ALL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", [2000, 9000])
+def test_a_full_disk_is_told_and_a_second_run_does_what_is_missing(limit, many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many, out, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    code, err = finished(process)
+    assert code == 1 and "File too large" in err and "Traceback" not in err, err
+    assert not leftovers(out)
+    before = done_once(out)
+    assert before < ALL
+    code, err = finished(start(many, out, "--verify"))
+    assert code == 0, err
+    assert done_once(out) == ALL
+
+
+@pytest.mark.slow
+def test_a_small_disk_that_is_really_full(many, tmp_path):
+    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
+        pytest.skip("the system allows no mount namespace here")
+    out, kept = tmp_path / "out", tmp_path / "kept"
+    out.mkdir()
+    script = ('mount -t tmpfs -o size=40k none "$1"; out="$1"; kept="$2"; shift 2; "$@"; code=$?; '
+              'cp -a "$out" "$kept"; exit $code')
+    command = [*BATCH, str(many), "--out", str(out), *WORDS, "--workers", "2"]
+    done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(out), str(kept), *command],
+                          capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "No space left" in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert not leftovers(kept) and done_once(kept) < ALL
+    code, err = finished(start(many, kept))
+    assert code == 0 and done_once(kept) == ALL, err
