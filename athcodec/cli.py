@@ -121,11 +121,13 @@ def _batch(args: argparse.Namespace) -> int:
     items = batch.find(inputs, args.out, settings=_batch_settings(args),
                        patterns=batch.load_settings(args.settings) if args.settings else None)
     where = {"manifest": args.manifest, "redo": args.redo}
+    how = {"workers": args.workers, "scheduler": args.scheduler, "verify": args.verify}
+    if args.split:
+        how["split"] = args.split
     if args.dry_run:
         _print_preview(batch.preview(items, args.out, **where), args.json)
         return 0
-    outcome = batch.run(items, args.out, **where, workers=args.workers, scheduler=args.scheduler, split=args.split,
-                        verify=args.verify, show=show_of_terminal())
+    outcome = batch.run(items, args.out, **where, **how, show=show_of_terminal())
     _print_outcome(outcome, args)
     return 1 if outcome.failed else 0
 
@@ -689,8 +691,9 @@ def _parser() -> argparse.ArgumentParser:
         f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}.",
     ))
     _batch_arguments(verb(
-        "batch", _batch, "compress many motions, by several processes", "An interrupted run goes on where it ended when "
-        "the command is given again. Exit code 1 where a clip failed; the others are done all the same.",
+        "batch", _batch, "compress many motions, by several processes",
+        "An interrupted run goes on where it ended when the command is given again. Exit code 1 where a clip failed; the "
+        "others are done all the same.",
     ))
     _decode_arguments(verb(
         "decode", _decode, "write the motion of an .ath file in another format",
@@ -730,8 +733,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _batch_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("inputs", metavar="IN", nargs="*", help="files, directories, patterns such as 'trees/**/*.h5', or "
-                      "URLs of them that fsspec knows (a directory's ends in a slash)")
+    verb.add_argument("inputs", metavar="IN", nargs="*", help="files, directories, patterns such as 'trees/**/*.h5', "
+                      "or URLs of them that fsspec knows (a directory's ends in a slash)")
     verb.add_argument("--list", metavar="FILE", help="a file with further inputs, one per line; - is stdin")
     verb.add_argument("--out", metavar="DIR", required=True, help="directory of the .ath files and of the manifest")
     verb.add_argument("--settings", metavar="FILE.toml", help='settings by pattern of the clip\'s name: ["oaks/*"] and '
@@ -739,7 +742,7 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--workers", metavar="N", type=_argument(_jobs), help="processes (default: one per core)")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of a running Dask cluster that sees the same paths, in "
                       "place of processes on this machine")
-    verb.add_argument("--split", metavar="SEGMENTS", type=_argument(_jobs), default=4, help="clips of more segments are "
+    verb.add_argument("--split", metavar="SEGMENTS", type=_argument(_jobs), help="clips of more segments are "
                       "coded so many at a time by whatever worker is free (default 4)")
     verb.add_argument("--manifest", metavar="FILE.jsonl", help="what is done and what failed (default: "
                       "athcodec-batch.jsonl in DIR)")

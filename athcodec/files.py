@@ -14,7 +14,7 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
@@ -26,6 +26,7 @@ except ImportError:  # Windows, where nobody can remove a file that another has 
 NAME_CHARACTERS = 50  # of the target in the part's name: a name of the longest length has room for the rest too
 PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
+_PART = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
 _URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
 
 
@@ -185,10 +186,16 @@ def _locked_folder(folder: str) -> int:
 def remove_leftovers(path: str) -> None:
     """Removes what writers that have died, and only those, left of files on their way to `path`."""
     directory, name = os.path.split(path)
-    form = re.compile(re.escape(_prefix(name)) + r"[0-9a-f]{8}\.part", re.DOTALL)
+    remove_leftovers_of(directory, [name])
+
+
+def remove_leftovers_of(directory: str, names: Iterable[str]) -> None:
+    """The same for many files of a directory, which is listed once."""
+    prefixes = {_prefix(name) for name in names}
     with suppress(OSError):  # a directory that can be written to but not listed
         for found in os.listdir(directory):
-            if form.fullmatch(found):
+            part = _PART.fullmatch(found)
+            if part and part[1] in prefixes:
                 _remove_if_dead(os.path.join(directory, found))
 
 

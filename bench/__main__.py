@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench import (
+    batch,
     data,
     decode,
     hierarchy,
@@ -31,7 +32,7 @@ from bench import (
 
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
-         "picture": picture, "hierarchy": hierarchy, "viewer": viewer}
+         "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer}
 
 
 def main(argv: Sequence[str]) -> int:

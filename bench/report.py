@@ -17,7 +17,7 @@ from bench.tables import as_text, table
 RESULTS = Path(__file__).resolve().parent / "results"
 TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
           "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
-          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding"}
+          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "batch": "Many clips"}
 
 ORDER = {verb: place for place, verb in enumerate(TITLES)}
 

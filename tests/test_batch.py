@@ -353,7 +353,7 @@ def lines_so_far(out: Path) -> int:
 def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
     out = tmp_path / "out"
     process = start(many, out, "--verify")
-    wait_for(lambda: lines_so_far(out) >= after and workers_of(process) and leftovers(out), process)
+    wait_for(lambda: lines_so_far(out) >= after and any(".ath." in part.name for part in leftovers(out)), process)
     workers_of(process)[0].kill()
     code, err = finished(process)
     assert code == 0, err
@@ -408,8 +408,7 @@ def test_a_full_disk_is_told_and_a_second_run_does_what_is_missing(limit, many, 
 
 @pytest.mark.slow
 def test_a_small_disk_that_is_really_full(many, tmp_path):
-    if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
-        pytest.skip("the system allows no mount namespace here")
+    """A tmpfs in a mount namespace of its own, which the system has to allow."""
     out, kept = tmp_path / "out", tmp_path / "kept"
     out.mkdir()
     script = ('mount -t tmpfs -o size=40k none "$1"; out="$1"; kept="$2"; shift 2; "$@"; code=$?; '

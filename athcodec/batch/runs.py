@@ -14,7 +14,7 @@ import queue
 import secrets
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -28,7 +28,7 @@ from athcodec.batch.manifest import Manifest, Record, read_records
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
-from athcodec.files import is_url, remove_leftovers, scratch_folder
+from athcodec.files import is_url, remove_leftovers_of, scratch_folder
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
@@ -105,11 +105,20 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
                 with _client(workers, scheduler, len(todo)) as client:
                     _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
         finally:
-            for each in todo:
-                remove_leftovers(each.item.output)  # of workers that were stopped
+            _tidy(each.item.output for each in todo)
             show.end()
     outcome.seconds = time.monotonic() - start
     return outcome
+
+
+def _tidy(outputs: Iterable[str]) -> None:
+    """Removes what workers that were stopped have left."""
+    folders: dict[str, list[str]] = {}
+    for output in outputs:
+        folder, name = os.path.split(output)
+        folders.setdefault(folder, []).append(name)
+    for folder, names in folders.items():
+        remove_leftovers_of(folder, names)
 
 
 def _key(item: Item, output: str | os.PathLike[str]) -> str:
@@ -154,8 +163,11 @@ def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die are no news: the manifest tells
     if scheduler is None:
-        cluster = distributed.LocalCluster(n_workers=workers or os.cpu_count() or 1, threads_per_worker=1,
-                                           processes=True, dashboard_address=None, silence_logs=logging.CRITICAL)
+        try:
+            cluster = distributed.LocalCluster(n_workers=workers or os.cpu_count() or 1, threads_per_worker=1,
+                                               processes=True, dashboard_address=None, silence_logs=logging.CRITICAL)
+        except (OSError, RuntimeError) as error:
+            raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
         with cluster, distributed.Client(cluster) as client:
             yield client
         return

@@ -188,7 +188,7 @@ def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
             os.mkdir(folder)  # the run's own is there as long as the run
         return work()
     except Exception as error:
-        return {"failed": one_line(error).replace(_local_path(item, folder), item.shown)}
+        return {"failed": one_line(error).replace(_local_path(item, folder), item.shown).replace(item.input, item.shown)}
 
 
 def one_line(error: BaseException) -> str:

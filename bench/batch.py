@@ -1,0 +1,134 @@
+"""Many small clips with one worker and with several: how much time further workers save.
+
+Every round encodes the same clips into an empty directory with each number of workers in turn, so that all see the
+same machine, and once in a plain loop of one process for what the workers themselves cost. The clips are windows of
+one clip, each from another frame on. Seconds are wall-clock time; those from the first clip to the last leave out the
+start of the workers. Every file is compared with that of the plain loop.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec import batch
+from athcodec.batch.show import Show
+from bench.clips import add_rel_error
+from bench.tables import table
+
+COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
+
+NOTE = """
+Each clip: {frames} frames of {vertices:,} vertices, HDF5; files in the page cache. 'all s': the whole run, with start
+and end of the workers; 'clips s': from the first clip to the last. Medians of {rounds} rounds. Loop: athcodec.encode in
+one process with one thread, nothing else. Load: of the machine before each run, median; with more running processes
+than cores the ratio says little.
+"""
+RATIO_NOTE = "Seconds from the first clip to the last, with one worker over with several, of the same round; median."
+
+
+class _Clock(Show):
+    """When a run began with its clips, and when the last was there."""
+
+    def begin(self, items, kept) -> None:
+        self.first = self.last = 0.0
+
+    def stage(self, output, stage, fraction) -> None:
+        self.first = self.first or time.perf_counter()
+
+    def finished(self, item, record) -> None:
+        self.first = self.first or time.perf_counter() - record.get("seconds", 0.0)
+        self.last = time.perf_counter()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="how many (default %(default)s)")
+    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of each (default %(default)s)")
+    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
+                        help="what they are windows of (default: the sample)")
+    parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
+                        help="numbers of workers; the first is what others are compared with (default 1 2)")
+    parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="default", help="(default %(default)s)")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        source, vertices = Path(folder, "in"), _make_clips(args, Path(folder, "in"))
+        settings = {"rel_error": args.rel_error, "effort": args.effort}
+        runs: dict[str, list[dict[str, float]]] = {}
+        broken: list[str] = []
+        for number in range(args.rounds):
+            runs.setdefault("loop", []).append(_loop(source, Path(folder, f"loop_{number}"), settings))
+            for workers in args.workers:
+                out = Path(folder, f"{workers}_{number}")
+                runs.setdefault(str(workers), []).append(_run(source, out, settings, workers))
+                broken += _differences(Path(folder, f"loop_{number}"), out)
+        files = [path.stat().st_size for path in Path(folder, "loop_0").iterdir()]
+    rows = [{"workers": name, "clips": args.clips, "bytes": sum(files)}
+            | {what: median(each[what] for each in rounds) for what in rounds[0]}
+            | {"clips/s": args.clips / median(each["clips s"] for each in rounds)} for name, rounds in runs.items()]
+    note = NOTE.format(frames=args.frames, vertices=vertices, rounds=args.rounds)
+    return {"tables": [table(f"Many clips, bound {args.rel_error:g}", rows, note),
+                       table("One worker over several", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}
+
+
+def _make_clips(args: argparse.Namespace, folder: Path) -> int:
+    """Windows of a clip as files; how many vertices they have."""
+    folder.mkdir()
+    with athcodec.read_hdf5(args.of) as clip:
+        frames = min(args.frames, clip.frame_count)
+        for number, start in enumerate(np.linspace(0, clip.frame_count - frames, args.clips).astype(int)):
+            window = athcodec.MotionClip(
+                clip.block(start, start + frames), clip.time[:frames], clip.vertex_branch, clip.branch_parent,
+                clip.rest.astype(clip.rest_dtype), stem_index=clip.stem_index, metadata=clip.metadata)
+            athcodec.write_hdf5(folder / f"clip_{number:04}.h5", window)
+        return clip.vertex_count
+
+
+def _loop(source: Path, out: Path, settings: dict[str, Any]) -> dict[str, float]:
+    out.mkdir()
+    load, start = _load(), time.perf_counter()
+    for path in sorted(source.iterdir()):
+        with athcodec.read_hdf5(path) as clip:
+            athcodec.encode(clip, out / f"{path.stem}.ath", jobs=1, **settings)
+    seconds = time.perf_counter() - start
+    return {"all s": seconds, "clips s": seconds} | load
+
+
+def _run(source: Path, out: Path, settings: dict[str, Any], workers: int) -> dict[str, float]:
+    items = batch.find([source], out, settings=settings)
+    clock, load, start = _Clock(), _load(), time.perf_counter()
+    outcome = batch.run(items, out, workers=workers, show=clock)
+    if outcome.failed:
+        raise SystemExit(f"batch: {outcome.failed[0]['output']}: {outcome.failed[0]['reason']}")
+    return {"all s": time.perf_counter() - start, "clips s": clock.last - clock.first} | load
+
+
+def _load() -> dict[str, float]:
+    """Of the machine, where the system tells it."""
+    return {"load": os.getloadavg()[0]} if hasattr(os, "getloadavg") else {}
+
+
+def _differences(loop: Path, out: Path) -> list[str]:
+    return [f"{path.name}: another file than athcodec.encode writes" for path in sorted(loop.iterdir())
+            if path.read_bytes() != (out / path.name).read_bytes()]
+
+
+def _ratios(runs: dict[str, list[dict[str, float]]], workers: list[int]) -> list[dict[str, Any]]:
+    rows = []
+    for count in workers[1:]:
+        pairs = zip(runs[str(workers[0])], runs[str(count)], strict=True)
+        ratio = median(one["clips s"] / several["clips s"] for one, several in pairs)
+        row = {"workers": f"{count} for {workers[0]}", "ratio": ratio}
+        rows.append(row | ({"target": TARGET, "met": ratio >= TARGET} if (workers[0], count) == WORKERS else {}))
+    return rows
