@@ -6,12 +6,14 @@ import functools
 import http.server
 import json
 import os
+import pty
 import resource
 import signal
 import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import distributed
@@ -33,7 +35,7 @@ WORDS = ["--effort", "fast", "--segment-frames", "16"]
 @pytest.fixture(scope="module")
 def cluster():
     """The address of a scheduler with two workers, processes, that some tests share."""
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster.scheduler_address
 
 
@@ -245,8 +247,14 @@ def test_settings_that_do_not_exist_or_make_no_sense_are_refused_by_name(text, m
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
+    unsaid = ""  # a header that is left out
+
     def log_message(self, *_) -> None:
         pass
+
+    def send_header(self, name: str, value: str) -> None:
+        if name != self.unsaid:
+            super().send_header(name, value)
 
 
 @pytest.fixture
@@ -270,6 +278,38 @@ def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path,
     assert not leftovers(out)
     os.utime(clips / "a.h5", ns=(0, 0))  # Last-Modified
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
+
+
+def test_an_input_whose_server_tells_nothing_is_known_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
+    monkeypatch.setattr(Quiet, "unsaid", "Last-Modified")
+    out = tmp_path / "out"
+    items = batch.find([f"{served}/a.h5"], out, settings=FAST)
+    [record] = batch.run(items, out, scheduler=cluster).done
+    assert record["source"] == {"size": (clips / "a.h5").stat().st_size,
+                                "sha256": batch.inputs.sha256(clips / "a.h5")}
+    outcome = batch.run(items, out, scheduler=cluster)
+    assert outcome.kept == items and not outcome.done and len(lines(out)) == 1
+    with open(clips / "a.h5", "r+b") as file:  # of the same size
+        file.seek(-1, os.SEEK_END)
+        file.write(b"!")
+    assert len(batch.run(items, out, scheduler=cluster).done) == 1
+
+
+# ---- what is shown ----
+
+
+def test_a_terminal_shows_a_table_and_the_result_goes_elsewhere(clips, tmp_path):
+    reader, writer = pty.openpty()
+    command = [*BATCH, str(clips / "a.h5"), "--out", str(tmp_path / "out"), *WORDS, "--workers", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=writer, text=True)
+    os.close(writer)
+    shown = b""
+    with suppress(OSError):  # the other end is closed
+        while part := os.read(reader, 1 << 16):
+            shown += part
+    os.close(reader)
+    assert "1 clip done, 0 kept, 0 failed" in process.communicate()[0] and process.returncode == 0
+    assert b"1 of 1: 1 done" in shown and b"a.h5" in shown
 
 
 # ---- what goes wrong ----
@@ -304,6 +344,24 @@ def test_a_scheduler_that_is_not_there_is_one_line(clips, tmp_path, monkeypatch,
     assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and "expected the address of a scheduler" in err
+
+
+def test_a_scheduler_that_goes_away_ends_the_run_and_not_what_was_done(clips, tmp_path, cluster, monkeypatch):
+    out = tmp_path / "out"
+
+    class Close(batch.show.Show):
+        def finished(self, item, record) -> None:
+            if len(seen := [line for line in lines(out)]) == 1:
+                assert seen[0]["status"] == "done"
+                threading.Thread(target=own.close).start()
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as own:
+        with pytest.raises(runs.SchedulerError, match="the same command goes on"):
+            batch.run(batch.find([clips], out), out, scheduler=own.scheduler_address, show=Close())
+    before = len(lines(out))
+    assert 1 <= before < 4 and not leftovers(out)
+    outcome = batch.run(batch.find([clips], out), out, scheduler=cluster)
+    assert len(outcome.kept) == before and len(done_once(out)) == 4
 
 
 # ---- processes that die and disks that are full ----
@@ -349,6 +407,15 @@ def lines_so_far(out: Path) -> int:
 
 
 @pytest.mark.slow
+def test_two_runs_at_once_do_not_disturb_each_other(clips, tmp_path):
+    processes = [start(clips, tmp_path / name) for name in ("one", "two")]
+    for process, name in zip(processes, ("one", "two")):
+        code, err = finished(process)
+        assert code == 0 and all(line.startswith("[") for line in err.splitlines()), err
+        assert len(done_once(tmp_path / name)) == 4
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 3, 8])
 def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
     out = tmp_path / "out"
@@ -358,6 +425,17 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(after, many, tmp_path):
     code, err = finished(process)
     assert code == 0, err
     assert done_once(out) == ALL and len(lines(out)) == 12 and not leftovers(out)
+    assert (out / "long.ath").read_bytes() == alone(many / "long.h5", tmp_path, **FAST)
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that_part(many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many / "long.h5", out)
+    wait_for(lambda: any(out.rglob("segments_0")), process)
+    workers_of(process)[1].kill()
+    code, err = finished(process)
+    assert code == 0 and done_once(out) == {"long.ath"} and not leftovers(out), err
     assert (out / "long.ath").read_bytes() == alone(many / "long.h5", tmp_path, **FAST)
 
 
@@ -420,3 +498,14 @@ def test_a_small_disk_that_is_really_full(many, tmp_path):
     assert not leftovers(kept) and done_once(kept) < ALL
     code, err = finished(start(many, kept))
     assert code == 0 and done_once(kept) == ALL, err
+
+
+@pytest.mark.slow
+def test_the_benchmark_compares_numbers_of_workers_and_every_file(tmp_path):
+    command = [sys.executable, "-m", "bench", "batch", "--clips", "4", "--frames", "20", "--effort", "fast", "--json",
+               str(tmp_path / "b.json")]
+    subprocess.run(command, cwd=Path(__file__).resolve().parent.parent, check=True, capture_output=True, timeout=120)
+    result = json.loads((tmp_path / "b.json").read_text())
+    runs_of, ratios = (each["rows"] for each in result["tables"])
+    assert [row["workers"] for row in runs_of] == ["loop", "1", "2"] and result["broken"] == []
+    assert ratios[0]["ratio"] == pytest.approx(runs_of[1]["clips s"] / runs_of[2]["clips s"])

@@ -34,7 +34,9 @@ MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
 SPLIT = 4  # segments
 PATIENCE = 0.25  # seconds between looks at the scheduler
-CONNECTING = 30  # seconds
+CONNECTING = 30  # seconds, to a scheduler, and of a scheduler without workers
+LOST = ("scheduler: the connection was lost, expected one until the end; the same command goes on where this one "
+        "ended")
 
 
 class SchedulerError(AthError):
@@ -163,9 +165,11 @@ def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die are no news: the manifest tells
     if scheduler is None:
+        private = True if find_spec("cryptography") else None  # TLS: a port that others on the machine cannot use
         try:
-            cluster = distributed.LocalCluster(n_workers=workers or os.cpu_count() or 1, threads_per_worker=1,
-                                               processes=True, dashboard_address=None, silence_logs=logging.CRITICAL)
+            cluster = distributed.LocalCluster(
+                n_workers=workers or os.cpu_count() or 1, threads_per_worker=1, processes=True, security=private,
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL)
         except (OSError, RuntimeError) as error:
             raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
         with cluster, distributed.Client(cluster) as client:
@@ -191,6 +195,7 @@ class _Run:
         self.client, self.output, self.folder, self.notes = client, output, folder, notes
         self.outcome, self.show, self.split, self.verify = outcome, show, split, verify
         self.topic = f"{SCRATCH}-{secrets.token_hex(8)}"
+        self.seen_workers = time.monotonic()
         self.finished: queue.SimpleQueue = queue.SimpleQueue()
         self.pending: dict[str, tuple[Item, str, Any]] = {}  # by key: the clip, what is done with it, the future
         self.parts: dict[str, list[Any]] = {}  # futures of a long clip's segments, by output
@@ -224,9 +229,7 @@ class _Run:
         try:
             future = self.finished.get(timeout=PATIENCE)
         except queue.Empty:
-            if self.client.status != "running":
-                raise SchedulerError("scheduler: the connection was lost, expected one until the end; the same command "
-                                     "goes on where this one ended") from None
+            self._check_scheduler()
             return
         item, what, _ = self.pending.pop(future.key)
         result = self._result(future, item)
@@ -239,6 +242,15 @@ class _Run:
         else:
             self._note(item, result)
 
+    def _check_scheduler(self) -> None:
+        if self.client.status != "running":
+            raise SchedulerError(LOST)
+        if self.client.scheduler_info()["workers"]:
+            self.seen_workers = time.monotonic()
+        elif time.monotonic() - self.seen_workers > CONNECTING:
+            raise SchedulerError(f"scheduler: got no worker for {CONNECTING} s, expected at least one; the same "
+                                 "command goes on where this one ended")
+
     def _result(self, future: Any, item: Item) -> Result:
         import distributed
 
@@ -250,8 +262,7 @@ class _Run:
                               "is too little memory"}
         except Exception as error:
             if future.status == "cancelled":
-                raise SchedulerError("scheduler: the connection was lost, expected one until the end; the same command "
-                                     "goes on where this one ended") from None
+                raise SchedulerError(LOST) from None
             return {"failed": one_line(error)}
 
     def _code(self, item: Item, segments: int) -> None:

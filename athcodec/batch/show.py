@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from athcodec.batch.inputs import Item
 
 ROWS = 20  # of the live table
+ENDED = ("done", "failed", "kept")
 
 
 class Show:
@@ -73,14 +74,14 @@ class LiveTable(Show):
 
     def stage(self, output: str, stage: str, fraction: float) -> None:
         with self.lock:
-            if self.rows.get(output, ("", ""))[0] not in ("done", "failed", "kept"):
+            if self.rows.get(output, ("", ""))[0] not in ENDED:
                 self.rows[output] = stage, f"{fraction:.0%}"
 
     def finished(self, item: Item, record: dict[str, Any]) -> None:
         with self.lock:
             self.counts[record["status"]] += 1
             self.bytes += record.get("bytes", 0)
-            self._ended(item.output, record["status"], _said(record))
+            self._ended(item.output, record["status"], _figures(record))
 
     def kept(self, item: Item) -> None:
         with self.lock:
@@ -93,22 +94,24 @@ class LiveTable(Show):
 
     def _ended(self, output: str, state: str, said: str) -> None:
         self.rows.pop(output, None)
-        ended = [each for each, (state, _) in self.rows.items() if state in ("done", "failed", "kept")]
+        ended = [each for each, (before, _) in self.rows.items() if before in ENDED]
         for each in ended[: max(0, len(ended) - ROWS // 2)]:
             del self.rows[each]
         self.rows[output] = state, said
 
-    def _table(self) -> Table:
+    def _table(self) -> Group:
         with self.lock:
-            rows, counts = list(self.rows.items())[-ROWS:], dict(self.counts)
-        title = (f"{counts['done'] + counts['failed']} of {self.total}: {counts['done']} done, {counts['failed']} "
-                 f"failed, {counts['kept']} kept, {self.bytes:,} bytes, {time.monotonic() - self.start:.0f} s")
-        table = Table(box=SIMPLE_HEAD, title=Text(title), title_justify="left", pad_edge=False)
-        for name in ("clip", "state", ""):
-            table.add_column(name, no_wrap=True)
-        for output, (state, figures) in rows:
+            rows, counts = sorted(self.rows.items(), key=lambda row: row[1][0] in ENDED), dict(self.counts)
+        ended = counts["done"] + counts["failed"]
+        head = (f"{ended} of {self.total}: {counts['done']} done, {counts['failed']} failed, {counts['kept']} kept, "
+                f"{self.bytes:,} bytes, {time.monotonic() - self.start:.0f} s")
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, expand=True)
+        table.add_column("clip", no_wrap=True, ratio=2)
+        table.add_column("state", no_wrap=True, min_width=8)
+        table.add_column("", no_wrap=True, ratio=3)
+        for output, (state, figures) in rows[:ROWS]:
             table.add_row(Text(self.names.get(output, output)), Text(state), Text(figures))
-        return table
+        return Group(Text(head), table if rows else Text("starting workers" if not ended else ""))
 
 
 def show_of_terminal() -> Show:
@@ -117,6 +120,10 @@ def show_of_terminal() -> Show:
 
 
 def _said(record: dict[str, Any]) -> str:
+    return f"failed: {_figures(record)}" if record["status"] == "failed" else _figures(record)
+
+
+def _figures(record: dict[str, Any]) -> str:
     if record["status"] == "failed":
-        return f"failed: {record['reason']}"
+        return record["reason"]
     return f"{record['bytes']:,} bytes, {record['raw_bytes'] / record['bytes']:.1f} to 1"

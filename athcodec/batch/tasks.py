@@ -188,7 +188,8 @@ def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
             os.mkdir(folder)  # the run's own is there as long as the run
         return work()
     except Exception as error:
-        return {"failed": one_line(error).replace(_local_path(item, folder), item.shown).replace(item.input, item.shown)}
+        reason = one_line(error).replace(_local_path(item, folder), item.shown)
+        return {"failed": reason.replace(item.input, item.shown)}  # a URL may hold keys
 
 
 def one_line(error: BaseException) -> str:
