@@ -7,6 +7,7 @@ import http.server
 import json
 import os
 import pty
+import re
 import resource
 import signal
 import subprocess
@@ -207,8 +208,25 @@ def test_inputs_are_files_folders_and_patterns(clips, tmp_path, monkeypatch):
     assert names("in") == names("in/**/*.h5") == ["a.h5", "b.h5", "long.h5", "sub/c.h5"]
     assert names("in/sub", "in/a.h5") == ["a.h5", "c.h5"]
     assert names("in/[ab].h5", "in/a.h5") == ["a.h5", "b.h5"]
-    [item] = batch.find(["in/frame_##.obj"], "out")
-    assert item.output == str(tmp_path / "out" / "frame.ath")
+    for series in ("in/frame_##.obj", "in/frame_%02d.obj"):
+        assert batch.find([series], "out")[0].output == str(tmp_path / "out" / "frame.ath")
+
+
+def test_inputs_come_from_a_list_too(clips, tmp_path, monkeypatch, capsys):
+    (tmp_path / "list.txt").write_text(f"{clips}/a.h5\n\n{clips}/b.h5\n")
+    words = ["batch", "--list", str(tmp_path / "list.txt"), "--out", str(tmp_path / "out"), "--dry-run", "--json"]
+    assert cli.main(words) == 0
+    found = json.loads(capsys.readouterr().out)["clips"]
+    assert [each["input"] for each in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
+
+
+def test_names_that_are_no_text_are_as_good_as_others(clips, tmp_path, cluster):
+    name = os.fsdecode(b"b\xe4um.h5")
+    (clips / "a.h5").rename(clips / name)
+    out = tmp_path / "out"
+    items = batch.find([clips / name], out, settings=FAST)
+    assert len(batch.run(items, out, scheduler=cluster, split=1).done) == 1 and done_once(out)
+    assert reasons(items, out) == {name: ""}
 
 
 def test_inputs_that_name_nothing_or_one_output_twice_are_refused(clips, tmp_path):
@@ -440,6 +458,24 @@ def test_a_worker_that_is_killed_while_it_codes_a_part_of_a_long_clip_costs_that
 
 
 @pytest.mark.slow
+def test_a_clip_whose_workers_die_each_time_is_given_up(many, tmp_path):
+    out = tmp_path / "out"
+    process = start(many / "long.h5", out, "--split", "100", "--effort", "default")
+    seen = set()
+    while process.poll() is None:
+        parts = {path.name for path in leftovers(out) if path.name.startswith(".long.ath.")}
+        if parts - seen:  # a worker has begun, and all are killed
+            seen |= parts
+            for worker in workers_of(process):
+                worker.kill()
+        time.sleep(0.01)
+    assert 2 <= len(seen) <= 4  # one may have died before it began
+    code, err = finished(process)
+    assert code == 1 and re.search(r"long.h5: 4 workers died that worked on it", err), err
+    assert not leftovers(out) and lines(out)[0]["status"] == "failed"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 2, 7])
 def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, tmp_path):
     out = tmp_path / "out"
@@ -458,13 +494,14 @@ def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_leaves_whole_files_only(many, tmp_path):
+@pytest.mark.parametrize("number, expected", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, tmp_path):
     out = tmp_path / "out"
     process = start(many, out, start_new_session=True)
     wait_for(lambda: lines_so_far(out) >= 2, process)
-    process.send_signal(signal.SIGINT)
+    os.killpg(process.pid, number)  # as a terminal does it: workers get it too
     code, err = finished(process)
-    assert code == 130 and "Traceback" not in err, err
+    assert code == expected and all(line.startswith("[") for line in err.splitlines()), err
     assert not leftovers(out) and done_once(out) == {line["output"] for line in lines(out)} < ALL
     assert finished(start(many, out))[0] == 0 and done_once(out) == ALL
 

@@ -20,7 +20,7 @@ from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.errors import ClipError, MissingExtra, RemoteError
 from athcodec.files import is_url
 from athcodec.remote import _one_line, _without_secrets
-from athcodec.sources import FORMATS, is_pattern
+from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
 
 FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
@@ -37,6 +37,11 @@ class Item:
     input: str
     output: str
     settings: Settings
+
+    @property
+    def mark(self) -> str:
+        """Short, and of plain characters whatever the names have."""
+        return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 
     @property
     def shown(self) -> str:
@@ -56,7 +61,7 @@ def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str
     patterns = {pattern: check_settings(each, f'["{pattern}"]') for pattern, each in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
-        target = os.path.abspath(os.path.join(output, os.path.splitext(_plain(name))[0] + ".ath"))
+        target = os.path.abspath(os.path.join(output, _stem(name, path) + ".ath"))
         item = Item(name, path, target, settings_of((name, path), default, patterns))
         other = items.setdefault(target, item)
         if other.input != path:
@@ -66,11 +71,13 @@ def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str
     return sorted(items.values(), key=lambda item: item.name)
 
 
-def _plain(name: str) -> str:
-    """A name without the marks of a numbered series: walk_####.obj is walk.ath."""
+def _stem(name: str, path: str) -> str:
+    """A name without its suffix, and without the place of the numbers of a series: walk_####.obj is walk."""
     head, tail = posixpath.split(name)
-    stem, suffix = os.path.splitext(tail)
-    return posixpath.join(head, (stem.rstrip("#_.-") or "frames") + suffix) if "#" in stem else name
+    series = NUMBER_PATTERN.fullmatch(tail) if not is_url(path) and is_pattern(path) else None
+    if series:  # prefix, place, width, and what is behind it with the suffix
+        return posixpath.join(head, (series[1] + Path(f"n{series[4]}").stem[1:]).strip("_.- ") or "frames")
+    return os.path.splitext(name)[0]
 
 
 def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]]:

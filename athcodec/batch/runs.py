@@ -7,12 +7,13 @@ beside the outputs, which goes when the run ends, or when the next one begins.
 
 from __future__ import annotations
 
-import hashlib
 import logging
+import multiprocessing.resource_tracker
 import os
 import queue
 import secrets
 import shutil
+import signal
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -167,9 +168,11 @@ def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[
     if scheduler is None:
         private = True if find_spec("cryptography") else None  # TLS: a port that others on the machine cannot use
         try:
-            cluster = distributed.LocalCluster(
-                n_workers=workers or os.cpu_count() or 1, threads_per_worker=1, processes=True, security=private,
-                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL)
+            with _interrupts_held_back():
+                cluster = distributed.LocalCluster(
+                    n_workers=workers or os.cpu_count() or 1, threads_per_worker=1, processes=True, security=private,
+                    dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.CRITICAL)
         except (OSError, RuntimeError) as error:
             raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
         with cluster, distributed.Client(cluster) as client:
@@ -187,6 +190,21 @@ def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[
         yield client
 
 
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Threads that begin in the block, and processes that they start at any time, never see Ctrl-C, which a terminal
+    sends to all: this thread ends them. It sees one that came meanwhile at the end."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    multiprocessing.resource_tracker.ensure_running()  # whoever starts it has interrupts let through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class _Run:
     """Clips on their way through the workers."""
 
@@ -202,7 +220,12 @@ class _Run:
 
     def all(self, todo: Sequence[Todo]) -> None:
         """Until each clip is in the manifest."""
-        self.client.subscribe_topic(self.topic, lambda event: self.show.stage(**event[1]))
+        outputs = {each.item.mark: each.item.output for each in todo}
+
+        def show(event: tuple[float, dict[str, Any]]) -> None:
+            self.show.stage(outputs[event[1]["clip"]], event[1]["stage"], event[1]["fraction"])
+
+        self.client.subscribe_topic(self.topic, show)
         try:
             for each in todo:
                 os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
@@ -215,7 +238,7 @@ class _Run:
 
     def _folder(self, item: Item) -> str:
         """Of one clip in the scratch folder."""
-        return os.path.join(self.folder, hashlib.sha256(_key(item, self.output).encode()).hexdigest()[:16])
+        return os.path.join(self.folder, item.mark)
 
     def _submit(self, item: Item, what: str, function: Any, *arguments: Any, **options: Any) -> Any:
         """Of clips that were begun the rest comes first."""

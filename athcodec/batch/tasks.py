@@ -212,6 +212,6 @@ def _reporter(item: Item, topic: str | None) -> Report:
         nonlocal last
         if time.monotonic() - last >= BETWEEN_REPORTS:
             last = time.monotonic()
-            worker.log_event(topic, {"output": item.output, "stage": stage, "fraction": fraction})
+            worker.log_event(topic, {"clip": item.mark, "stage": stage, "fraction": fraction})
 
     return report
