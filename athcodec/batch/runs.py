@@ -36,6 +36,7 @@ SCRATCH = "athcodec-batch"
 SPLIT = 4  # segments
 PATIENCE = 0.25  # seconds between looks at the scheduler
 CONNECTING = 30  # seconds, to a scheduler, and of a scheduler without workers
+ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 LOST = ("scheduler: the connection was lost, expected one until the end; the same command goes on where this one "
         "ended")
 
@@ -105,7 +106,7 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
         show.begin([each.item for each in todo], len(outcome.kept))
         try:
             if todo:
-                with _client(workers, scheduler, len(todo)) as client:
+                with _client(workers, scheduler) as client:
                     _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
         finally:
             _tidy(each.item.output for each in todo)
@@ -159,23 +160,31 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 # ---- workers ----
 
 
+def _cluster(workers: int) -> Any:
+    """Processes on this machine, with one thread each. Raises SchedulerError."""
+    import dask
+    import distributed
+
+    environment = dict(dask.config.get(ENVIRONMENT))
+    environment.pop("MALLOC_TRIM_THRESHOLD_", None)  # arrays would come from the system each time: half as fast
+    private = True if find_spec("cryptography") else None  # TLS: a port that others on the machine cannot use
+    try:
+        with _interrupts_held_back(), dask.config.set({ENVIRONMENT: environment}):
+            return distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, security=private,
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL)
+    except (OSError, RuntimeError) as error:
+        raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
+
+
 @contextmanager
-def _client(workers: int | None, scheduler: str | None, clips: int) -> Iterator[Any]:
+def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die are no news: the manifest tells
     if scheduler is None:
-        private = True if find_spec("cryptography") else None  # TLS: a port that others on the machine cannot use
-        try:
-            with _interrupts_held_back():
-                cluster = distributed.LocalCluster(
-                    n_workers=workers or os.cpu_count() or 1, threads_per_worker=1, processes=True, security=private,
-                    dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
-                    silence_logs=logging.CRITICAL)
-        except (OSError, RuntimeError) as error:
-            raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
-        with cluster, distributed.Client(cluster) as client:
+        with _cluster(workers or os.cpu_count() or 1) as cluster, distributed.Client(cluster) as client:
             yield client
         return
     try:
