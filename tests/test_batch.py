@@ -194,6 +194,24 @@ def test_a_dry_run_says_what_would_be_done_and_writes_nothing(clips, tmp_path, c
     assert not (tmp_path / "out").exists()
 
 
+ASK_WORKER = """
+import os
+from distributed import Client
+from athcodec.batch.runs import _cluster
+if __name__ == "__main__":
+    with _cluster(1) as cluster, Client(cluster) as client:
+        print(cluster.scheduler_address.split(":")[0], client.submit(os.getenv, "MALLOC_TRIM_THRESHOLD_").result())
+"""
+
+
+@pytest.mark.slow
+def test_workers_keep_the_memory_of_their_arrays_and_are_reached_with_a_key(tmp_path):
+    """By itself Dask has them give it back at once, and encoding takes twice the time."""
+    (tmp_path / "ask.py").write_text(ASK_WORKER)
+    done = subprocess.run([sys.executable, str(tmp_path / "ask.py")], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "tls None\n", done.stderr
+
+
 # ---- inputs and settings ----
 
 

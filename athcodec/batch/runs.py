@@ -99,6 +99,7 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
     show = show or Show()
     with (Manifest(manifest or os.path.join(output, MANIFEST)) as notes,
           scratch_folder(os.path.join(output, SCRATCH)) as folder):
+        os.chmod(folder, 0o700)  # workers unpickle what lies there
         todo = []
         for item in items:
             each = _todo(item, notes.records.get(_key(item, output)), redo)
@@ -263,6 +264,7 @@ class _Run:
         except queue.Empty:
             self._check_scheduler()
             return
+        self.seen_workers = time.monotonic()
         item, what, _ = self.pending.pop(future.key)
         result = self._result(future, item)
         if "draft" in result:
