@@ -26,7 +26,7 @@ from athcodec.ath import Thresholds
 from athcodec.errors import ClipError
 from athcodec.files import is_url
 from athcodec.search import EFFORTS
-from athcodec.sources import format_named
+from athcodec.sources import FORMATS, format_named
 from athcodec.transform import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import parse_length, parse_size
 
@@ -154,7 +154,7 @@ def _rate(value: Any) -> float:
 
 
 def _format(value: Any) -> str:
-    return format_named(value).name
+    return format_named(value, FORMATS).name
 
 
 def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:

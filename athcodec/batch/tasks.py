@@ -147,6 +147,10 @@ def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
         return clip
     if hierarchy == "auto" or hierarchy in discovery.METHODS:
         return discovery.with_branches(clip, discovery.find_branches(clip, hierarchy))
+    if hierarchy.lower().endswith(".mtg"):
+        from athcodec.sources.mtg import mtg_branches
+
+        return discovery.with_branches(clip, discovery.Found(*mtg_branches(hierarchy, clip), "file"))
     return discovery.with_branches(clip, discovery.load(hierarchy))
 
 
