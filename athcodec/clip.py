@@ -154,8 +154,8 @@ class MotionClip:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Raises ClipError at the end of the block, also instead of what it raises, where the positions come from a file
-        that somebody has written to since the clip was made."""
+        """Raises ClipError at the end of the block, also instead of what it raises, where the positions come from a
+        file that somebody has written to since the clip was made."""
         try:
             yield
         finally:

@@ -65,8 +65,8 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives, and where that goes by motion, patches of other sizes and a single one too: only a trial
-    tells which of them makes the smallest file."""
+    """What find_branches gives, and where that goes by motion, patches of another size and a single one too: only a
+    trial tells which of them makes the smallest file."""
     found = find_branches(clip)
     if found.method != "motion":
         return [found]
