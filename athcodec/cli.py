@@ -727,8 +727,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
     _source_arguments(verb)
     _coding_arguments(verb)
-    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4); "
-                      "the file is the same whatever their number")
+    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4, "
+                      "fewer for large meshes); the file is the same whatever their number")
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 

@@ -25,11 +25,16 @@ from athcodec.shapes import Shapes
 from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
 
 FINER = 32  # times smaller than the step is that at which one learns
+ROWS_AT_ONCE = 1 << 14  # of coefficients
+WORK_BYTES = 1536 << 20  # that segments in work may take where nobody says how many they are
+SEGMENT_WORK = 8  # times its float32 positions is what a segment takes while it is coded
 
 
-def threads(jobs: int | None) -> int:
-    """Segments, or candidates, that are worked on at once: `jobs`, or as many as there are cores, at most 4."""
-    return jobs or min(4, os.cpu_count() or 1)
+def threads(jobs: int | None, source: Source) -> int:
+    """Segments, or candidates, that are worked on at once: `jobs`, or one per core, at most 4 and few enough for
+    memory."""
+    fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
+    return jobs or max(1, min(4, os.cpu_count() or 1, fit))
 
 
 @dataclass
@@ -82,6 +87,11 @@ class Source:
         below = [self.weights[level >= each] for each in range(levels)]
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
+
+    @property
+    def segment_bytes(self) -> int:
+        """Of the float32 positions of the longest segment."""
+        return 12 * self.clip.vertex_count * max(stop - start for start, stop in self.segments)
 
     def block(self, segment: int) -> np.ndarray:
         """(T, N, 3) positions of a segment as the clip has them."""
@@ -203,19 +213,24 @@ def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> l
     return streams
 
 
-def _level_rows(segment: SegmentMotion, level: int) -> np.ndarray:
-    """All quantised tracks of one level's stream over time, in units of their steps: (rows, frames)."""
-    pieces = segment.plan.pieces
-    slots = []
+def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]:
+    """Second moments over time, (T, T), of those tracks of one level's stream that do not quantise to nothing, in units
+    of their steps, and how many they are; of a segment that was analysed finely, in cosines."""
+    pieces, slots = segment.plan.pieces, []
     for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]),
                           (pieces["low_modes"], pieces["count"], pieces["level"])):
         for piece in np.flatnonzero(at == level):
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
-    coefficients = segment.coefficients[np.concatenate(slots) if slots else np.zeros(0, int)]
-    tracks = segment.tracks[segment.plan.base_level == level]
-    rows = np.concatenate([coefficients.reshape(-1, segment.frames), tracks.reshape(-1, segment.frames)])
-    return rows[np.any(rows, axis=1)] @ segment.cosines
+    chosen = np.concatenate(slots) if slots else np.zeros(0, int)
+    moments, count = np.zeros((segment.frames, segment.frames)), 0
+    parts = (segment.coefficients[chosen[at: at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
+    for part in (*parts, segment.tracks[segment.plan.base_level == level]):
+        rows = part.reshape(-1, segment.frames) / FINER
+        rows = rows[(rows**2).sum(axis=1) > qz.DEAD_ZONE**2]
+        moments += rows.T @ rows
+        count += len(rows)
+    return segment.cosines.T @ moments @ segment.cosines, count
 
 
 def analyse_finely(shape: Shape, settings: Settings, positions: np.ndarray) -> SegmentMotion:
@@ -232,7 +247,7 @@ def _learn_bases(shape: Shape, settings: Settings, positions: np.ndarray) -> dic
     if not levels:
         return {}
     segment = analyse_finely(shape, settings, positions)
-    bases = {level: qz.learn_temporal_basis(_level_rows(segment, level) / FINER, qz.TEMPORAL_TOLERANCE)
+    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE)
              for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
 

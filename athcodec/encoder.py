@@ -90,9 +90,9 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     positions bit for bit, and the rest pose is kept likewise; the bound is that of the level before. weights: a factor
     on the bound for each vertex, (N,) above 0, or the name of the attribute that holds them: vertex v is within
     weights[v] times the bound, the largest of which the file promises for all. attributes: "none" drops faces, edges
-    and named arrays. jobs: threads (default: one per core, at most 4); the file is the same whatever their number,
-    memory grows with it. A clip without branches gets those that discovery.py finds. Raises ClipError, BoundError,
-    ValueError, OSError.
+    and named arrays. jobs: threads (default: one per core, at most 4, fewer for large meshes); the file is the same
+    whatever their number, memory grows with it. A clip without branches gets those that discovery.py finds. Raises
+    ClipError, BoundError, ValueError, OSError.
     """
     report = progress or _silent
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
@@ -442,10 +442,11 @@ class _Job:
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Some segments, coded a few at a time."""
-        with ThreadPoolExecutor(threads(self.jobs)) as pool:
+        at_once = threads(self.jobs, self.source)
+        with ThreadPoolExecutor(at_once) as pool:
             pending: deque[tuple[int, Future]] = deque()
             for index in segments:
-                if len(pending) == threads(self.jobs):
+                if len(pending) == at_once:
                     yield _coded(*pending.popleft())
                 block = self.source.block(index)
                 exact = self.source.exact(block) if self.lossless else None

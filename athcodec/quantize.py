@@ -68,19 +68,18 @@ def rest_step_ratio(relative_bound: float) -> float:
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
 
 
-def learn_temporal_basis(rows: np.ndarray, tolerance: float) -> np.ndarray | None:
-    """Orthonormal rows over time that hold `rows` but for a rest below `tolerance` (mean square per row entry).
+def learn_temporal_basis(moments: np.ndarray, count: int, tolerance: float) -> np.ndarray | None:
+    """Orthonormal rows over time that hold tracks but for a rest below `tolerance` (mean square per number).
 
-    rows: (K, T) tracks in units of their steps. Returns stored integers (rank, T) int32 of TEMPORAL_BITS, or None
-    where no basis smaller than the DCT's would do.
+    moments: (T, T) second moments of `count` tracks in units of their steps. Returns stored integers (rank, T) int32 of
+    TEMPORAL_BITS, or None where no basis smaller than the DCT's would do.
     """
-    frames = rows.shape[1]
-    rows = rows[(rows**2).sum(axis=1) > DEAD_ZONE**2]  # others quantise to nothing
-    if len(rows) <= 1:
+    frames = len(moments)
+    if count <= 1:
         return None
-    values, vectors = np.linalg.eigh(rows.T @ rows)
+    values, vectors = np.linalg.eigh(moments)
     rest = np.cumsum(np.maximum(values, 0.0))  # ascending: what is lost by leaving out the first i + 1
-    rank = frames - int(np.searchsorted(rest, tolerance * rows.size, side="right"))
+    rank = frames - int(np.searchsorted(rest, tolerance * count * frames, side="right"))
     if not 1 <= rank <= frames // 2:
         return None
     basis = np.ascontiguousarray(vectors[:, ::-1][:, :rank].T)

@@ -145,7 +145,7 @@ class Search:
         return counts / counts.sum()
 
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
-        with ThreadPoolExecutor(threads(self.jobs)) as pool:
+        with ThreadPoolExecutor(threads(self.jobs, self.source)) as pool:
             return list(pool.map(self.cost, candidates))
 
     def _with_basis(self, settings: Settings) -> Settings:

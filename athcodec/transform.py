@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from athcodec.shapes import Shapes
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
-SEGMENT_BYTES = 256 << 20
+SEGMENT_BYTES = 128 << 20
 
 
 def decoding_bytes(vertex_count: int, frames: int) -> int:
@@ -41,7 +41,7 @@ def decoding_bytes(vertex_count: int, frames: int) -> int:
 
 def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT,
                    memory: int = 2 << 30) -> list[tuple[int, int]]:
-    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 256 MiB, or where a
+    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 128 MiB, or where a
     decoder would need more than `memory` bytes."""
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
     while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
