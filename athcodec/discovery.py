@@ -41,6 +41,7 @@ IN_ORDER = 0.7  # rank correlation of the source's order with the distance from 
 SMALL = 8  # vertices of a branch whose order is kept in any case
 PATCH_VERTICES = 150  # that a patch of a mesh without other branches has on average
 SMALL_PATCH, LARGE_PATCH, LARGE_MESH = 40, 600, 10_000  # that are tried besides, and vertices from which on the latter
+FREE_PATCHES = (64, 200)  # vertices of patches that hang on nothing
 PATCH_ROUNDS = 8
 MOST_PATCHES = 2000
 CRUMB = 12  # vertices: smaller patches join a neighbour
@@ -65,14 +66,17 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives, and where that goes by motion, patches of another size and a single one too: only a
-    trial tells which of them makes the smallest file."""
+    """What find_branches gives, and where that goes by motion, patches of another size, patches that hang on nothing,
+    and a single one too: only a trial tells which of them makes the smallest file."""
     found = find_branches(clip)
+    if found.method == "skeleton":
+        return [found, dataclasses.replace(found, stem_index=None)]
     if found.method != "motion":
         return [found]
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
-    other = SMALL_PATCH if clip.vertex_count < LARGE_MESH else LARGE_PATCH
-    return [single, found, _by_motion(clip, None, other)]
+    if clip.vertex_count >= LARGE_MESH:
+        return [single, found, _by_motion(clip, None, LARGE_PATCH), _free_patches(clip, FREE_PATCHES[-1])]
+    return [single, found, _by_motion(clip, None, SMALL_PATCH), *(_free_patches(clip, size) for size in FREE_PATCHES)]
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
@@ -239,6 +243,12 @@ def _by_components(clip: MotionClip, root: int | None) -> Found | None:
     if count == 1 or count > COMPONENTS_AT_MOST * clip.vertex_count:
         return None
     return _arranged(clip, label, root, "components")
+
+
+def _free_patches(clip: MotionClip, patch_vertices: int) -> Found:
+    """Patches without parents: what moves as a blend of few poses, as a skin does, stays one in the space of the clip."""
+    patches = _by_motion(clip, None, patch_vertices)
+    return Found(patches.vertex_branch, np.full_like(patches.branch_parent, -1), None, "motion")
 
 
 def _by_motion(clip: MotionClip, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:

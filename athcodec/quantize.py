@@ -13,6 +13,7 @@ from athcodec.errors import BoundError
 DEAD_ZONE = 0.55
 NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of maps: step over the error that is theirs
 NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
+FEW_ROOTS = 4  # whose maps are a few bytes
 NODE_HARM = 1.08  # times a level's error that cheaper maps may cost
 SHAPE_STEP = 0.1  # precision of a learned shape: what it moves in a frame (RMS), in steps
 LEAST_SHAPE = 0.12  # what a shape that is kept moves in a frame (RMS), in steps

@@ -223,10 +223,12 @@ class Search:
         scale = self.source.clip.frame_count / self.sample.shape[2]
         rest = coded.bytes * scale + shape.prelude_bytes
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        roots = int((self.source.hierarchy.branch_parent < 0).sum())
         chosen = limits = None
         for quality in qz.NODE_QUALITIES:
             steps = quality * errors
-            steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
+            if roots <= qz.FEW_ROOTS:
+                steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
             coded.segment.clear_nodes()
             coded.segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:

@@ -151,19 +151,6 @@ def test_a_mesh_of_one_piece_gets_patches_that_move_rigidly(tmp_path):
         assert apart.max() <= result.max_error_bound
 
 
-@pytest.mark.slow
-def test_a_walking_mesh_is_smaller_than_by_pca(tmp_path):
-    from bench.codecs import Source
-    from bench.codecs.coder import RangeCoder
-    from bench.codecs.pca import GlobalPca
-
-    clip = walker(80)
-    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-4, attributes="none", effort="best")
-    source = Source(dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, int),
-                                        branch_parent=np.array([-1]), rest=clip.rest.astype(np.float32)))
-    assert result.bytes < len(GlobalPca(RangeCoder()).encode(source, 1e-4 * source.diagonal))
-
-
 @pytest.mark.parametrize("vertices", [1, 2, 5, 40])
 def test_points_without_any_mesh_are_compressed_too(tmp_path, vertices):
     rng = np.random.default_rng(vertices)

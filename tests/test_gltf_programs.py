@@ -15,14 +15,15 @@ from pathlib import Path
 import numpy as np
 import pygltflib
 import pytest
+from test_gltf import Maker, far, leafy, leafy_ath  # noqa: F401, the fixtures too
+from test_vat import exr
 
 import athcodec
+from athcodec import MotionClip
 from athcodec.excerpt import Excerpt
 from athcodec.exporters import write
 from athcodec.exporters.fitting import quaternions
 from athcodec.sources import read
-from test_gltf import Maker, far, leafy, leafy_ath  # noqa: F401, the fixtures too
-from test_vat import exr
 
 pytestmark = pytest.mark.programs
 SCRIPTS = Path(__file__).resolve().parent / "node"
@@ -210,3 +211,17 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
             stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(tmp_path / "b.glb", times[::10])
             assert far(shown, wanted[::10]) <= decoder.max_error_bound + stated + 1e-6 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("bound", [1e-3, 1e-4])
+def test_an_animal_without_its_joints_is_smaller_than_by_pca(panda, tmp_path, bound):
+    """Against principal components of all trajectories, tuned, with the same entropy coder and corrections."""
+    from bench.codecs import Source
+    from bench.codecs.coder import RangeCoder
+    from bench.codecs.pca import GlobalPca
+
+    positions = panda["positions"].astype(np.float32)
+    clip = MotionClip(positions, np.arange(len(positions)) / 30, faces=panda["faces"])
+    ours = athcodec.encode(clip, tmp_path / "panda.ath", rel_error=bound, attributes="none").bytes
+    source = Source(MotionClip(positions, clip.time, np.zeros(positions.shape[1], int), np.array([-1])))
+    assert ours < len(GlobalPca(RangeCoder()).encode(source, bound * source.diagonal))
