@@ -246,7 +246,7 @@ def _by_components(clip: MotionClip, root: int | None) -> Found | None:
 
 
 def _free_patches(clip: MotionClip, patch_vertices: int) -> Found:
-    """Patches without parents: what moves as a blend of few poses, as a skin does, stays one in the space of the clip."""
+    """Patches without parents: what moves as a blend of few poses, as skins do, stays one in the space of the clip."""
     patches = _by_motion(clip, None, patch_vertices)
     return Found(patches.vertex_branch, np.full_like(patches.branch_parent, -1), None, "motion")
 

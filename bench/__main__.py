@@ -16,6 +16,7 @@ from bench import (
     data,
     decode,
     hierarchy,
+    large,
     levels,
     memory,
     paper,
@@ -32,7 +33,8 @@ from bench import (
 
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
-         "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer}
+         "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
+         "large": large}
 
 
 def main(argv: Sequence[str]) -> int:
