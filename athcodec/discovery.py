@@ -13,8 +13,9 @@ import dataclasses
 import importlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,15 +69,16 @@ class Found:
 def candidates(clip: MotionClip) -> list[Found]:
     """What find_branches gives, and where that goes by motion, patches of another size, patches that hang on nothing,
     and a single one too: only a trial tells which of them makes the smallest file."""
-    found = find_branches(clip)
+    seen = _Seen(clip)
+    found = _first_found(seen, METHODS, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
     if found.method != "motion":
         return [found]
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if clip.vertex_count >= LARGE_MESH:
-        return [single, found, _by_motion(clip, None, LARGE_PATCH), _free_patches(clip, FREE_PATCHES[-1])]
-    return [single, found, _by_motion(clip, None, SMALL_PATCH), *(_free_patches(clip, size) for size in FREE_PATCHES)]
+        return [single, found, _by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
+    return [single, found, _by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
@@ -90,11 +92,37 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
-    for name in METHODS if method == "auto" else (method,):
-        found = _FINDERS[name](clip, root)
-        if found is not None:
-            return found
-    raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
+    found = _first_found(_Seen(clip), METHODS if method == "auto" else (method,), root)
+    if found is None:
+        raise ClipError(f"branches: the clip has nothing to find them by {method}, expected {_EXPECTED[method]}")
+    return found
+
+
+class _Seen:
+    """What the methods look at in a clip, each made once, when it is asked for."""
+
+    def __init__(self, clip: MotionClip):
+        self.clip = clip
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """(1 + k, N, 3) float64: the rest pose and a few frames spread over the clip."""
+        return _sampled(self.clip)
+
+    @cached_property
+    def mesh(self) -> np.ndarray:
+        """(L, 2) pairs of vertices that edges or sides of faces join."""
+        return _links(self.clip)
+
+    @cached_property
+    def links(self) -> np.ndarray:
+        """The same, and what stays at one place."""
+        return _welded(self.clip, self.mesh)
+
+
+def _first_found(seen: _Seen, methods: Sequence[str], root: int | None) -> Found | None:
+    """By the first method that has something to go by; motion always has."""
+    return next((found for found in (_FINDERS[name](seen, root) for name in methods) if found is not None), None)
 
 
 def with_branches(clip: MotionClip, found: Found) -> MotionClip:
@@ -163,8 +191,9 @@ def _stem_order(vertex_branch: np.ndarray, stem_index: np.ndarray | None) -> np.
 # ---- the methods ----
 
 
-def _by_attributes(clip: MotionClip, root: int | None) -> Found | None:
+def _by_attributes(seen: _Seen, root: int | None) -> Found | None:
     """Labels that the source has under a usual name, for vertices or faces, and their parents if it has those too."""
+    clip = seen.clip
     named = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): array for name, array in clip.attributes.items()}
     labels = next((label for label in (_vertex_labels(clip, named.get(name)) for name in LABEL_NAMES)
                    if label is not None), None)
@@ -175,8 +204,8 @@ def _by_attributes(clip: MotionClip, root: int | None) -> Found | None:
     if parents is not None and parents.ndim == 1 and parents.dtype.kind in "iu" and len(parents) > names.max():
         own = parents[names].astype(np.int64)
         parent = np.where(np.isin(own, names), np.searchsorted(names, own).clip(0, len(names) - 1), -1)
-        return _arranged(clip, vertex_branch, root, "attributes", parent)
-    return _arranged(clip, vertex_branch, root, "attributes")
+        return _arranged(seen, vertex_branch, root, "attributes", parent)
+    return _arranged(seen, vertex_branch, root, "attributes")
 
 
 def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:
@@ -194,8 +223,9 @@ def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | N
     return labels if labels.min() >= 0 else None
 
 
-def _by_skeleton(clip: MotionClip, root: int | None) -> Found | None:
+def _by_skeleton(seen: _Seen, root: int | None) -> Found | None:
     """Chains of joints: the vertices whose strongest weights are theirs."""
+    clip = seen.clip
     if clip.skin is None or (clip.skin.vertex_joint >= 0).sum() == 0:
         return None
     joint = clip.skin.vertex_joint.astype(np.int64)
@@ -206,7 +236,7 @@ def _by_skeleton(clip: MotionClip, root: int | None) -> Found | None:
     is_used[names] = True
     parent = np.array([_used_ancestor(int(name), clip.skin.joint_parent, is_used) for name in names])
     parent = np.where(parent < 0, -1, np.searchsorted(names, parent))
-    return _arranged(clip, label, root, "skeleton", parent)
+    return _arranged(seen, label, root, "skeleton", parent)
 
 
 def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
@@ -221,8 +251,9 @@ def _nearest_label(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     return np.where(label >= 0, label, label[label >= 0][tree.query(rest)[1]])
 
 
-def _by_edges(clip: MotionClip, root: int | None) -> Found | None:
+def _by_edges(seen: _Seen, root: int | None) -> Found | None:
     """Stems of a graph of centre lines; not for meshes, whose edges close cycles."""
+    clip = seen.clip
     if clip.edges is None or not len(clip.edges) or clip.polygons is not None:
         return None
     try:
@@ -233,34 +264,36 @@ def _by_edges(clip: MotionClip, root: int | None) -> Found | None:
     return Found(*branches, "edges")
 
 
-def _by_components(clip: MotionClip, root: int | None) -> Found | None:
+def _by_components(seen: _Seen, root: int | None) -> Found | None:
     """Pieces of a mesh that hang together: bark tubes, leaf cards."""
-    links = _links(clip)
-    if not len(links):
+    if not len(seen.mesh):
         return None
-    label = _components(_welded(clip, links), clip.vertex_count)
+    vertex_count = seen.clip.vertex_count
+    label = _components(seen.links, vertex_count)
     count = int(label.max()) + 1
-    if count == 1 or count > COMPONENTS_AT_MOST * clip.vertex_count:
+    if count == 1 or count > COMPONENTS_AT_MOST * vertex_count:
         return None
-    return _arranged(clip, label, root, "components")
+    return _arranged(seen, label, root, "components")
 
 
-def _free_patches(clip: MotionClip, patch_vertices: int) -> Found:
+def _by_motion(seen: _Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
+    """Patches that move rigidly, each on one that it touches."""
+    return _arranged(seen, _patches(seen, patch_vertices), root, "motion")
+
+
+def _free_patches(seen: _Seen, patch_vertices: int) -> Found:
     """Patches without parents: what moves as a blend of few poses, as skins do, stays one in the space of the clip."""
-    patches = _by_motion(clip, None, patch_vertices)
-    return Found(patches.vertex_branch, np.full_like(patches.branch_parent, -1), None, "motion")
+    label = _patches(seen, patch_vertices)
+    return Found(label.astype(np.int32), np.full(label.max() + 1, -1, np.int32), None, "motion")
 
 
-def _by_motion(clip: MotionClip, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
-    """Patches that move rigidly, grown over the mesh, or over near neighbours where there is none."""
-    links = _welded(clip, _links(clip))
-    if not len(links):
-        links = _near_neighbours(clip.rest, 8)
-    label = _rigid_patches(_sampled(clip), links, patch_vertices)
-    return _arranged(clip, label, root, "motion")
+def _patches(seen: _Seen, patch_vertices: int) -> np.ndarray:
+    """(N,) labels of patches grown over the mesh, or over near neighbours where there is none."""
+    links = seen.links if len(seen.links) else _near_neighbours(seen.clip.rest, 8)
+    return _rigid_patches(seen.frames, links, patch_vertices)
 
 
-_FINDERS: dict[str, Callable[[MotionClip, int | None], Found | None]] = {
+_FINDERS: dict[str, Callable[[_Seen, int | None], Found | None]] = {
     "attributes": _by_attributes, "skeleton": _by_skeleton, "edges": _by_edges, "components": _by_components,
     "motion": _by_motion,
 }
@@ -274,16 +307,15 @@ _EXPECTED = {
 # ---- what the methods share ----
 
 
-def _arranged(clip: MotionClip, label: np.ndarray, root: int | None, method: str,
+def _arranged(seen: _Seen, label: np.ndarray, root: int | None, method: str,
               parent: np.ndarray | None = None) -> Found:
     """A tree over the labels, whose vertices run from base to tip."""
-    frames = _sampled(clip)
+    frames, rest = seen.frames, seen.clip.rest
     if parent is None:
         joints = _joints(frames, label, _contacts(frames, label), root)
     else:
-        joints = _joints_of(clip.rest, frames, label, parent)
-    order = _along(clip.rest, label, joints, _welded(clip, _links(clip)))
-    return _found(label, joints.parent, order, method)
+        joints = _joints_of(rest, frames, label, parent)
+    return _found(label, joints.parent, _along(rest, label, joints, seen.links), method)
 
 
 def _found(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: np.ndarray, method: str) -> Found:

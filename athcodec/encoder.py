@@ -209,8 +209,11 @@ def _best_branches(clip: MotionClip, fraction: float) -> Found:
     def size(each: Found) -> float:
         return _trial_size(with_branches(some, each), fraction, clip.frame_count / some.frame_count)
 
-    best = min(found, key=size)
-    return min((best, dataclasses.replace(best, stem_index=None)), key=size)  # the source's order costs nothing to say
+    least, best = min(((size(each), each) for each in found), key=lambda tried: tried[0])
+    if best.stem_index is None or best.method != "motion":
+        return best
+    unordered = dataclasses.replace(best, stem_index=None)  # the source's order costs nothing to say
+    return unordered if size(unordered) < least else best
 
 
 def _trial_size(clip: MotionClip, fraction: float, longer: float) -> float:
