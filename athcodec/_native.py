@@ -71,6 +71,8 @@ _PLAYING = {  # core/ath.h
     "ath_vertex_source": (c_void_p, [c_void_p]),
     "ath_branch_source": (c_void_p, [c_void_p]),
     "ath_times": (c_void_p, [c_void_p]),
+    "ath_clips": (c_void_p, [c_void_p]),
+    "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
     "ath_rest_wide": (None, [c_void_p, c_int, c_void_p, c_size_t]),
     "ath_chunks": (c_void_p, [c_void_p]),
     "ath_fault": (c_int32, [c_void_p]),
@@ -86,7 +88,7 @@ _PLAYING = {  # core/ath.h
     "ath_positions": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_positions_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_matrices_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
-    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
 _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h

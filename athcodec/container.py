@@ -1,7 +1,7 @@
 """The .ath file: the only module that knows byte offsets, checksums and limits (FORMAT.md, "File").
 
 A file is a header, a chunk table and an error table, then the chunks in table order without gaps, so that offsets are
-never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (clip, level, segment, kind),
+never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
 other attributes last. This module packs and parses; what the streams inside mean is the business of entropy.py.
 """
 
@@ -11,7 +11,7 @@ import json
 import math
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import BinaryIO
@@ -20,6 +20,7 @@ import numpy as np
 import zstandard
 
 from athcodec._native import SEGMENT_FRAMES, crc32c
+from athcodec.clip import Span
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -36,16 +37,17 @@ from athcodec.errors import (
 )
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 3
+MAJOR, MINOR = 0, 4
 NO_LEVEL = 255
 OPTIONAL = 0x8000
 
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
+CLIPS = 7
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
 ATTRIBUTE = OPTIONAL | 32
 KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
-              STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
+              CLIPS: "CLIPS", STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
               EXACT: "EXACT", ATTRIBUTE: "ATTRIBUTE"}
 
 _HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
@@ -74,7 +76,8 @@ class Limits:
 
 @dataclass
 class Header:
-    """The fixed header. `max_error` is the promise of the deepest stored level, in scene units."""
+    """The fixed header. `max_error` is the promise of the deepest stored level, in scene units; frames and segments are
+    those of all clips."""
 
     vertex_count: int
     branch_count: int
@@ -84,6 +87,7 @@ class Header:
     full_level_count: int
     max_error: float
     wide: bool = False
+    clip_count: int = 1
     chunk_count: int = 0
     file_length: int = 0
 
@@ -98,7 +102,6 @@ class Chunk:
     length: int
     checksum: int
     offset: int = 0
-    clip: int = 0
 
     @property
     def is_motion(self) -> bool:
@@ -114,7 +117,7 @@ class Chunk:
 def _pack_header(header: Header, checksum: int) -> bytes:
     return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
                         header.branch_count, header.frame_count, header.segment_count, header.level_count,
-                        header.full_level_count, 1, int(header.wide), header.max_error, 0)
+                        header.full_level_count, header.clip_count, int(header.wide), header.max_error, 0)
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
@@ -122,7 +125,7 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
     errors: (levels, segments, 2) of max and RMS error in scene units; the maximum is rounded up to float32.
     """
-    table = b"".join(_CHUNK.pack(c.kind, c.clip, c.level, c.segment, c.length, c.checksum) for c in chunks)
+    table = b"".join(_CHUNK.pack(c.kind, 0, c.level, c.segment, c.length, c.checksum) for c in chunks)
     table += np.ascontiguousarray(_round_up(errors)).astype("<f4").tobytes()
     header.chunk_count = len(chunks)
     header.file_length = _file_length(header, chunks)
@@ -146,7 +149,7 @@ def _round_up(values: np.ndarray) -> np.ndarray:
 
 def _order(chunk: Chunk) -> tuple:
     if chunk.is_motion:
-        return (1, chunk.clip, chunk.level, chunk.segment, chunk.kind)
+        return (1, chunk.level, chunk.segment, chunk.kind)
     if chunk.kind & ~OPTIONAL < 16:
         return (0, chunk.kind & ~OPTIONAL)
     return (2, chunk.kind & ~OPTIONAL)
@@ -163,6 +166,11 @@ class ChunkStore:
         place = self.spool.seek(0, 2)
         self.spool.write(payload)
         self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+
+    def replace(self, kind: int, payload: bytes) -> None:
+        """Another content for the one chunk of this kind."""
+        self.entries = [(chunk, place) for chunk, place in self.entries if chunk.kind != kind]
+        self.add(kind, payload)
 
     def size(self, header: Header) -> int:
         """Bytes of the whole file."""
@@ -181,7 +189,7 @@ class ChunkStore:
 
 
 def _at(chunk: Chunk, offset: int) -> Chunk:
-    return Chunk(chunk.kind, chunk.level, chunk.segment, chunk.length, chunk.checksum, offset, chunk.clip)
+    return Chunk(chunk.kind, chunk.level, chunk.segment, chunk.length, chunk.checksum, offset)
 
 
 class Container:
@@ -229,11 +237,11 @@ class Container:
         (_, _, _, self._checksum, length, chunk_count, vertices, branches, frames, segments, levels, full_levels, clips,
          flags, max_error, reserved) = _HEADER.unpack(front)
         header = Header(vertices, branches, frames, segments, levels, full_levels, max_error, bool(flags & 1),
-                        chunk_count, length)
-        self._check_header(header, clips, flags, reserved)
+                        clips, chunk_count, length)
+        self._check_header(header, flags, reserved)
         return header, front
 
-    def _check_header(self, header: Header, clips: int, flags: int, reserved: int) -> None:
+    def _check_header(self, header: Header, flags: int, reserved: int) -> None:
         limits = self.limits
         for name, value, limit in (("Vertex_Count", header.vertex_count, limits.vertices),
                                    ("Branch_Count", header.branch_count, limits.branches),
@@ -251,7 +259,7 @@ class Container:
             (2 <= header.full_level_count <= 32, "Full_Level_Count", header.full_level_count, "2 to 32"),
             (1 <= header.level_count <= header.full_level_count, "Level_Count", header.level_count,
              "1 to Full_Level_Count"),
-            (clips == 1, "Clip_Count", clips, "1"),
+            (header.clip_count >= 1, "Clip_Count", header.clip_count, "at least 1"),
             (flags < 2, "Flags", flags, "reserved bits 0"),
             (reserved == 0, "Reserved", reserved, "0"),
             (math.isfinite(header.max_error) and header.max_error >= 0, "Max_Error", header.max_error,
@@ -281,9 +289,9 @@ class Container:
     def _parse_chunks(self, table: bytes, offset: int) -> list[Chunk]:
         chunks = []
         for i in range(self.header.chunk_count):
-            kind, clip, level, segment, length, checksum = _CHUNK.unpack_from(table, i * _CHUNK.size)
-            chunk = Chunk(kind, level, segment, length, checksum, offset, clip)
-            self._check_chunk(chunk)
+            kind, reserved, level, segment, length, checksum = _CHUNK.unpack_from(table, i * _CHUNK.size)
+            chunk = Chunk(kind, level, segment, length, checksum, offset)
+            self._check_chunk(chunk, reserved)
             if chunks and self._misplaced(chunks[-1], chunk):
                 raise BadChunkTable(f"chunk table: {chunk}: expected after {chunks[-1]} in file order, each once")
             chunks.append(chunk)
@@ -297,16 +305,16 @@ class Container:
         repeatable = chunk.kind & OPTIONAL and chunk.kind & ~OPTIONAL >= 32
         return _order(chunk) < _order(before) or (_order(chunk) == _order(before) and not repeatable)
 
-    def _check_chunk(self, chunk: Chunk) -> None:
+    def _check_chunk(self, chunk: Chunk, reserved: int) -> None:
         if chunk.kind not in KIND_NAMES and (not chunk.kind & OPTIONAL or chunk.kind ^ OPTIONAL in KIND_NAMES):
             raise UnknownChunk(f"{chunk}: got a required kind that this decoder does not know")
         if chunk.length > self.limits.chunk_bytes:
             raise LimitExceeded(f"{chunk}: got {chunk.length} bytes; the limit is {self.limits.chunk_bytes}")
         level_valid = chunk.level < self.header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
         segment_valid = chunk.segment < (self.header.segment_count if chunk.is_motion else 1)
-        if chunk.clip != 0 or not level_valid or not segment_valid:
-            raise BadChunkTable(f"{chunk}: got clip {chunk.clip}, level {chunk.level}, segment {chunk.segment}; "
-                                f"expected what the header announces")
+        if reserved != 0 or not level_valid or not segment_valid:
+            raise BadChunkTable(f"{chunk}: got level {chunk.level}, segment {chunk.segment}, reserved {reserved}; "
+                                f"expected what the header announces, and 0")
 
     def _check_length(self, strict: bool) -> None:
         expected, got = self.header.file_length, self.available_length
@@ -371,7 +379,7 @@ def truncated_front(container: Container, level: int) -> tuple[bytes, list[Chunk
     errors = container.errors[: level + 1]
     promise = header.max_error if level + 1 == header.full_level_count else float(errors[level, :, 0].max())
     shorter = Header(header.vertex_count, header.branch_count, header.frame_count, header.segment_count, level + 1,
-                     header.full_level_count, promise, header.wide)
+                     header.full_level_count, promise, header.wide, header.clip_count)
     return pack_front(shorter, chunks, errors), chunks
 
 
@@ -380,7 +388,8 @@ def truncated_front(container: Container, level: int) -> tuple[bytes, list[Chunk
 _HIERARCHY = struct.Struct("<ffII")
 _REST = struct.Struct("<BBH3dd")
 _TIME = struct.Struct("<B")
-_TIME_UNIFORM = struct.Struct("<Bdd")
+_STEADY = struct.Struct("<dd")
+_CLIP = struct.Struct("<IIBB")
 _STEMS = struct.Struct("<fBBH")
 _BASIS_LENGTH = struct.Struct("<I")
 _CORRECTIONS = struct.Struct("<f")
@@ -428,21 +437,37 @@ def pack_rest(rest: Rest) -> bytes:
     return _REST.pack(int(rest.exact), int(wide), 0, *rest.origin, rest.step) + rest.stream
 
 
-def pack_steady_time(time: np.ndarray) -> bytes | None:
-    """TIME by the rule that gives the very same times in seconds, (T,) float64; None where no rule does."""
-    index, first = np.arange(len(time)), float(time[0])
-    if len(time) == 1:
-        return _TIME_UNIFORM.pack(0, first, 1.0)
-    if len(time) > 1:
-        steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
-        with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
-            for step in steps:
-                if (first + index * step == time).all():
-                    return _TIME_UNIFORM.pack(0, first, step)
-            for rate in {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}:
-                if (first + index / rate == time).all():
-                    return _TIME_UNIFORM.pack(1, first, rate)
+def pack_steady_time(*times: np.ndarray) -> bytes | None:
+    """TIME by the rule that gives the very same times in seconds, (T,) float64 for each clip; None where none does."""
+    for method in (0, 1):
+        steps = [_steady_step(method, time) for time in times]
+        if None not in steps:
+            pairs = (_STEADY.pack(float(time[0]), step) for time, step in zip(times, steps))
+            return _TIME.pack(method) + b"".join(pairs)
     return None
+
+
+def _steady_step(method: int, time: np.ndarray) -> float | None:
+    if len(time) == 1:
+        return 1.0
+    index, first = np.arange(len(time)), float(time[0])
+    steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
+    if method == 1:
+        steps = {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}
+    with np.errstate(over="ignore", invalid="ignore"):  # a rule that overflows does not give the times
+        fit = (step for step in steps if (first + (index / step if method else index * step) == time).all())
+        return next(fit, None)
+
+
+def pack_clips(spans: Sequence[Span], segment_counts: Sequence[int], seams: Sequence[Sequence[float] | None]) -> bytes:
+    """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32."""
+    entries = []
+    for span, segments, errors in zip(spans, segment_counts, seams):
+        name = span.name.encode()
+        entries.append(_CLIP.pack(span.frame_count, segments, int(span.loop), len(name)) + name)
+        if span.loop:
+            entries.append(_round_up(errors).astype("<f4").tobytes())
+    return b"".join(entries)
 
 
 def pack_time(stream: bytes) -> bytes:

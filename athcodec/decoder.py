@@ -8,6 +8,7 @@ and reads the static data. It never imports the encoder.
 from __future__ import annotations
 
 import builtins
+import copy
 import os
 import threading
 from bisect import bisect_right
@@ -31,6 +32,7 @@ from athcodec.errors import (
     BadChunkTable,
     BadHeader,
     ClipError,
+    ClipUnavailable,
     LevelUnavailable,
     LimitExceeded,
     Truncated,
@@ -58,6 +60,28 @@ class Depth:
 
 
 @dataclass(frozen=True)
+class Clip:
+    """A clip of a file. Frames and segments are numbered over the whole file, one clip after the other.
+
+    seam_errors: for a loop, how well each level of the full file keeps the step from the last frame to the first, the
+    most that any vertex's is off, scene units; empty for others.
+    """
+
+    name: str
+    first_frame: int
+    frame_count: int
+    first_segment: int
+    segment_count: int
+    loop: bool
+    duration: float  # seconds from the first frame to the last
+    seam_errors: tuple[float, ...]
+
+    @property
+    def segments(self) -> range:
+        return range(self.first_segment, self.first_segment + self.segment_count)
+
+
+@dataclass(frozen=True)
 class Affines:
     """What moves as one: per part its branch, vertex range (file order), kind, and 3x4 matrix in absolute positions."""
 
@@ -68,13 +92,15 @@ class Affines:
     matrices: np.ndarray  # (K, 3, 4) float64
 
 
-def open(path, *, strict: bool = False, allow_partial: bool = False, limits: Limits | None = None) -> Decoder:
+def open(path, *, clip: str | None = None, strict: bool = False, allow_partial: bool = False,
+         limits: Limits | None = None) -> Decoder:
     """Opens an .ath file: a path, a URL (remote.py), or a seekable binary file object.
 
-    strict: refuse a file shorter or longer than it says. allow_partial: a damaged level hides itself and those after
-    it instead of raising. Raises a FormatError, or OSError, a RemoteError where it is about a URL.
+    clip: the name of the one to play (default: the first). strict: refuse a file shorter or longer than it says.
+    allow_partial: a damaged level hides itself and those after it instead of raising. Raises a FormatError, or OSError,
+    a RemoteError where it is about a URL, ClipUnavailable.
     """
-    return Decoder(path, strict=strict, allow_partial=allow_partial, limits=limits)
+    return Decoder(path, clip=clip, strict=strict, allow_partial=allow_partial, limits=limits)
 
 
 def _opened(path):
@@ -86,13 +112,17 @@ def _opened(path):
 
 
 class Decoder:
-    """An opened .ath file; a context manager. Positions come in the source's vertex order unless said otherwise."""
+    """One clip of an opened .ath file; a context manager. Positions come in the source's vertex order unless said
+    otherwise; frames, segments, times and errors are those of the clip, counted from its first frame."""
 
-    def __init__(self, path, *, strict: bool = False, allow_partial: bool = False, limits: Limits | None = None):
+    def __init__(self, path, *, clip: str | None = None, strict: bool = False, allow_partial: bool = False,
+                 limits: Limits | None = None):
         self._owned = not hasattr(path, "read")
         self._file = _opened(path) if self._owned else path
         try:
             self._open(strict, allow_partial, limits or Limits())
+            if clip is not None:
+                self._clip = self._clip_named(clip)
         except BaseException:
             self.close()
             raise
@@ -105,7 +135,8 @@ class Decoder:
         self._vertex_source = self._player.vertex_source()
         self.hierarchy = Hierarchy.from_parts(branches["parent"], branches["count"], branches["attach"],
                                               self._vertex_source, self._player.branch_source())
-        self.time = self._player.times()
+        self.clips = self._read_clips()
+        self._clip = self.clips[0]
         self._damaged_from = self._first_damaged_level() if allow_partial else self.container.header.level_count
         self._lock = threading.Lock()
         self._ready: dict[tuple[int, int], player.Segment] = {}  # the segment shown last, by (segment, depth)
@@ -117,6 +148,35 @@ class Decoder:
             raise self._refusal(error, "header") from None
         self._player.build()
 
+    def _read_clips(self) -> tuple[Clip, ...]:
+        """All that the file holds, in its order."""
+        return tuple(Clip(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment,
+                          clip.segment_count, bool(clip.loop), clip.duration,
+                          tuple(self._player.seam_error(index, level) for level in range(self.full_level_count))
+                          if clip.loop else ())
+                     for index, clip in enumerate(self._player.clips()))
+
+    def _clip_named(self, name: str) -> Clip:
+        found = next((clip for clip in self.clips if clip.name == name), None)
+        if found is None:
+            names = ", ".join(repr(clip.name) for clip in self.clips if clip.name)
+            raise ClipUnavailable(f"clip: got {name!r}; expected {names or 'none, the only one has no name'}")
+        return found
+
+    @property
+    def clip(self) -> Clip:
+        """The one that is played."""
+        return self._clip
+
+    def play(self, name: str) -> Decoder:
+        """Another clip of the same file, at the same time as this one: a decoder that shares the file, which is closed
+        with this one. Raises ClipUnavailable."""
+        other = copy.copy(self)
+        other._owned, other._clip, other._ready = False, self._clip_named(name), {}
+        for own in ("time", "segments", "_segment_starts", "metadata"):
+            other.__dict__.pop(own, None)
+        return other
+
     def _refusal(self, error: player.PlayError, where: str) -> Exception:
         """What the core refused, in words."""
         refused = error_class(error.code)
@@ -126,24 +186,25 @@ class Decoder:
                 self.container.payload(chunk)
             where = str(chunk)
         header, limits = self.container.header, self.limits
-        frames = -(-header.frame_count // header.segment_count)
         reasons = {
             BadHeader: f"got Full_Level_Count {header.full_level_count}; expected what the hierarchy has",
             BadChunkTable: f"got {self._absent_chunk()}; expected those of every segment that the hierarchy asks for",
             LimitExceeded: f"got branches too deep; the limit is {limits.hierarchy_depth}" if error.chunk else
-                           f"got {header.vertex_count} vertices in segments of {frames} frames, more than memory is "
-                           f"allowed for; the limit is {limits.memory_bytes}",
+                           f"got {header.vertex_count} vertices and {header.frame_count} frames in "
+                           f"{header.segment_count} segments, of which one needs more memory than is allowed; the "
+                           f"limit is {limits.memory_bytes}",
         }
         return refused(f"{where}: {reasons.get(refused, 'got content that does not decode; expected a valid stream')}")
 
     def _absent_chunk(self) -> str:
         """The first chunk that the table lacks as far as it tells by itself."""
-        for kind in (ct.HIERARCHY, ct.REST, ct.TIME):
+        header = self.container.header
+        for kind in (*((ct.CLIPS,) if header.clip_count > 1 else ()), ct.HIERARCHY, ct.REST, ct.TIME):
             if self.container.find(kind) is None:
                 return f"no {ct.KIND_NAMES[kind]}"
         for (kind, level), count in Counter((c.kind, c.level) for c in self.container.chunks if c.is_motion).items():
-            if kind not in (ct.CORRECTIONS, ct.SHAPES) and count < len(self.segments):
-                segment = next(i for i in range(len(self.segments)) if self.container.find(kind, level, i) is None)
+            if kind not in (ct.CORRECTIONS, ct.SHAPES) and count < header.segment_count:
+                segment = next(i for i in range(header.segment_count) if self.container.find(kind, level, i) is None)
                 return f"no {ct.KIND_NAMES[kind]} of level {level}, segment {segment}"
         return "other chunks"
 
@@ -176,7 +237,12 @@ class Decoder:
 
     @property
     def frame_count(self) -> int:
-        return self.container.header.frame_count
+        return self._clip.frame_count
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """Seconds, (T,) float64."""
+        return self._player.times()[self._clip.first_frame: self._clip.first_frame + self._clip.frame_count]
 
     @property
     def branch_count(self) -> int:
@@ -210,7 +276,7 @@ class Decoder:
     @cached_property
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
-        return balanced_segments(self.frame_count, self.container.header.segment_count)
+        return balanced_segments(self.frame_count, self._clip.segment_count)
 
     @cached_property
     def _segment_starts(self) -> list[int]:
@@ -286,7 +352,7 @@ class Decoder:
         starts = np.array(self.segments)
         frames = starts[:, 1] - starts[:, 0]
         result = []
-        for depth, errors in enumerate(self.container.errors):
+        for depth, errors in enumerate(self.container.errors[:, self._clip.segments]):
             rms = float(np.sqrt((errors[:, 1] ** 2 * frames).sum() / frames.sum()))
             result.append(Depth(depth, self.nodes_at(depth), self.container.level_end(depth),
                                 float(errors[:, 0].max()), rms, self.available(depth)))
@@ -296,7 +362,7 @@ class Decoder:
         """The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of
         view of `fov` (radians) on a screen of `height` pixels, is at most `pixels`; the deepest where none is.
         """
-        return self._player.depth_for(distance, fov, height, pixels)
+        return self._player.depth_for(self._clip.segments, distance, fov, height, pixels)
 
     def table1(self) -> dict:
         """The paper's table 1: depth, nodes, leaves and the four parameters of the ATH."""
@@ -311,11 +377,14 @@ class Decoder:
     def info(self) -> dict:
         """What `athcodec info --json` prints."""
         return {
-            "vertices": self.vertex_count, "frames": self.frame_count, "fps": self.fps, "branches": self.branch_count,
-            "segments": len(self.segments), "nodes": self._player.info.node_count, "bytes": self.file_length,
+            "vertices": self.vertex_count, "frames": self.container.header.frame_count, "fps": self.fps,
+            "branches": self.branch_count, "segments": self.container.header.segment_count, "nodes": self._player.info.node_count, "bytes": self.file_length,
             "available_bytes": self.container.available_length, "max_error_bound": self.max_error_bound,
             "complete": self.complete, "levels": self.level_count, "full_levels": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
+            "clips": [{"name": clip.name, "frames": clip.frame_count, "segments": clip.segment_count,
+                       "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors)}
+                      for clip in self.clips],
             "depths": [{"depth": d.depth, "nodes": d.nodes, "bytes": d.bytes, "max_error": d.max_error,
                         "rms_error": d.rms_error, "available": d.available} for d in self.depths],
         }
@@ -397,9 +466,12 @@ class Decoder:
 
     @cached_property
     def metadata(self) -> dict:
-        """Unit, up axis and whatever else the source said of itself."""
+        """Unit, up axis and whatever else the source said of itself, this clip's own in place of those for all."""
         chunk = self.container.find(ct.METADATA)
-        return ct.parse_metadata(self._payload(chunk), self.limits) if chunk else {}
+        metadata = ct.parse_metadata(self._payload(chunk), self.limits) if chunk else {}
+        own = metadata.pop("clips", None) if len(self.clips) > 1 else None
+        own = own.get(self._clip.name) if isinstance(own, dict) else None
+        return metadata | own if isinstance(own, dict) else metadata
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
@@ -459,9 +531,13 @@ class Decoder:
     def _work(self) -> player.Work:
         return player.Work(self._player.work_size())
 
+    def _in_file(self, segment: int) -> int:
+        """A segment of the clip, counted over the whole file."""
+        return self._clip.first_segment + segment
+
     @contextmanager
     def _prepared(self, segment: int, depth: int) -> Iterator[player.Segment]:
-        """A segment ready to be shown, for the caller alone. Raises a FormatError, or LevelUnavailable."""
+        """A segment of the file ready to be shown, for the caller alone. Raises a FormatError, or LevelUnavailable."""
         with self._lock:
             ready = self._ready.pop((segment, depth), None)
             if ready is None:
@@ -502,14 +578,14 @@ class Decoder:
         segments = self._segments_within(first, last)
         if len(segments) > 1:
             with self._lock:
-                self.container.prefetch(self._player.missing(depth, segments[0], segments[-1]))
+                self.container.prefetch(self._player.missing(depth, *map(self._in_file, (segments[0], segments[-1]))))
         return segments
 
     def _show(self, segment: int, depth: int, start: int, out: np.ndarray) -> None:
         """Fills `out`, (k, N, 3) float32 or float64, with the frames from `start` on, in the source's order."""
-        with self._prepared(segment, depth) as ready:
-            for i, frame in enumerate(out):
-                self._player.positions(ready, start + i, frame)
+        with self._prepared(self._in_file(segment), depth) as ready:
+            for i, frame in enumerate(out, self._clip.first_frame + start):
+                self._player.positions(ready, i, frame)
 
     def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
@@ -543,9 +619,10 @@ class Decoder:
         parts = self._player.cut(depth)
         nodes, stems = parts[parts["branch"] >= 0], self._exact_branches(parts)
         positions = np.empty((self.vertex_count, 3))
-        with self._prepared(self._segment_of(frame), depth) as ready:
-            node_matrices = self._player.matrices(ready, frame, len(nodes))
-            self._player.positions(ready, frame, positions, player.FILE_ORDER)
+        with self._prepared(self._in_file(self._segment_of(frame)), depth) as ready:
+            in_file = self._clip.first_frame + frame
+            node_matrices = self._player.matrices(ready, in_file, len(nodes))
+            self._player.positions(ready, in_file, positions, player.FILE_ORDER)
         try:
             maps = stem_maps(self.hierarchy, self._player.rest(), positions[None])
         except np.linalg.LinAlgError:
@@ -596,7 +673,7 @@ class Decoder:
             _ = self.metadata, self.faces, self.edges, self.attributes
         except ClipError as error:
             raise BadChunk(f"static data: {error}") from None
-        for segment in range(len(self.segments)):
+        for segment in range(self.container.header.segment_count):
             for depth in range(self.level_count):
                 with self._prepared(segment, depth):
                     pass

@@ -57,6 +57,18 @@ class LevelSummary:
 
 
 @dataclass(frozen=True)
+class Seam:
+    """Where a loop begins again: the largest way of any vertex from the source's last frame to its first (`step`), and
+    from frame to frame beside that (`step_beside`, which it resembles in a seamless loop); how far off the file's step is
+    at most (`error`). Scene units."""
+
+    clip: str
+    step: float
+    step_beside: float
+    error: float
+
+
+@dataclass(frozen=True)
 class Summary:
     """What `encode` made."""
 
@@ -69,6 +81,7 @@ class Summary:
     depths: list[LevelSummary]
     chunk_bytes: dict[str, int]
     choices: dict
+    seams: tuple[Seam, ...] = ()
 
     @property
     def ratio(self) -> float:
@@ -91,8 +104,9 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     on the bound for each vertex, (N,) above 0, or the name of the attribute that holds them: vertex v is within
     weights[v] times the bound, the largest of which the file promises for all. attributes: "none" drops faces, edges
     and named arrays. jobs: threads (default: one per core, at most 4, fewer for large meshes); the file is the same
-    whatever their number, memory grows with it. A clip without branches gets those that discovery.py finds. Raises
-    ClipError, BoundError, ValueError, OSError.
+    whatever their number, memory grows with it. A clip without branches gets those that discovery.py finds. Several
+    clips of one plant go into one file when they have been joined (joining.py). Raises ClipError, BoundError, ValueError,
+    OSError.
     """
     report = progress or _silent
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
@@ -204,7 +218,7 @@ def _best_branches(clip: MotionClip, fraction: float) -> Found:
         return found[0]
     start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
     stop = min(clip.frame_count, start + TRIAL_FRAMES)
-    some = MotionClip(clip.block(start, stop), clip.time[start:stop], rest=clip.rest.astype(clip.rest_dtype))
+    some = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.rest.astype(clip.rest_dtype))
 
     def size(each: Found) -> float:
         return _trial_size(with_branches(some, each), fraction, clip.frame_count / some.frame_count)
@@ -256,10 +270,11 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
     return dataclasses.replace(clip, attributes=attributes, metadata=metadata, rest=rest), values
 
 
-def time_chunk(time: np.ndarray) -> bytes:
-    """Content of TIME for times in seconds, (T,), exactly: by a rule where one gives the very same numbers."""
-    steady = ct.pack_steady_time(time)
-    return steady or ct.pack_time(entropy.encode_times(np.ascontiguousarray(time, np.float64)))
+def time_chunk(*times: np.ndarray) -> bytes:
+    """Content of TIME for times in seconds, (T,) for each clip, exactly: by rules where these give the very same
+    numbers."""
+    steady = ct.pack_steady_time(*times)
+    return steady or ct.pack_time(entropy.encode_times(np.concatenate(times).astype(np.float64)))
 
 
 def _relative_bound(fraction: float | None, job: _Job) -> float:
@@ -396,6 +411,11 @@ class _Job:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
+        if any(span.loop for span in self.clip.spans):
+            with Decoder(out, strict=True) as decoder:
+                result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
+            out.seek(0)
+            chunks = result.store.write(out, result.header, result.errors)
         with Decoder(out, strict=True) as decoder:  # before the file gets its name
             summary = _summary(Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
@@ -409,18 +429,55 @@ class _Job:
             store.add(ct.SHAPES, stream, level)
         errors = self._add_motion(store, shape, coded)
         self._add_static(store)
+        if self.clip.spans:
+            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.spans)))
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
                            self.segment_count, len(errors), len(errors),
                            0.0 if self.lossless else self.source.largest_bound(decided.settings.bound),
-                           self.clip.dtype == np.float64)
+                           self.clip.dtype == np.float64, len(self.clip.span_frames))
         return _Result(store, header, errors)
+
+    def _clips(self, seam_errors: Sequence[np.ndarray]) -> bytes:
+        return ct.pack_clips(self.clip.spans, [len(segments) for segments in self.source.span_segments], seam_errors)
+
+    def _seam_errors(self, decoder: Decoder) -> list[np.ndarray]:
+        """Of each clip, if it is a loop: how far off its step from the last frame to the first is, (levels,)."""
+        errors = [np.zeros(decoder.level_count) for _ in self.clip.spans]
+        for own, clip, (start, stop) in zip(errors, decoder.clips, self.clip.span_frames):
+            if clip.loop:
+                own[:] = self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start))
+        return errors
+
+    @staticmethod
+    def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
+        errors = []
+        for level in range(loop.level_count):
+            last, first = (loop.positions(frame, level, np.float64) for frame in (-1, 0))
+            errors.append(np.linalg.norm(first - last - step, axis=1).max())
+        return errors
+
+    def _step(self, frame: int, following: int) -> np.ndarray:
+        """Ways of the vertices from one frame of the source to another, (N, 3) float64."""
+        before, after = (self.clip.block(each, each + 1)[0].astype(np.float64) for each in (frame, following))
+        return after - before
+
+    def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
+        """Of the loops of the file just written."""
+        seams = []
+        for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames):
+            if clip.loop:
+                beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
+                step, *steps = (np.linalg.norm(self._step(*frames), axis=1).max()
+                                for frames in [(stop - 1, start), *beside])
+                seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
+        return tuple(seams)
 
     def _add_prelude(self, store: ct.ChunkStore, shape: Shape, ath: Ath) -> None:
         limits = ath.thresholds
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
                                                   shape.hierarchy_stream))
         store.add(ct.REST, ct.pack_rest(shape.rest_chunk))
-        store.add(ct.TIME, time_chunk(self.clip.time))
+        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.span_frames)))
         metadata = self.clip.metadata if self.keep_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
         if metadata:
@@ -538,4 +595,5 @@ def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: 
                "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, settings.largest_bound,
-                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices)
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices,
+                   job.seams(decoder))

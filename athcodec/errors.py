@@ -74,6 +74,10 @@ class LevelUnavailable(AthError, LookupError):
     """A level or frame was asked for that the file, or what is there of it, does not hold."""
 
 
+class ClipUnavailable(AthError, LookupError):
+    """A clip was asked for by a name that none of the file's has."""
+
+
 class RemoteError(AthError, OSError):
     """Bytes behind a URL cannot be had, or are no longer those of the file that was opened."""
 

@@ -51,11 +51,18 @@ class Info(Structure):
     """ath_info."""
 
     _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
-                ("origin", c_double * 3), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count level_count "
-                                              "full_level_count node_count chunk_count wide").split()]
+                ("origin", c_double * 3)]
+    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
+                                              "level_count full_level_count node_count chunk_count wide").split()]
     _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lam", c_uint32),
                  ("rest_wide", c_int32)]
+
+
+class Clip(Structure):
+    """ath_clip."""
+
+    _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
+    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
 
 
 class Chunk(Structure):
@@ -148,8 +155,15 @@ class File:
         return self._array(lib.ath_vertex_source(self._file), "<i4", self.info.vertex_count)
 
     def times(self) -> np.ndarray:
-        """Seconds, (T,) float64."""
+        """Seconds, (T,) float64, of all clips."""
         return self._array(lib.ath_times(self._file), "<f8", self.info.frame_count)
+
+    def clips(self) -> list[Clip]:
+        """In memory of the file."""
+        return ctypes.cast(lib.ath_clips(self._file), POINTER(Clip))[: self.info.clip_count]
+
+    def seam_error(self, clip: int, level: int) -> float:
+        return lib.ath_seam_error(self._file, clip, level)
 
     def rest(self, order: int = FILE_ORDER) -> np.ndarray:
         """(N, 3) float64."""
@@ -213,6 +227,6 @@ class File:
                                           out.ctypes.data, 12 * out.itemsize))
         return out
 
-    def depth_for(self, distance: float, fov: float, height: float, pixels: float, segment: int = -1) -> int:
-        """The coarsest level whose error, seen from afar, is at most `pixels`."""
-        return lib.ath_depth_for(self._file, segment, distance, fov, height, pixels)
+    def depth_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
+        """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
+        return lib.ath_depth_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)

@@ -329,14 +329,14 @@ static double offset_of(int instance)
 /* One second at TICKS pictures a second. */
 static double show_crowd(const crowd *crowd)
 {
-    double start = now_ms(), loop = crowd->clip->info.duration;
+    double start = now_ms(), loop = ath_clips(crowd->clip->file)->duration;
     size_t at = 0;
     for (int tick = 0; tick < TICKS; tick++)
         for (int i = 0; i < crowd->count; i++) {
             const level_run *run = crowd->runs + crowd->levels[i % crowd->level_count];
             float *out;
             double seconds = (double)tick / TICKS + loop * offset_of(i);
-            double frame = ath_frame_at(crowd->clip->file, seconds, ATH_LOOP);
+            double frame = ath_frame_at(crowd->clip->file, 0, seconds, ATH_LOOP);
             if (at + run->shown_floats > crowd->ring_floats) at = 0;
             out = crowd->ring + at;
             write_matrices(crowd->clip, run->segments, frame, out, out + run->matrix_floats);

@@ -104,6 +104,30 @@ def full_clip():
 
 
 @pytest.fixture(scope="session")
+def medley_clips():
+    """Motions of one plant by name: a loop of 20 frames, one of 37 at another rate with uneven steps, one of a single
+    frame, and a loop that was blended."""
+    clip = awkward(seed=7, branches=9, longest=8, frames=90, roots=1, shape="stem", motion="sway")
+
+    def part(start, stop, time):
+        return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent, stem_index=clip.stem_index,
+                          rest=clip.rest.astype(clip.rest_dtype), metadata={"unit": "m", "from": start})
+
+    return {"calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
+            "Böe": part(20, 57, np.sort(np.random.default_rng(2).random(37)) + np.arange(37) / 24),
+            "still": part(57, 58, np.array([2.5])),
+            "round": athcodec.looped(part(50, 90, np.arange(40) / 30), blend=8)}
+
+
+@pytest.fixture(scope="session")
+def medley_ath(medley_clips, tmp_path_factory):
+    """All of them in one file, in segments of up to 16 frames."""
+    path = tmp_path_factory.mktemp("medley") / "medley.ath"
+    athcodec.encode(athcodec.join(medley_clips), path, rel_error=1e-4, segment_frames=16)
+    return path
+
+
+@pytest.fixture(scope="session")
 def full_ath(full_clip, tmp_path_factory):
     """The full clip in two segments."""
     path = tmp_path_factory.mktemp("full") / "full.ath"

@@ -21,17 +21,22 @@ from athcodec._library import load_library
 OK, BAD_CHECKSUM, LIMIT_EXCEEDED = 0, 5, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
 FILE_ORDER, SOURCE_ORDER = 0, 1
-CLAMP, LOOP, PING_PONG = 0, 1, 2
+CLAMP, LOOP, PING_PONG, AS_MARKED = 0, 1, 2, 3
 GUARD = 0xA5
 
 
 class Info(ctypes.Structure):
     _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
-                ("origin", c_double * 3), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count "
+                ("origin", c_double * 3)]
+    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
                                               "level_count full_level_count node_count chunk_count wide").split()]
     _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lambda_", c_uint32),
                  ("rest_wide", c_int32)]
+
+
+class Clip(ctypes.Structure):
+    _fields_ = [("name", c_char_p), ("duration", c_double)]
+    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
 
 
 class Limits(ctypes.Structure):
@@ -67,8 +72,11 @@ _SIGNATURES = {
     "ath_get_info": (None, [c_void_p, POINTER(Info)]),
     "ath_vertex_source": (POINTER(c_int32), [c_void_p]),
     "ath_times": (POINTER(c_double), [c_void_p]),
+    "ath_clips": (POINTER(Clip), [c_void_p]),
+    "ath_clip_named": (c_int32, [c_void_p, c_char_p]),
+    "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
     "ath_rest": (None, [c_void_p, c_int, c_void_p, c_size_t]),
-    "ath_level_error": (None, [c_void_p, c_int32, c_int32, POINTER(c_double), POINTER(c_double)]),
+    "ath_level_error": (None, [c_void_p, c_int32, c_int32, c_int32, POINTER(c_double), POINTER(c_double)]),
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_segment_of": (c_int32, [c_void_p, c_int32]),
     "ath_chunks": (POINTER(Chunk), [c_void_p]),
@@ -87,13 +95,13 @@ _SIGNATURES = {
     "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_segment_index": (c_int32, [c_void_p]),
     "ath_segment_level": (c_int32, [c_void_p]),
-    "ath_frame_at": (c_double, [c_void_p, c_double, c_int]),
+    "ath_frame_at": (c_double, [c_void_p, c_int32, c_double, c_int]),
     "ath_blend_at": (Blend, [c_void_p, c_double]),
     "ath_positions": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
     "ath_positions_wide": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
     "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
     "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
-    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
 }
 
 
@@ -169,6 +177,19 @@ class Player:
     def segments(self) -> range:
         return range(self.info.segment_count)
 
+    @property
+    def clips(self) -> list[Clip]:
+        return core.ath_clips(self.address)[: self.info.clip_count]
+
+    def times_of(self, clip: Clip) -> np.ndarray:
+        times = np.ctypeslib.as_array(core.ath_times(self.address), (self.info.frame_count,))
+        return times[clip.first_frame: clip.first_frame + clip.frame_count]
+
+    def after(self, frame: int) -> int:
+        """The frame that it blends into: behind the last one of a clip that is the clip's first."""
+        clip = next(each for each in self.clips if frame < each.first_frame + each.frame_count)
+        return frame + 1 if frame + 1 < clip.first_frame + clip.frame_count else clip.first_frame
+
     def start_of(self, segment: int) -> int:
         return core.ath_segment_start(self.address, segment)
 
@@ -227,9 +248,9 @@ def pointers(prepared: list[Memory]):
     return (c_void_p * max(len(prepared), 1))(*[memory and memory.address for memory in prepared])
 
 
-@pytest.fixture(scope="module", params=["sample", "bushy", "full"])
+@pytest.fixture(scope="module", params=["sample", "bushy", "full", "medley"])
 def data(request) -> bytes:
-    """Three segments of a tree, four of a random plant on two roots, two of a plant with uneven times."""
+    """Three segments of a tree, four of a random plant on two roots, two of a plant with uneven times, four clips."""
     return request.getfixturevalue(f"{request.param}_ath").read_bytes()
 
 
@@ -489,7 +510,7 @@ def test_between_two_frames_is_their_blend_forwards_and_backwards(player):
         scale = np.abs(whole).max()
         for place, shown in zip(places, forwards):
             i = int(place)
-            j = (i + 1) % player.info.frame_count
+            j = player.after(i)
             blended = whole[i] + (whole[j] - whole[i]) * (place - i)
             assert np.allclose(shown, blended, rtol=0, atol=1e-6 * scale)
 
@@ -577,13 +598,16 @@ def test_without_a_segment_that_has_the_frame_nothing_is_written(player):
 # ---- time ----
 
 
-def frame_at(player: Player, seconds: float, wrap: int) -> float:
-    return core.ath_frame_at(player.address, seconds, wrap)
+def frame_at(player: Player, clip: int, seconds: float, wrap: int) -> float:
+    """Counted from the clip's first."""
+    return core.ath_frame_at(player.address, clip, seconds, wrap) - player.clips[clip].first_frame
 
 
 def expected_frame(times: np.ndarray, seconds: float, wrap: int) -> float:
     """The same in other words: unrolled tracks of frames over time, looked up by interpolation."""
     last = len(times) - 1
+    if last == 0:
+        return 0
     length, step = times[-1], times[-1] / last
     if wrap == CLAMP:
         return np.interp(seconds, times, np.arange(last + 1))
@@ -595,31 +619,56 @@ def expected_frame(times: np.ndarray, seconds: float, wrap: int) -> float:
 
 @pytest.mark.parametrize("wrap", [CLAMP, LOOP, PING_PONG], ids=["clamp", "loop", "ping-pong"])
 def test_time_is_clamped_looped_or_turned_back_with_uneven_steps_too(wrap, player):
-    times = np.ctypeslib.as_array(core.ath_times(player.address), (player.info.frame_count,))
-    times = times - times[0]
-    assert player.info.duration == times[-1]
-    for i in range(player.info.frame_count - 1):
-        assert frame_at(player, times[i], wrap) == i, "frames are hit exactly"
-    for seconds in np.linspace(-3.3, 4.1, 500) * times[-1]:
-        expected = expected_frame(times, seconds, wrap)
-        assert frame_at(player, seconds, wrap) == pytest.approx(expected, abs=1e-6)
-    for seconds in (float("nan"), float("inf"), float("-inf"), 1e300, -1e300):
-        assert 0 <= frame_at(player, seconds, wrap) <= player.info.frame_count - 1
+    for index, clip in enumerate(player.clips):
+        times = player.times_of(clip)
+        times = times - times[0]
+        assert clip.duration == times[-1]
+        for i in range(clip.frame_count - 1):
+            assert frame_at(player, index, times[i], wrap) == i, "frames are hit exactly"
+        for seconds in np.linspace(-3.3, 4.1, 500) * times[-1]:
+            expected = expected_frame(times, seconds, wrap)
+            assert frame_at(player, index, seconds, wrap) == pytest.approx(expected, abs=1e-6)
+            assert 0 <= frame_at(player, index, seconds, wrap) < clip.frame_count, "that of another clip"
+        for seconds in (float("nan"), float("inf"), float("-inf"), 1e300, -1e300):
+            assert 0 <= frame_at(player, index, seconds, wrap) <= clip.frame_count - 1
+
+
+def test_a_clip_that_is_a_loop_is_played_as_one_where_its_mark_decides(player):
+    for index, clip in enumerate(player.clips):
+        for seconds in np.linspace(0, 3, 50) * clip.duration:
+            marked = frame_at(player, index, seconds, LOOP if clip.loop else CLAMP)
+            assert frame_at(player, index, seconds, AS_MARKED) == marked
+
+
+def test_clips_are_found_by_name_and_follow_each_other(player):
+    frame = segment = 0
+    for index, clip in enumerate(player.clips):
+        assert core.ath_clip_named(player.address, clip.name) == index
+        assert (clip.first_frame, clip.first_segment) == (frame, segment)
+        frame, segment = frame + clip.frame_count, segment + clip.segment_count
+        assert player.start_of(clip.first_segment) == clip.first_frame
+    assert (frame, segment) == (player.info.frame_count, player.info.segment_count)
+    for nobody in (b"nobody", b"calm ", b"cal"):
+        assert core.ath_clip_named(player.address, nobody) == -1
 
 
 def test_the_times_of_the_uneven_clip_are_uneven(uneven):
-    times = np.ctypeslib.as_array(core.ath_times(uneven.address), (uneven.info.frame_count,))
+    times = uneven.times_of(uneven.clips[0])
     assert np.ptp(np.diff(times)) > 1e-4
 
 
 def test_a_loop_blends_the_last_frame_into_the_first(player):
-    last = player.info.frame_count - 1
-    step = player.info.duration / last
-    place = frame_at(player, player.info.duration + step / 4, LOOP)
-    blend = core.ath_blend_at(player.address, place)
-    assert tuple(blend.frame) == (last, 0) and blend.weight == pytest.approx(0.25)
-    assert tuple(blend.segment) == (player.segments[-1], 0)
-    assert frame_at(player, player.info.duration + step / 4, CLAMP) == last
+    for index, clip in enumerate(player.clips):
+        if clip.frame_count == 1:
+            continue
+        last = clip.frame_count - 1
+        step = clip.duration / last
+        place = core.ath_frame_at(player.address, index, clip.duration + step / 4, LOOP)
+        blend = core.ath_blend_at(player.address, place)
+        assert tuple(blend.frame) == (clip.first_frame + last, clip.first_frame)
+        assert blend.weight == pytest.approx(0.25)
+        assert tuple(blend.segment) == (clip.first_segment + clip.segment_count - 1, clip.first_segment)
+        assert frame_at(player, index, clip.duration + step / 4, CLAMP) == last
 
 
 def test_a_blend_names_the_segments_of_its_frames(player):
@@ -636,22 +685,22 @@ def test_a_blend_names_the_segments_of_its_frames(player):
 
 
 def test_a_distance_asks_for_the_coarsest_level_whose_error_is_not_seen(player):
-    def depth_for(segment, distance, pixels=1.0):
-        return core.ath_depth_for(player.address, segment, distance, 1.0, 1080.0, pixels)
+    def depth_for(segments, distance, pixels=1.0):
+        return core.ath_depth_for(player.address, *segments, distance, 1.0, 1080.0, pixels)
 
-    for segment in (-1, *player.segments):
+    for segments in ((0, player.segments[-1]), *((each, each) for each in player.segments)):
         error = c_double()
         worst = []
         for level in player.levels:
-            core.ath_level_error(player.address, level, segment, byref(error), None)
+            core.ath_level_error(player.address, level, *segments, byref(error), None)
             worst.append(error.value)
         unit = 1080 / (2 * np.tan(0.5))
         distances = np.geomspace(worst[-1] * unit / 10, worst[0] * unit * 10, 200)
-        depths = [depth_for(segment, distance) for distance in distances]
+        depths = [depth_for(segments, distance) for distance in distances]
         for distance, depth in zip(distances, depths):
             under = [level for level in player.levels if worst[level] * unit / distance <= 1.0]
             assert depth == (under[0] if under else player.levels[-1])
-            assert depth_for(segment, distance, 0.5) >= depth
+            assert depth_for(segments, distance, 0.5) >= depth
         assert (np.diff(depths) <= 0).all() and (depths[0], depths[-1]) == (player.levels[-1], 0)
         for nowhere in (0.0, -1.0, float("nan")):
-            assert depth_for(segment, nowhere) == player.levels[-1]
+            assert depth_for(segments, nowhere) == player.levels[-1]

@@ -74,11 +74,16 @@ class Info(ctypes.Structure):
     """The front of ath_info."""
 
     _fields_ = [(name, ctypes.c_uint64) for name in ("file_length", "prelude_length")]
-    _fields_ += [("max_error", c_double), ("origin", c_double * 3), ("duration", c_double)]
+    _fields_ += [("max_error", c_double), ("origin", c_double * 3)]
     _fields_ += [(name, c_int32) for name in (
-        "vertex_count", "branch_count", "frame_count", "segment_count", "level_count", "full_level_count",
-        "node_count", "chunk_count", "wide")]
+        "vertex_count", "branch_count", "frame_count", "segment_count", "clip_count", "level_count",
+        "full_level_count", "node_count", "chunk_count", "wide")]
     _fields_ += [("more", c_int32 * 16)]
+
+
+class Clip(ctypes.Structure):
+    _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
+    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
 
 
 class Native:
@@ -88,9 +93,10 @@ class Native:
         self.lib = load_library()
         for name in ("ath_build_size", "ath_work_size", "ath_segment_size"):
             getattr(self.lib, name).restype = c_size_t
-        for name in ("ath_times", "ath_branches"):
+        for name in ("ath_times", "ath_branches", "ath_clips"):
             getattr(self.lib, name).restype = c_void_p
-        self.lib.ath_frame_at.restype = c_double
+        for name in ("ath_frame_at", "ath_seam_error"):
+            getattr(self.lib, name).restype = c_double
         self.kept = [create_string_buffer(data, len(data))]
         front, size = c_size_t(), c_size_t()
         assert self.lib.ath_front(self.kept[0], c_size_t(len(data)), None, byref(front), byref(size)) == OK
@@ -135,9 +141,10 @@ class Native:
         name = "ath_positions" if dtype == np.float32 else "ath_positions_wide"
         return self.show(name, (self.info.vertex_count, 3), dtype, segments, frame, c_int(order))
 
-    def level_error(self, level: int, segment: int) -> dict:
+    def level_error(self, level: int, first: int) -> dict:
+        last = self.info.segment_count - 1
         most, rms = c_double(), c_double()
-        self.lib.ath_level_error(self.file, level, segment, byref(most), byref(rms))
+        self.lib.ath_level_error(self.file, level, first, last, byref(most), byref(rms))
         return {"max": most.value, "rms": rms.value}
 
 
@@ -181,10 +188,10 @@ def learned_chunks(data: bytes) -> int:
     return learned
 
 
-@pytest.fixture(scope="module", params=["sample", "bushy", "uneven", "wide", "exact rest", "key-framed"])
-def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath):
+@pytest.fixture(scope="module", params=["sample", "bushy", "uneven", "clips", "wide", "exact rest", "key-framed"])
+def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_ath):
     """Files that use different parts of the decoder, all but one in several segments."""
-    kept = {"sample": sample_ath, "bushy": bushy_ath, "uneven": full_ath}
+    kept = {"sample": sample_ath, "bushy": bushy_ath, "uneven": full_ath, "clips": medley_ath}
     if request.param in kept:
         return kept[request.param]
     path = tmp_path_factory.mktemp("wasm") / "plant.ath"
@@ -251,15 +258,18 @@ const file = AthFile.open(read(path)), { info } = file, levels = [...Array(info.
 const b = file.branches();
 const seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, NaN];
 answer({
-  info: [info.fileLength, info.preludeLength, info.maxError, info.origin, info.duration, info.vertexCount,
-         info.branchCount, info.frameCount, info.segmentCount, info.levelCount, info.fullLevelCount,
+  info: [info.fileLength, info.preludeLength, info.maxError, info.origin, info.vertexCount,
+         info.branchCount, info.frameCount, info.segmentCount, info.clipCount, info.levelCount, info.fullLevelCount,
          info.nodeCount, info.chunkCount, info.wide],
   branches: digest(...each(info.branchCount, (i) => Int32Array.of(
     b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i]))),
   times: [...file.times()],
   rest: [digest(file.rest()), digest(file.rest("file", { out: new Float64Array(3 * info.vertexCount) }))],
-  errors: levels.map((level) => [-1, info.segmentCount - 1].map((s) => file.levelError(level, s))),
-  frameAt: ["clamp", "loop", "pingpong"].map((wrap) => seconds.map((s) => file.frameAt(s, wrap))),
+  errors: levels.map((level) => [0, info.segmentCount - 1].map((first) => file.levelError(level, first))),
+  frameAt: ["clamp", "loop", "pingpong", "marked"].map((wrap) => file.clips.map(
+    (_, clip) => seconds.map((s) => file.frameAt(s, wrap, clip)))),
+  clips: file.clips.map((clip, i) => [clip.name, clip.duration, clip.firstFrame, clip.frameCount, clip.firstSegment,
+                                      clip.segmentCount, clip.loop, levels.map((level) => file.seamError(i, level))]),
   depthFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.depthFor(d, 0.8, 1080, 1)),
 });
 """
@@ -273,16 +283,21 @@ def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
     lib.ath_rest_wide(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
     wanted = {
-        "info": [info.file_length, info.prelude_length, info.max_error, list(info.origin), info.duration,
-                 info.vertex_count, info.branch_count, info.frame_count, info.segment_count, info.level_count,
+        "info": [info.file_length, info.prelude_length, info.max_error, list(info.origin), info.vertex_count,
+                 info.branch_count, info.frame_count, info.segment_count, info.clip_count, info.level_count,
                  info.full_level_count, info.node_count, info.chunk_count, bool(info.wide)],
         "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 32 * info.branch_count))),
         "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
         "rest": [digest(rest), digest(wide)],
-        "errors": [[native.level_error(level, segment) for segment in (-1, info.segment_count - 1)]
+        "errors": [[native.level_error(level, segment) for segment in (0, info.segment_count - 1)]
                    for level in range(info.level_count)],
-        "frameAt": [[lib.ath_frame_at(file, c_double(s), wrap) for s in seconds] for wrap in range(3)],
-        "depthFor": [lib.ath_depth_for(file, -1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
+        "frameAt": [[[lib.ath_frame_at(file, clip, c_double(s), wrap) for s in seconds]
+                     for clip in range(info.clip_count)] for wrap in range(4)],
+        "clips": [[clip.name.decode(), clip.duration, clip.first_frame, clip.frame_count, clip.first_segment,
+                   clip.segment_count, bool(clip.loop),
+                   [lib.ath_seam_error(file, i, level) for level in range(info.level_count)]]
+                  for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])],
+        "depthFor": [lib.ath_depth_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
                      for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
     assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
 
@@ -489,7 +504,7 @@ const of = (value) => [value, Object.getPrototypeOf(value)].flatMap((one) => Obj
 answer({ AthFile: [...of(file), "front", "open"].sort(), Segment: of(segment), Preparation: of(preparation),
          AthInfo: Object.keys(file.info).sort(), Branches: Object.keys(file.branches()).sort(),
          Parts: Object.keys(file.parts(0)).sort(), Chunk: Object.keys(file.chunks()[0]).sort(),
-         ByteRange: Object.keys(file.ranges(0, 0, 0, true)[0]).sort() });
+         Clip: Object.keys(file.clips[0]).sort(), ByteRange: Object.keys(file.ranges(0, 0, 0, true)[0]).sort() });
 """
 
 

@@ -114,8 +114,9 @@ typedef struct ath_info {
     uint64_t file_length, prelude_length;
     double max_error;        /* of the deepest stored level, promised */
     double origin[3];
-    double duration;         /* time of the last frame less that of the first */
-    int32_t vertex_count, branch_count, frame_count, segment_count;
+    int32_t vertex_count, branch_count;
+    int32_t frame_count, segment_count; /* of all clips */
+    int32_t clip_count;
     int32_t level_count;     /* stored levels: 0 to level_count - 1 */
     int32_t full_level_count;
     int32_t node_count, chunk_count;
@@ -126,6 +127,24 @@ typedef struct ath_info {
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);
+
+/* A clip. Frames and segments are numbered over the whole file, one clip after the other. */
+typedef struct ath_clip {
+    const char *name;      /* UTF-8, ends with a zero; empty where the only clip of a file has none */
+    double duration;       /* seconds from its first frame to its last */
+    int32_t first_frame, frame_count;
+    int32_t first_segment, segment_count;
+    int32_t loop;          /* 1: its first frame follows its last */
+    int32_t reserved;
+} ath_clip;
+
+/* info.clip_count of them. */
+ATH_API const ath_clip *ath_clips(const ath_file *file);
+/* The clip of this name, -1: none. */
+ATH_API int32_t ath_clip_named(const ath_file *file, const char *name);
+/* How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is off, scene
+ * units; 0 for clips that are no loops. */
+ATH_API double ath_seam_error(const ath_file *file, int32_t clip, int32_t level);
 
 enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };
 
@@ -145,7 +164,7 @@ ATH_API const ath_branch *ath_branches(const ath_file *file);
 /* File vertex i is vertex vertex_source[i] of the source; branches likewise. */
 ATH_API const int32_t *ath_vertex_source(const ath_file *file);
 ATH_API const int32_t *ath_branch_source(const ath_file *file);
-/* Seconds, frame_count of them, increasing. */
+/* Seconds, frame_count of them, increasing within a clip. */
 ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
@@ -155,10 +174,10 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t stride);
 
-/* Largest and RMS error of showing `level`, measured by the encoder, scene units; segment -1: over all of them.
- * Either result may be null. */
-ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t segment, double *max_error,
-                             double *rms_error);
+/* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result may be
+ * null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
+ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment,
+                             double *max_error, double *rms_error);
 
 /* First frame of a segment (for segment_count: frame_count), and the segment that a frame is in. */
 ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
@@ -244,13 +263,15 @@ ATH_API int32_t ath_segment_level(const ath_segment *segment);
 
 /* ---- playing ----------------------------------------------------------------------------------------------------- */
 
-typedef enum ath_wrap { ATH_CLAMP = 0, ATH_LOOP = 1, ATH_PING_PONG = 2 } ath_wrap;
+/* ATH_AS_MARKED: ATH_LOOP for clips that are loops, else ATH_CLAMP. */
+typedef enum ath_wrap { ATH_CLAMP = 0, ATH_LOOP = 1, ATH_PING_PONG = 2, ATH_AS_MARKED = 3 } ath_wrap;
 
-/* Where on the frames a time, in seconds since the first frame, is: 0 to frame_count - 1 and, for a loop, on to
- * frame_count, as the last frame blends into the first over the mean frame time. */
-ATH_API double ath_frame_at(const ath_file *file, double seconds, ath_wrap wrap);
+/* Where on the file's frames a time, in seconds since the clip's first frame, is: from that to the clip's last and, for a
+ * loop, on to the frame behind it, as the last frame blends into the first over the mean frame time. */
+ATH_API double ath_frame_at(const ath_file *file, int32_t clip, double seconds, ath_wrap wrap);
 
-/* The frames that a place on the frames lies between, and the weight of the second; the same one twice where that is 0. */
+/* The frames that a place on the frames lies between, and the weight of the second; the same one twice where that is 0.
+ * Behind the last frame of a clip is its first. */
 typedef struct ath_blend {
     int32_t frame[2], segment[2];
     double weight;
@@ -287,12 +308,12 @@ ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *
 /* ---- level of detail --------------------------------------------------------------------------------------------- */
 
 /* The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of view of
- * `fov` (radians) on a screen of `height` pixels, is at most `pixels`; the deepest level where none is. segment -1:
- * over all segments. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than
+ * `fov` (radians) on a screen of `height` pixels, is at most `pixels` in these segments; the deepest level where none
+ * is. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than
  * the one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang and
  * Peng 2011: the view-dependent choice.) */
-ATH_API int32_t ath_depth_for(const ath_file *file, int32_t segment, double distance, double fov, double height,
-                              double pixels);
+ATH_API int32_t ath_depth_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance,
+                              double fov, double height, double pixels);
 
 /* CRC-32C (Castagnoli) of `size` bytes, continuing from `crc` (0 to start). */
 ATH_API uint32_t ath_crc32c(uint32_t crc, const uint8_t *bytes, size_t size);

@@ -8,7 +8,7 @@ enum {
     CHECKSUM_AT = 12,
     OPTIONAL = 0x8000,
     MAJOR = 0,
-    MINOR = 3
+    MINOR = 4
 };
 
 static uint32_t u16_at(const uint8_t *at) { return (uint32_t)at[0] | (uint32_t)at[1] << 8; }
@@ -67,6 +67,7 @@ static void parse_header(const uint8_t *bytes, ath_header *header)
     header->segment_count = u32_at(bytes + 40);
     header->level_count = bytes[44];
     header->full_level_count = bytes[45];
+    header->clip_count = bytes[46];
     header->wide = bytes[47] & 1;
     header->max_error = f64_at(bytes + 48);
 }
@@ -88,7 +89,7 @@ static int check_header(const uint8_t *bytes, const ath_limits *limits, const at
     int valid = header->branch_count <= header->vertex_count && header->segment_count <= header->frame_count
                 && header->frame_count <= (uint64_t)ATH_SEGMENT_FRAMES * header->segment_count
                 && header->full_level_count >= 2 && header->full_level_count <= ATH_LEVELS && header->level_count >= 1
-                && header->level_count <= header->full_level_count && bytes[46] == 1 && bytes[47] < 2
+                && header->level_count <= header->full_level_count && header->clip_count >= 1 && bytes[47] < 2
                 && u64_at(bytes + 56) == 0 && ath_is_finite(header->max_error) && header->max_error >= 0.0;
     return valid ? ATH_OK : ATH_BAD_HEADER;
 }
@@ -117,7 +118,7 @@ int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_
 /* 1: known; 0: to be skipped; -1: refused. */
 static int known(uint32_t kind)
 {
-    static const uint16_t kinds[] = {ATH_HIERARCHY, ATH_REST, ATH_TIME, OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6,
+    static const uint16_t kinds[] = {ATH_HIERARCHY, ATH_REST, ATH_TIME, ATH_CLIPS, OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6,
                                      ATH_STEMS, ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES, ATH_EXACT,
                                      OPTIONAL | 32};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -264,16 +265,71 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     return valid ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-int ath_parse_time(ath_bytes chunk, ath_time_head *head, ath_bytes *body)
+/* Bytes of the character at the front; 0 where it is not UTF-8 (RFC 3629), or a control character. */
+static size_t character_size(ath_bytes text)
+{
+    static const uint8_t least[4] = {0x20, 0xc2, 0xe0, 0xf0}, most[4] = {0x7e, 0xdf, 0xef, 0xf4};
+    uint8_t first = text.bytes[0];
+    for (size_t more = 0; more < 4; more++) {
+        if (first < least[more] || first > most[more]) continue;
+        if (more >= text.size) return 0;
+        for (size_t i = 1; i <= more; i++)
+            if (text.bytes[i] >> 6 != 2) return 0;
+        uint8_t second = more > 0 ? text.bytes[1] : 0;
+        int overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
+        int beyond = (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates, no character */
+        return overlong || beyond ? 0 : more + 1;
+    }
+    return 0;
+}
+
+static int is_name(ath_bytes text)
+{
+    while (text.size > 0) {
+        size_t size = character_size(text);
+        if (size == 0) return 0;
+        text = rest_of(text, size);
+    }
+    return 1;
+}
+
+float ath_seam(const ath_clip_entry *entry, int32_t level) { return f32_at(entry->seams + 4 * level); }
+
+int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry)
+{
+    if (chunk->size < 10 || chunk->bytes[8] > 1) return ATH_BAD_CHUNK;
+    entry->frames = u32_at(chunk->bytes);
+    entry->segments = u32_at(chunk->bytes + 4);
+    entry->loop = chunk->bytes[8];
+    entry->name.size = chunk->bytes[9];
+    size_t seams = entry->loop ? 4 * (size_t)header->full_level_count : 0;
+    *chunk = rest_of(*chunk, 10);
+    if (entry->segments < 1 || entry->segments > entry->frames
+        || entry->frames > (uint64_t)ATH_SEGMENT_FRAMES * entry->segments || chunk->size < entry->name.size + seams
+        || (entry->name.size == 0 && header->clip_count > 1))
+        return ATH_BAD_CHUNK;
+    entry->name.bytes = chunk->bytes;
+    entry->seams = chunk->bytes + entry->name.size;
+    *chunk = rest_of(*chunk, entry->name.size + seams);
+    if (!is_name(entry->name)) return ATH_BAD_CHUNK;
+    for (int32_t level = 0; entry->loop && level < header->full_level_count; level++)
+        if (!ath_is_finite((double)ath_seam(entry, level)) || ath_seam(entry, level) < 0.0f) return ATH_BAD_CHUNK;
+    return ATH_OK;
+}
+
+int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body)
 {
     if (chunk.size < 1 || chunk.bytes[0] > 2) return ATH_BAD_CHUNK;
-    head->method = chunk.bytes[0];
+    *method = chunk.bytes[0];
     *body = rest_of(chunk, 1);
-    if (head->method == 2) return ATH_OK;
-    if (chunk.size != 17) return ATH_BAD_CHUNK;
-    head->first = f64_at(chunk.bytes + 1);
-    head->step = f64_at(chunk.bytes + 9);
-    return is_step(head->step) ? ATH_OK : ATH_BAD_CHUNK;
+    return *method == 2 || body->size == 16 * (size_t)clip_count ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step)
+{
+    *first = f64_at(body.bytes + 16 * (size_t)clip);
+    *step = f64_at(body.bytes + 16 * (size_t)clip + 8);
+    return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)

@@ -8,6 +8,7 @@ enum {
     ATH_HIERARCHY = 1,
     ATH_REST = 2,
     ATH_TIME = 3,
+    ATH_CLIPS = 7,
     ATH_STEMS = 16,
     ATH_AFFINES = 17,
     ATH_CORRECTIONS = 18,
@@ -22,7 +23,7 @@ typedef struct {
     double max_error;
     uint32_t checksum;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, wide;
+    int32_t level_count, full_level_count, clip_count, wide;
 } ath_header;
 
 /* Checks everything in front of the first chunk. Fills *header, *needed (bytes wanted from the front on ATH_MISSING, the
@@ -55,9 +56,14 @@ typedef struct {
 } ath_rest_head;
 
 typedef struct {
-    double first, step;
-    int32_t method; /* 0: first + i * step; 1: first + i / step; 2: stream */
-} ath_time_head;
+    uint32_t frames, segments;
+    int32_t loop;
+    ath_bytes name;        /* UTF-8 */
+    const uint8_t *seams;  /* of a loop: full_level_count floats, see ath_seam */
+} ath_clip_entry;
+
+/* 0: first + i * step; 1: first + i / step, with a pair for each clip; 2: stream */
+typedef int32_t ath_time_method;
 
 typedef struct {
     double step, omega;
@@ -67,7 +73,11 @@ typedef struct {
 
 int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
-int ath_parse_time(ath_bytes chunk, ath_time_head *head, ath_bytes *body);
+/* The entry at the front of `chunk`, which becomes what is behind it. */
+int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);
+float ath_seam(const ath_clip_entry *entry, int32_t level);
+int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body);
+int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step);
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 

@@ -2,6 +2,8 @@
 #include "file.h"
 #include "decode.h"
 
+enum { NAME_BYTES = 256 }; /* of a clip's name, with the zero behind it */
+
 /* ---- memory ---- */
 
 static int32_t most_pieces(const ath_header *header)
@@ -22,10 +24,13 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t vertices = header->vertex_count, branches = header->branch_count;
-    uint64_t entries = (uint64_t)header->level_count * header->segment_count;
+    uint64_t entries = (uint64_t)header->level_count * header->segment_count, clips = (uint64_t)header->clip_count;
     ath_take(&arena, sizeof *file);
     file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
     file->errors = (float *)ath_take(&arena, entries * 2 * sizeof(float));
+    file->clips = (ath_clip *)ath_take(&arena, clips * sizeof(ath_clip));
+    file->names = (char *)ath_take(&arena, clips * NAME_BYTES);
+    file->seams = (float *)ath_take(&arena, clips * (uint64_t)header->full_level_count * sizeof(float));
     file->branches = (ath_branch *)ath_take(&arena, branches * sizeof(ath_branch));
     file->branch_source = (int32_t *)ath_take(&arena, branches * sizeof(int32_t));
     file->vertex_source = (int32_t *)ath_take(&arena, vertices * sizeof(int32_t));
@@ -40,9 +45,8 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 }
 
 /* FORMAT.md, "Limits": what a segment may take, whatever the decoder. */
-static int within_memory(const ath_header *header, const ath_limits *limits)
+static int within_memory(const ath_header *header, const ath_limits *limits, uint64_t frames)
 {
-    uint64_t frames = (header->frame_count + header->segment_count - 1) / header->segment_count;
     return header->vertex_count * (60 * frames + 512) <= limits->memory_bytes;
 }
 
@@ -66,7 +70,8 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
     *memory_bytes = 0;
     if (result != ATH_OK) return result;
     uint64_t memory = carve(&file, &header, 0);
-    if (!within_memory(&header, &chosen) || memory > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
+    uint64_t frames = (header.frame_count + header.segment_count - 1) / header.segment_count;
+    if (!within_memory(&header, &chosen, frames) || memory > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
     *memory_bytes = (size_t)memory;
     return ATH_OK;
 }
@@ -84,6 +89,64 @@ static int load(ath_file *file, int32_t kind, ath_bytes *content)
     content->bytes = chunk->bytes;
     content->size = chunk->length;
     return ath_check_chunk(file, file->fault);
+}
+
+static int same_name(const char *a, const char *b)
+{
+    while (*a && *a == *b) a++, b++;
+    return *a == *b;
+}
+
+/* Frames and segments of the clip behind those before it; ATH_BAD_CHUNK where there are no more of them. */
+static int place_clip(ath_file *file, int32_t index, uint32_t frames, uint32_t segments)
+{
+    ath_clip *clip = file->clips + index;
+    const ath_clip *before = clip - 1;
+    clip->first_frame = index > 0 ? before->first_frame + before->frame_count : 0;
+    clip->first_segment = index > 0 ? before->first_segment + before->segment_count : 0;
+    if (frames > file->header.frame_count - (uint32_t)clip->first_frame
+        || segments > file->header.segment_count - (uint32_t)clip->first_segment)
+        return ATH_BAD_CHUNK;
+    clip->frame_count = (int32_t)frames;
+    clip->segment_count = (int32_t)segments;
+    clip->name = file->names + NAME_BYTES * index;
+    file->longest = ath_max(file->longest, (int32_t)((frames + segments - 1) / segments));
+    return ATH_OK;
+}
+
+static int read_clip(ath_file *file, int32_t index, ath_bytes *chunk)
+{
+    ath_clip *clip = file->clips + index;
+    ath_clip_entry entry;
+    int result = ath_parse_clip(chunk, &file->header, &entry);
+    if (result == ATH_OK) result = place_clip(file, index, entry.frames, entry.segments);
+    if (result != ATH_OK) return result;
+    memcpy(file->names + NAME_BYTES * index, entry.name.bytes, entry.name.size);
+    clip->loop = entry.loop;
+    for (int32_t level = 0; clip->loop && level < file->header.full_level_count; level++)
+        file->seams[index * file->header.full_level_count + level] = ath_seam(&entry, level);
+    for (int32_t before = 0; before < index; before++)
+        if (same_name(file->clips[before].name, clip->name)) return ATH_BAD_CHUNK;
+    return ATH_OK;
+}
+
+static int read_clips(ath_file *file)
+{
+    const ath_header *header = &file->header;
+    ath_bytes chunk;
+    file->info.clip_count = header->clip_count;
+    memset(file->clips, 0, (size_t)header->clip_count * sizeof *file->clips);
+    memset(file->names, 0, (size_t)header->clip_count * NAME_BYTES);
+    memset(file->seams, 0, (size_t)header->clip_count * (size_t)header->full_level_count * sizeof *file->seams);
+    if (header->clip_count == 1 && !ath_find_chunk(file->chunks, header->chunk_count, ATH_CLIPS, ATH_NO_LEVEL, 0))
+        return place_clip(file, 0, header->frame_count, header->segment_count);
+    int result = load(file, ATH_CLIPS, &chunk);
+    for (int32_t i = 0; result == ATH_OK && i < header->clip_count; i++) result = read_clip(file, i, &chunk);
+    if (result != ATH_OK) return result;
+    const ath_clip *last = file->clips + header->clip_count - 1;
+    int whole = chunk.size == 0 && last->first_frame + last->frame_count == (int32_t)header->frame_count
+                && last->first_segment + last->segment_count == (int32_t)header->segment_count;
+    return whole ? ATH_OK : ATH_BAD_CHUNK;
 }
 
 static int read_hierarchy(ath_file *file, const ath_limits *limits)
@@ -198,24 +261,30 @@ static int read_rest(ath_file *file)
     return result != ATH_OK ? result : all_finite(file->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-static int read_time(ath_file *file)
+static int time_clip(const ath_file *file, int32_t index, ath_time_method method, ath_bytes body)
 {
-    int32_t count = (int32_t)file->header.frame_count;
-    double *times = file->times;
-    ath_bytes chunk, body;
-    ath_time_head head;
-    int result = load(file, ATH_TIME, &chunk);
-    if (result == ATH_OK) result = ath_parse_time(chunk, &head, &body);
-    if (result == ATH_OK && head.method == 2)
-        result = ath_decode_times(file->scratch, body.bytes, body.size, count, times);
-    if (result != ATH_OK) return result;
-    for (int32_t i = 0; i < count; i++) {
-        if (head.method == 0) times[i] = head.first + (double)i * head.step;
-        if (head.method == 1) times[i] = head.first + (double)i / head.step;
+    ath_clip *clip = file->clips + index;
+    double *times = file->times + clip->first_frame, first = 0.0, step = 0.0;
+    if (method != 2 && ath_parse_steady(body, index, &first, &step) != ATH_OK) return ATH_BAD_CHUNK;
+    for (int32_t i = 0; i < clip->frame_count; i++) {
+        if (method == 0) times[i] = first + (double)i * step;
+        if (method == 1) times[i] = first + (double)i / step;
         if (!ath_is_finite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) return ATH_BAD_CHUNK;
     }
-    file->info.duration = times[count - 1] - times[0];
+    clip->duration = times[clip->frame_count - 1] - times[0];
     return ATH_OK;
+}
+
+static int read_time(ath_file *file)
+{
+    ath_bytes chunk, body;
+    ath_time_method method;
+    int result = load(file, ATH_TIME, &chunk);
+    if (result == ATH_OK) result = ath_parse_time(chunk, file->info.clip_count, &method, &body);
+    if (result == ATH_OK && method == 2)
+        result = ath_decode_times(file->scratch, body.bytes, body.size, file->info.frame_count, file->times);
+    for (int32_t i = 0; result == ATH_OK && i < file->info.clip_count; i++) result = time_clip(file, i, method, body);
+    return result;
 }
 
 /* ---- opening ---- */
@@ -235,13 +304,15 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->full_level_count = header->full_level_count;
     info->chunk_count = (int32_t)header->chunk_count;
     info->wide = header->wide;
-    file->frames[0] = info->frame_count / info->segment_count;
-    file->frames[1] = (info->frame_count + info->segment_count - 1) / info->segment_count;
 }
 
 static int read_prelude(ath_file *file, const ath_limits *limits)
 {
-    int result = read_hierarchy(file, limits);
+    int result = read_clips(file);
+    if (result != ATH_OK) return result;
+    file->fault = -1;
+    if (!within_memory(&file->header, limits, (uint64_t)file->longest)) return ATH_LIMIT_EXCEEDED;
+    result = read_hierarchy(file, limits);
     if (result != ATH_OK) return result;
     file->fault = -1;
     plan(file);
@@ -284,15 +355,24 @@ int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t ava
 
 /* ---- building ---- */
 
+/* The segments of a clip have as many frames as each other, or one more. */
+static int has_segments_of(const ath_file *file, int32_t frames)
+{
+    for (int32_t i = 0; i < file->info.clip_count; i++) {
+        const ath_clip *clip = file->clips + i;
+        int32_t shorter = clip->frame_count / clip->segment_count, rest = clip->frame_count % clip->segment_count;
+        if (frames == shorter || (rest > 0 && frames == shorter + 1)) return 1;
+    }
+    return 0;
+}
+
 static uint64_t carve_build(ath_file *file, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    for (int32_t i = 0; i < 2; i++) {
-        uint64_t size = (uint64_t)file->frames[i] * (uint64_t)file->frames[i] * sizeof(double);
-        int same = i == 1 && file->frames[0] == file->frames[1];
-        file->cosines[i] = same ? file->cosines[0] : (double *)ath_take(&arena, size);
-    }
+    for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+        if (has_segments_of(file, (int32_t)frames))
+            file->cosines[frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
     return arena.used;
 }
 
@@ -309,14 +389,9 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     carve_build(file, (uint8_t *)memory);
     ath_basis_fill(file->pieces, file->shape.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
     file->shape.bases = file->bases;
-    ath_cosine_basis(file->frames[0], file->cosines[0]);
-    if (file->cosines[1] != file->cosines[0]) ath_cosine_basis(file->frames[1], file->cosines[1]);
+    for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+        if (file->cosines[frames]) ath_cosine_basis(frames, file->cosines[frames]);
     return ATH_OK;
-}
-
-const double *ath_file_cosines(const ath_file *file, int32_t frames)
-{
-    return file->cosines[frames == file->frames[0] ? 0 : 1];
 }
 
 /* ---- what a file holds ---- */
@@ -330,6 +405,20 @@ const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_sou
 const int32_t *ath_branch_source(const ath_file *file) { return file->branch_source; }
 
 const double *ath_times(const ath_file *file) { return file->times; }
+
+const ath_clip *ath_clips(const ath_file *file) { return file->clips; }
+
+int32_t ath_clip_named(const ath_file *file, const char *name)
+{
+    for (int32_t i = 0; i < file->info.clip_count; i++)
+        if (same_name(file->clips[i].name, name)) return i;
+    return -1;
+}
+
+double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
+{
+    return (double)file->seams[clip * file->header.full_level_count + level];
+}
 
 static double rest_number(const ath_file *file, size_t i)
 {
@@ -358,9 +447,9 @@ void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t st
 }
 
 /* Squares are weighted by the frames of their segments. */
-void ath_level_error(const ath_file *file, int32_t level, int32_t segment, double *max_error, double *rms_error)
+void ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t last, double *max_error,
+                     double *rms_error)
 {
-    int32_t first = segment < 0 ? 0 : segment, last = segment < 0 ? file->info.segment_count - 1 : segment;
     const float *errors = file->errors + 2 * (size_t)level * (size_t)file->info.segment_count;
     double largest = 0.0, squares = 0.0, frames = 0.0;
     for (int32_t s = first; s <= last; s++) {
@@ -373,9 +462,30 @@ void ath_level_error(const ath_file *file, int32_t level, int32_t segment, doubl
     if (rms_error) *rms_error = first == last ? (double)errors[2 * first + 1] : ath_sqrt(squares / frames);
 }
 
+/* The last clip that begins at or before this frame, or segment: an offset of ath_clip says which is meant. */
+static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
+{
+    int32_t low = 0, high = file->info.clip_count;
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (*(const int32_t *)(const void *)((const char *)(file->clips + middle) + first) <= place)
+            low = middle;
+        else
+            high = middle;
+    }
+    return file->clips + low;
+}
+
+const ath_clip *ath_file_clip(const ath_file *file, int32_t frame)
+{
+    return clip_at(file, offsetof(ath_clip, first_frame), frame);
+}
+
 int32_t ath_segment_start(const ath_file *file, int32_t segment)
 {
-    return (int32_t)((int64_t)file->info.frame_count * segment / file->info.segment_count);
+    const ath_clip *clip = clip_at(file, offsetof(ath_clip, first_segment), segment);
+    int64_t within = segment - clip->first_segment;
+    return clip->first_frame + (int32_t)(clip->frame_count * within / clip->segment_count);
 }
 
 int32_t ath_file_frames(const ath_file *file, int32_t segment)
@@ -385,8 +495,10 @@ int32_t ath_file_frames(const ath_file *file, int32_t segment)
 
 int32_t ath_segment_of(const ath_file *file, int32_t frame)
 {
-    int32_t segment = (int32_t)((int64_t)frame * file->info.segment_count / file->info.frame_count);
-    while (segment + 1 < file->info.segment_count && ath_segment_start(file, segment + 1) <= frame) segment++;
+    const ath_clip *clip = ath_file_clip(file, frame);
+    int64_t within = frame - clip->first_frame;
+    int32_t segment = clip->first_segment + (int32_t)(within * clip->segment_count / clip->frame_count);
+    while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame) segment++;
     return segment;
 }
 

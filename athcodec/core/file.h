@@ -11,6 +11,9 @@ struct ath_file {
     ath_shape shape;
     ath_chunk *chunks;
     float *errors;               /* level_count x segment_count x (max, rms) */
+    ath_clip *clips;
+    char *names;                 /* of the clips, NAME_BYTES each */
+    float *seams;                /* clip_count x full_level_count */
     ath_branch *branches;
     int32_t *branch_source, *vertex_source;
     double *times;
@@ -21,16 +24,16 @@ struct ath_file {
     uint8_t *gaps;
     void *scratch;               /* of opening and building */
     double *bases;               /* null until ath_build */
-    double *cosines[2];          /* of the shorter and the longer segments */
+    double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
-    int32_t frames[2];           /* of the shorter and the longer segments */
+    int32_t longest;             /* frames of the longest segment */
     int32_t fault;
     uint32_t stems_levels;       /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };
 
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
-const double *ath_file_cosines(const ath_file *file, int32_t frames);
+const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
 /* Whether it stores the level behind the last lossy one. */
 ATH_INLINE int ath_file_is_lossless(const ath_file *file)

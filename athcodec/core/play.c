@@ -13,10 +13,11 @@ static double wrapped(double x, double period)
     return rest < period ? rest : 0.0;
 }
 
-static double frame_of(const ath_file *file, double seconds)
+/* Within the clip. */
+static double frame_of(const ath_file *file, const ath_clip *clip, double seconds)
 {
-    const double *times = file->times;
-    int32_t low = 0, high = file->info.frame_count - 1;
+    const double *times = file->times + clip->first_frame;
+    int32_t low = 0, high = clip->frame_count - 1;
     while (high - low > 1) {
         int32_t middle = low + (high - low) / 2;
         if (times[middle] - times[0] <= seconds)
@@ -27,10 +28,10 @@ static double frame_of(const ath_file *file, double seconds)
     return (double)low + (seconds - (times[low] - times[0])) / (times[high] - times[low]);
 }
 
-double ath_frame_at(const ath_file *file, double seconds, ath_wrap wrap)
+static double frame_within(const ath_file *file, const ath_clip *clip, double seconds, ath_wrap wrap)
 {
-    double last = (double)(file->info.frame_count - 1), duration = file->info.duration;
-    if (file->info.frame_count < 2) return 0.0;
+    double last = (double)(clip->frame_count - 1), duration = clip->duration;
+    if (clip->frame_count < 2) return 0.0;
     double frame_time = duration / last;
     if (wrap == ATH_LOOP) seconds = wrapped(seconds, duration + frame_time);
     if (wrap == ATH_PING_PONG) {
@@ -38,19 +39,28 @@ double ath_frame_at(const ath_file *file, double seconds, ath_wrap wrap)
         if (seconds > duration) seconds = 2.0 * duration - seconds;
     }
     if (!(seconds > 0.0)) return 0.0;
-    if (seconds < duration) return frame_of(file, seconds);
+    if (seconds < duration) return frame_of(file, clip, seconds);
     double beyond = wrap == ATH_LOOP ? (seconds - duration) / frame_time : 0.0;
     return last + (beyond < 1.0 ? beyond : 1.0);
 }
 
+double ath_frame_at(const ath_file *file, int32_t clip, double seconds, ath_wrap wrap)
+{
+    const ath_clip *shown = file->clips + clip;
+    if (wrap == ATH_AS_MARKED) wrap = shown->loop ? ATH_LOOP : ATH_CLAMP;
+    double first = (double)shown->first_frame, frame = first + frame_within(file, shown, seconds, wrap);
+    return frame < first + (double)shown->frame_count ? frame : first; /* that one is another clip's */
+}
+
 ath_blend ath_blend_at(const ath_file *file, double frame)
 {
-    int32_t count = file->info.frame_count;
     ath_blend blend;
-    if (!(frame > 0.0) || frame >= (double)count) frame = 0.0;
+    if (!(frame > 0.0) || frame >= (double)file->info.frame_count) frame = 0.0;
+    const ath_clip *clip = ath_file_clip(file, (int32_t)frame);
+    int32_t end = clip->first_frame + clip->frame_count;
     blend.frame[0] = blend.frame[1] = (int32_t)frame;
     blend.weight = frame - (double)blend.frame[0];
-    if (blend.weight > 0.0) blend.frame[1] = blend.frame[0] + 1 < count ? blend.frame[0] + 1 : 0;
+    if (blend.weight > 0.0) blend.frame[1] = blend.frame[0] + 1 < end ? blend.frame[0] + 1 : clip->first_frame;
     for (int32_t i = 0; i < 2; i++) blend.segment[i] = ath_segment_of(file, blend.frame[i]);
     return blend;
 }
@@ -361,14 +371,15 @@ int ath_matrices_wide(const ath_file *file, const ath_segment *const *segments, 
 
 /* ---- level of detail ---- */
 
-int32_t ath_depth_for(const ath_file *file, int32_t segment, double distance, double fov, double height, double pixels)
+int32_t ath_depth_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance, double fov,
+                      double height, double pixels)
 {
     int32_t deepest = file->info.level_count - 1;
     if (!(distance > 0.0 && fov > 0.0 && fov < 3.141592653589793)) return deepest;
     double pixels_per_unit = height / (2.0 * distance * ath_tan_of_half(fov));
     for (int32_t level = 0; level < deepest; level++) {
         double error;
-        ath_level_error(file, level, segment, &error, 0);
+        ath_level_error(file, level, first_segment, last_segment, &error, 0);
         if (error * pixels_per_unit <= pixels) return level;
     }
     return deepest;

@@ -130,13 +130,13 @@ static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_
 size_t ath_work_size(const ath_file *file)
 {
     ath_work counted;
-    return ath_size_or_most(carve(&counted, file, file->frames[1], 0));
+    return ath_size_or_most(carve(&counted, file, file->longest, 0));
 }
 
 size_t ath_segment_size(const ath_file *file, int32_t level)
 {
     ath_segment counted;
-    return ath_size_or_most(carve_segment(&counted, file, level, file->frames[1], 0));
+    return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
 }
 
 /* ---- start ---- */
@@ -184,7 +184,7 @@ static void ready_motion(ath_work *work)
 {
     work->motion.frames = work->segment->frames;
     work->motion.streams = work->streams;
-    work->motion.cosines = ath_file_cosines(work->file, work->segment->frames);
+    work->motion.cosines = work->file->cosines[work->segment->frames];
     work->scratch = ath_motion_scratch(&work->file->shape, &work->motion);
     work->piece.counts = work->counts;
     work->piece.shapes = work->unit_shapes;

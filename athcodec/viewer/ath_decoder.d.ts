@@ -6,13 +6,14 @@
  *
  *     await ready;
  *     const file = AthFile.open(bytes);
- *     const level = file.depthFor(distance, fov, height, 1);
- *     const segments = [];
- *     for (let i = 0; i < file.info.segmentCount; i++) segments.push(file.prepare(i, level));
- *     const xyz = file.positions(segments, file.frameAt(seconds, "loop"));
+ *     const { firstSegment, segmentCount } = file.clips[0];
+ *     const last = firstSegment + segmentCount - 1, segments = [];
+ *     const level = file.depthFor(distance, fov, height, 1, firstSegment, last);
+ *     for (let i = firstSegment; i <= last; i++) segments.push(file.prepare(i, level));
+ *     const xyz = file.positions(segments, file.frameAt(seconds, "loop", 0));
  *
- * Units and layout. Positions and errors are in the file's scene units, time is in seconds, frames count from
- * 0. Positions are x, y, z of one vertex after the other. Matrices are 3x4, row-major, 12 numbers:
+ * Units and layout. Positions and errors are in the file's scene units, time is in seconds. Frames and segments
+ * count from 0 over the whole file, whose clips come one after the other. Positions are x, y, z of one vertex after the other. Matrices are 3x4, row-major, 12 numbers:
  * x' = m[0] x + m[1] y + m[2] z + m[3] and so on. Order "file": every subtree of the plant is one range of
  * vertices; branches and parts refer to it. Order "source": as in the clip that was encoded; FACES and EDGES
  * refer to it.
@@ -44,8 +45,9 @@ export class AthError extends Error {
 /** "file" or "source", see above. */
 export type Order = "file" | "source";
 
-/** What comes after the last frame: it stays; the first, blended into; the same way back. */
-export type Wrap = "clamp" | "loop" | "pingpong";
+/** What comes after a clip's last frame: it stays; the first, blended into; the same way back; "loop" where the
+ * clip is marked as one, else "clamp". */
+export type Wrap = "clamp" | "loop" | "pingpong" | "marked";
 
 export interface AthInfo {
   /** Bytes of the whole file. */
@@ -57,12 +59,12 @@ export interface AthInfo {
   readonly maxError: number;
   /** x, y, z that the file's numbers are relative to. For information: positions are absolute. */
   readonly origin: readonly [number, number, number];
-  /** Seconds from the first frame to the last. */
-  readonly duration: number;
   readonly vertexCount: number;
   readonly branchCount: number;
+  /** Of all clips. */
   readonly frameCount: number;
   readonly segmentCount: number;
+  readonly clipCount: number;
   /** Levels in this file, 0 to levelCount - 1; those that encoding made. */
   readonly levelCount: number;
   readonly fullLevelCount: number;
@@ -78,6 +80,20 @@ export interface AthInfo {
   readonly xi: number;
   readonly eta: number;
   readonly lambda: number;
+}
+
+/** A motion of the plant: frames firstFrame to firstFrame + frameCount - 1 of the file, segments likewise. */
+export interface Clip {
+  /** Empty where the only clip of a file has none. */
+  readonly name: string;
+  /** Seconds from the first frame to the last. */
+  readonly duration: number;
+  readonly firstFrame: number;
+  readonly frameCount: number;
+  readonly firstSegment: number;
+  readonly segmentCount: number;
+  /** Whether its first frame follows its last. */
+  readonly loop: boolean;
 }
 
 /** One entry per branch, parents before children; the subtree of b is the branches b to b + subtree[b] -
@@ -177,6 +193,8 @@ export class AthFile {
   static open(bytes: Uint8Array): AthFile;
 
   readonly info: AthInfo;
+  /** At least one. Where a function takes a clip it takes its number here, or its name. */
+  readonly clips: readonly Clip[];
 
   /** Whether the last positions(), matrices() or exact() showed the nearer frame in place of a blend,
    * because the other one is in a segment that was not handed over at the same level. */
@@ -186,14 +204,17 @@ export class AthFile {
   /** File vertex i is vertex vertexSource()[i] of the source; branches likewise. */
   vertexSource(): Int32Array;
   branchSource(): Int32Array;
-  /** Seconds, one per frame, increasing. */
+  /** Seconds, one per frame, increasing within a clip. */
   times(): Float64Array;
   /** The rest pose, 3 numbers per vertex; order "source" by default. */
   rest(order?: Order): Float32Array;
   rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
-  /** Largest and root-mean-square error of showing a level, measured by the encoder; segment -1 (default):
-   * over all. */
-  levelError(level: number, segment?: number): { max: number; rms: number };
+  /** Largest and root-mean-square error of showing a level, measured by the encoder, over the segments `first`
+   * to `last` (default: all). */
+  levelError(level: number, first?: number, last?: number): { max: number; rms: number };
+  /** How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is
+   * off; 0 for clips that are no loops. */
+  seamError(clip: number | string, level: number): number;
   /** First frame of a segment; of segmentCount: frameCount. */
   segmentStart(segment: number): number;
   segmentOf(frame: number): number;
@@ -217,18 +238,19 @@ export class AthFile {
 
   parts(level: number): Parts;
   /** The coarsest level whose largest error, seen from `distance` (scene units) under a vertical field of
-   * view of `fov` (radians) on a screen `height` pixels high, is at most `pixels`; the deepest where none
-   * is. segment -1 (default): over all of them. */
-  depthFor(distance: number, fov: number, height: number, pixels: number, segment?: number): number;
+   * view of `fov` (radians) on a screen `height` pixels high, is at most `pixels` in the segments `first` to
+   * `last` (default: all); the deepest where none is. */
+  depthFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number): number;
 
   /** Decodes a segment at a level. Throws AthError: "MISSING", "BAD_CHECKSUM", "BAD_CHUNK", "NO_MEMORY". */
   prepare(segment: number, level: number): Segment;
   /** The same, to be spread over frames. Throws AthError: "MISSING", "NO_MEMORY". */
   preparation(segment: number, level: number): Preparation;
 
-  /** Where on the frames a time, in seconds since the first frame, is: 0 to frameCount - 1 and, for a
-   * loop, on to frameCount, as the last frame blends into the first over the mean frame time. */
-  frameAt(seconds: number, wrap?: Wrap): number;
+  /** Where on the frames a time, in seconds since the first frame of the clip (default: the first clip), is: from
+   * that to the clip's last and, for a loop, on to the frame behind it, as the last frame blends into the first
+   * over the mean frame time. */
+  frameAt(seconds: number, wrap?: Wrap, clip?: number | string): number;
 
   /*
    * What follows shows a place on the frames, such as 3.25, from prepared segments, of which any number may

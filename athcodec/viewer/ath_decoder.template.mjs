@@ -7,17 +7,21 @@ const WASM = "@WASM@"; // zlib, base64
 
 const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68;
 const ORDERS = { file: 0, source: 1 };
-const WRAPS = { clamp: 0, loop: 1, pingpong: 2 };
+const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
 const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
 const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
-  duration: "f64", vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32",
-  levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", wide: "i32", epsilon: "f32",
+  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32", levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", wide: "i32", epsilon: "f32",
   xi: "f32", eta: "u32", lambda: "u32", restWide: "i32",
 };
 const INFO_SIZE = 112;
+const CLIP = {
+  name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
+  loop: "i32",
+};
+const CLIP_SIZE = 40;
 const CHUNK = {
   fed: "u64", offset: "u64", length: "u32", checksum: "u32", segment: "u32", kind: "u16", level: "u8",
 };
@@ -166,10 +170,14 @@ class Core {
       [name, Int32Array.from({ length: count }, (_, i) => rows[i * names.length + k])]));
   }
 
+  // A string that ends with a zero, of at most 255 bytes.
+  text(at) {
+    const bytes = new Uint8Array(this.c.memory.buffer).subarray(at >>> 0, (at >>> 0) + 256);
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+  }
+
   error(code, message, more) {
-    const at = this.c.ath_result_name(code) >>> 0;
-    const bytes = this.view(Uint8Array, at, 32);
-    return new AthError(code, String.fromCharCode(...bytes.subarray(0, bytes.indexOf(0))), message, more);
+    return new AthError(code, this.text(this.c.ath_result_name(code)), message, more);
   }
 
   // Looks at ever more of the front: {code, needed, memory, at}; `at` is a copy of the prelude if code is OK.
@@ -280,6 +288,7 @@ class Preparation {
 
 export class AthFile {
   info = null;
+  clips = [];
   held = false;
   #own = null;            // the Core, until dispose()
   #at = 0;                // the ath_file
@@ -314,6 +323,7 @@ export class AthFile {
     this.info = this.#info();
     this.#chunks = this.#chunkTable();
     if (code !== OK) throw this.#chunkError(code, c.ath_fault(this.#at));
+    this.clips = this.#clipTable();
     const size = c.ath_build_size(this.#at) >>> 0;
     this.#check(c.ath_build(this.#at, core.take(size), size), `the bases of the motion, ${size} bytes`);
     this.feed(bytes, 0);
@@ -327,6 +337,14 @@ export class AthFile {
     const { originX, originY, originZ, wide, restWide, ...rest } = info;
     const origin = [originX, originY, originZ];
     return Object.freeze({ ...rest, origin, wide: wide !== 0, restWide: restWide !== 0 });
+  }
+
+  #clipTable() {
+    const at = this.#core.c.ath_clips(this.#at) >>> 0;
+    return Object.freeze(Array.from({ length: this.info.clipCount }, (_, i) => {
+      const { name, loop, ...clip } = this.#core.struct(CLIP, at + i * CLIP_SIZE);
+      return Object.freeze({ name: this.#core.text(name), loop: loop !== 0, ...clip });
+    }));
   }
 
   #chunkTable() {
@@ -363,8 +381,16 @@ export class AthFile {
     return whole(level, 0, this.info.levelCount - 1, "level");
   }
 
-  #segment(segment, low = 0) {
-    return whole(segment, low, this.info.segmentCount - 1, "segment");
+  #segment(segment) {
+    return whole(segment, 0, this.info.segmentCount - 1, "segment");
+  }
+
+  // Its number, given that or its name.
+  #clip(clip) {
+    if (typeof clip !== "string") return whole(clip, 0, this.clips.length - 1, "clip");
+    const found = this.clips.findIndex(({ name }) => name === clip);
+    if (found >= 0) return found;
+    throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
   }
 
   // ---- what it holds ----
@@ -395,15 +421,20 @@ export class AthFile {
     });
   }
 
-  levelError(level, segment = -1) {
+  levelError(level, first = 0, last = this.info.segmentCount - 1) {
     const c = this.#c;
     this.#level(level);
-    this.#segment(segment, -1);
+    this.#segment(first);
+    this.#segment(last);
     const [max, rms] = this.#core.with(16, (at) => {
-      c.ath_level_error(this.#at, level, segment, at, at + 8);
+      c.ath_level_error(this.#at, level, first, last, at, at + 8);
       return this.#core.copy(Float64Array, at, 2);
     });
     return { max, rms };
+  }
+
+  seamError(clip, level) {
+    return this.#c.ath_seam_error(this.#at, this.#clip(clip), this.#level(level));
   }
 
   segmentStart(segment) {
@@ -506,8 +537,8 @@ export class AthFile {
     });
   }
 
-  depthFor(distance, fov, height, pixels, segment = -1) {
-    return this.#c.ath_depth_for(this.#at, this.#segment(segment, -1), number(distance, "distance"),
+  depthFor(distance, fov, height, pixels, first = 0, last = this.info.segmentCount - 1) {
+    return this.#c.ath_depth_for(this.#at, this.#segment(first), this.#segment(last), number(distance, "distance"),
       number(fov, "fov"), number(height, "height"), number(pixels, "pixels"));
   }
 
@@ -570,8 +601,8 @@ export class AthFile {
 
   // ---- playing ----
 
-  frameAt(seconds, wrap = "clamp") {
-    return this.#c.ath_frame_at(this.#at, number(seconds, "seconds"), choice(wrap, WRAPS, "wrap"));
+  frameAt(seconds, wrap = "clamp", clip = 0) {
+    return this.#c.ath_frame_at(this.#at, this.#clip(clip), number(seconds, "seconds"), choice(wrap, WRAPS, "wrap"));
   }
 
   // The memory that results pass through, `bytes` at least.

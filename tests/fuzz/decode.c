@@ -62,7 +62,12 @@ static double place(const user *u, int32_t argument)
     static const double odd[4] = {-1.0, 1e300, 0.0, 1e-300};
     argument &= 255;
     if (argument >= 252) return odd[argument - 252];
-    return ath_frame_at(u->file, u->info.duration * argument / 100.0, (ath_wrap)(argument % 3));
+    int32_t clip = argument % u->info.clip_count;
+    double seconds = ath_clips(u->file)[clip].duration * argument / 100.0;
+    double frame = ath_frame_at(u->file, clip, seconds, (ath_wrap)(argument % 4));
+    int32_t first = ath_clips(u->file)[clip].first_frame;
+    REQUIRE(frame >= first && frame < first + ath_clips(u->file)[clip].frame_count, "a time is within its clip");
+    return frame;
 }
 
 static void play(user *u, int32_t argument, int wide)
@@ -121,16 +126,19 @@ static void ask(user *u, int32_t argument)
     if (ready >= 0)
         REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
     double largest, rms;
-    ath_level_error(u->file, level, argument & 2 ? segment : -1, &largest, &rms);
-    level = ath_depth_for(u->file, argument & 4 ? segment : -1, argument, 0.02 * argument, 1080.0, 1.0);
+    ath_level_error(u->file, level, argument & 2 ? segment : 0, segment, &largest, &rms);
+    level = ath_depth_for(u->file, argument & 4 ? segment : 0, segment, argument, 0.02 * argument, 1080.0, 1.0);
     REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
     for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i);
     int32_t last = u->info.vertex_count - 1;
     REQUIRE(ath_vertex_source(u->file)[last] <= last, "vertices are those of the source");
     REQUIRE(ath_branch_source(u->file)[u->info.branch_count - 1] < u->info.branch_count, "so are branches");
-    const double *times = ath_times(u->file);
+    const ath_clip *clip = ath_clips(u->file) + argument % u->info.clip_count;
+    const double *times = ath_times(u->file) + clip->first_frame;
     REQUIRE(ath_branches(u->file)[0].parent == -1, "the first branch is a root");
-    REQUIRE(times[0] <= times[u->info.frame_count - 1], "times ascend");
+    REQUIRE(times[0] <= times[clip->frame_count - 1], "times ascend");
+    REQUIRE(ath_clip_named(u->file, clip->name) == argument % u->info.clip_count, "a clip is found by its name");
+    REQUIRE(ath_seam_error(u->file, argument % u->info.clip_count, level) >= 0.0, "seams have errors");
     REQUIRE(ath_fault(u->file) == -1, "an opened file has no fault");
 }
 

@@ -2,7 +2,7 @@
  * to the plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance
  * asks for.
  *
- *     play FILE [--slices N] [--seconds S] [--fps F]
+ *     play FILE [--clip NAME] [--slices N] [--seconds S] [--fps F]
  *
  * It prints the same on every machine, but for the microseconds. What it leaves out: threads (each has an
  * ath_work of its own), more than two segments in memory, and range requests (ath_ranges) instead of a download
@@ -25,6 +25,8 @@ typedef struct {
     size_t length, there, slice;
     ath_file *file;
     ath_info info;
+    int32_t clip_index, first_segment, last_segment;
+    const ath_clip *clip;         /* the one that is played */
     void *bases;
     ath_work *work;
     size_t file_size, build_size, work_size, segments_size;
@@ -97,6 +99,16 @@ static void open_file(player *p, const char *path, size_t slices)
     p->bound_level = -1;
 }
 
+/* Segments of the other clips are never asked for. */
+static void choose_clip(player *p, const char *name)
+{
+    p->clip_index = name ? ath_clip_named(p->file, name) : 0;
+    if (p->clip_index < 0) fail(name, "is none of the file's clips");
+    p->clip = ath_clips(p->file) + p->clip_index;
+    p->first_segment = p->clip->first_segment;
+    p->last_segment = p->first_segment + p->clip->segment_count - 1;
+}
+
 static void close_file(player *p)
 {
     void *const memories[] = {p->playing, p->next, p->work, p->bases, p->file,
@@ -109,8 +121,9 @@ static void close_file(player *p)
 
 static void choose_level(player *p, double distance)
 {
-    int32_t at_least = ath_depth_for(p->file, -1, distance, FOV, SCREEN, PIXELS);
-    int32_t at_most = ath_depth_for(p->file, -1, distance, FOV, SCREEN, COMFORTABLE);
+    int32_t at_least = ath_depth_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, PIXELS);
+    int32_t at_most = ath_depth_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN,
+                                    COMFORTABLE);
     if (p->level < at_least) p->level = at_least;
     if (p->level > at_most) p->level = at_most;
 }
@@ -144,7 +157,7 @@ static int start(player *p, int32_t segment, int32_t level)
  * next segment where this one is nearly over. `left`: drawn frames until then. */
 static int start_next(player *p, int32_t now, double left)
 {
-    int32_t count = p->info.segment_count, after = (now + 1) % count;
+    int32_t count = p->clip->segment_count, after = now < p->last_segment ? now + 1 : p->first_segment;
     int32_t level = level_for(p, now), level_after = level_for(p, after);
     if (level < 0) return 0;
     if (index_of(p->playing) != now) return start(p, now, level);
@@ -186,9 +199,9 @@ static void prepare(player *p, double place)
 /* A quarter of the time that a segment plays will do to prepare the next. */
 static void set_pace(player *p, double fps)
 {
-    double frame_time = p->info.duration / fmax(1.0, p->info.frame_count - 1);
+    double frame_time = p->clip->duration / fmax(1.0, p->clip->frame_count - 1);
     p->drawn_per_frame = frame_time * fps;
-    double drawn = p->drawn_per_frame * p->info.frame_count / p->info.segment_count;
+    double drawn = p->drawn_per_frame * p->clip->frame_count / p->clip->segment_count;
     p->spread = (int32_t)fmin(30.0, 1.0 + drawn / 4.0);
 }
 
@@ -230,9 +243,10 @@ static double camera(const player *p, double progress)
 {
     double error, unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* pixels of a length of 1 from a distance of 1 */
     double nearness = fmin(1.0, 1.5 * (1.0 - fabs(2.0 * progress - 1.0)));
-    ath_level_error(p->file, 0, -1, &error, NULL);
+    ath_level_error(p->file, 0, p->first_segment, p->last_segment, &error, NULL);
     double far = fmax(1e-6, 1.5 * error * unit / COMFORTABLE);
-    ath_level_error(p->file, p->info.level_count > 1 ? p->info.level_count - 2 : 0, -1, &error, NULL);
+    int32_t last_but_one = p->info.level_count > 1 ? p->info.level_count - 2 : 0;
+    ath_level_error(p->file, last_but_one, p->first_segment, p->last_segment, &error, NULL);
     double near = fmax(1e-6 * far, error * unit / (2.0 * PIXELS));
     return far * pow(near / far, nearness);
 }
@@ -246,7 +260,7 @@ static double microseconds(void)
 
 static void draw_frame(player *p, double seconds)
 {
-    double place = ath_frame_at(p->file, seconds, ATH_LOOP), begin = microseconds();
+    double place = ath_frame_at(p->file, p->clip_index, seconds, ATH_LOOP), begin = microseconds();
     prepare(p, place);
     double prepared = microseconds();
     p->held += draw(p, place) == ATH_HELD;
@@ -286,8 +300,13 @@ int main(int argc, char **argv)
 {
     player p = {0};
     double slices = 32, seconds = 12, fps = 60;
-    if (argc < 2 || argc % 2 != 0) fail("usage", "play FILE [--slices N] [--seconds S] [--fps F]");
+    const char *clip = NULL;
+    if (argc < 2 || argc % 2 != 0) fail("usage", "play FILE [--clip NAME] [--slices N] [--seconds S] [--fps F]");
     for (int i = 2; i < argc; i += 2) {
+        if (!strcmp(argv[i], "--clip")) {
+            clip = argv[i + 1];
+            continue;
+        }
         double *option = !strcmp(argv[i], "--slices") ? &slices : !strcmp(argv[i], "--seconds") ? &seconds
                          : !strcmp(argv[i], "--fps") ? &fps : NULL;
         if (!option) fail(argv[i], "no such option");
@@ -295,12 +314,13 @@ int main(int argc, char **argv)
         if (!(*option >= 1.0 && *option <= 1e6)) fail(argv[i], "expected a number from 1 to 1e6");
     }
     open_file(&p, argv[1], (size_t)slices);
+    choose_clip(&p, clip);
     set_pace(&p, fps);
     walk(&p, seconds, fps);
     printf("bytes of memory: file %zu, opened %zu, built %zu, work %zu, segments at most %zu\n", p.length,
            p.file_size, p.build_size, p.work_size, p.segments_size);
     printf("ranges missing at the end: %d\n",
-           (int)ath_ranges(p.file, p.info.level_count - 1, 0, p.info.segment_count - 1, 0, NULL, 0));
+           (int)ath_ranges(p.file, p.info.level_count - 1, p.first_segment, p.last_segment, 0, NULL, 0));
     close_file(&p);
     return EXIT_SUCCESS;
 }

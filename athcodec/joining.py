@@ -1,0 +1,157 @@
+"""Several clips of one plant as one, for one file; and clips that repeat without a jump.
+
+A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such clips
+one after the other; the encoder sees one long clip whose spans it codes apart. `looped` makes a clip that can be played
+over and over. Both read frames only when they are asked for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from athcodec.clip import MotionClip, Span, span_frames
+from athcodec.errors import ClipError
+
+BLEND = "loop_blend"  # metadata: frames that were blended
+
+
+def join(clips: Mapping[str, MotionClip]) -> MotionClip:
+    """One clip of several by name, which go into one .ath file, in this order.
+
+    They have the same vertices, branches, faces, edges and attributes, which the file holds once, and the same rest pose:
+    where that of a clip is its first frame, as it is for sources without one, the others' counts. Metadata in which they
+    differ are kept for each. Closing the result closes them all. Raises ClipError where they do not fit together.
+    """
+    if not clips:
+        raise ClipError("clips: got none, expected at least one")
+    parts, first = list(clips.values()), next(iter(clips.values()))
+    for name, part in clips.items():
+        _check_alike(name, part, next(iter(clips)), first)
+    spans = tuple(dataclasses.replace(_only_span(name, part), name=name) for name, part in clips.items())
+    rest = _common_rest(clips)
+    closing = ExitStack()
+    for part in parts:
+        closing.callback(part.close)
+    return MotionClip(
+        _Joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
+        first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
+        stem_index=first.stem_index, spans=spans, resource=closing, unchanged=_all_unchanged(parts), skin=first.skin)
+
+
+def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
+    """The clip as a loop: behind its last frame comes its first, after the mean time of a frame.
+
+    blend: for a motion that does not end where it began, so many frames at its end are taken off and blended into those at
+    its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a third of
+    the frames. Raises ClipError.
+    """
+    span = _only_span("", clip)
+    if not 0 <= blend <= clip.frame_count // 3:
+        raise ClipError(f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip")
+    frames = clip.frame_count - blend
+    spans = (dataclasses.replace(span, frame_count=frames, loop=True),)
+    if not blend:
+        return _replaced(clip, spans=spans)
+    return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], spans=spans,
+                     metadata=clip.metadata | {BLEND: blend})
+
+
+def _replaced(clip: MotionClip, **changes: Any) -> MotionClip:
+    return dataclasses.replace(clip, rest=clip.rest.astype(clip.rest_dtype), **changes)
+
+
+def _only_span(name: str, clip: MotionClip) -> Span:
+    if len(clip.spans) > 1:
+        raise ClipError(f"{name or 'clip'}: got {len(clip.spans)} clips in one, expected a single one")
+    return clip.spans[0] if clip.spans else Span(name, clip.frame_count)
+
+
+def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip) -> None:
+    """ClipError unless both are of the same plant."""
+    if clip.vertex_count != first.vertex_count:
+        raise ClipError(f"{name}: got {clip.vertex_count} vertices, expected {first.vertex_count} as {first_name} has")
+    for what in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
+        if not _equal(getattr(clip, what), getattr(first, what)):
+            raise ClipError(f"{name}: got other {what} than {first_name}, expected clips of one plant")
+    for what in sorted(clip.attributes.keys() | first.attributes.keys()):
+        if not _equal(clip.attributes.get(what), first.attributes.get(what)):
+            raise ClipError(f"{name}: got another attribute {what} than {first_name}, expected clips of one plant")
+
+
+def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
+    return a is b or (a is not None and b is not None and a.dtype == b.dtype and a.shape == b.shape
+                      and a.tobytes() == b.tobytes())
+
+
+def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
+    own = {name: clip for name, clip in clips.items() if not np.array_equal(clip.rest, clip.block(0, 1)[0])}
+    name, chosen = next(iter((own or clips).items()))
+    for other, clip in own.items():
+        if not np.array_equal(clip.rest, chosen.rest):
+            vertex = int(np.linalg.norm(clip.rest - chosen.rest, axis=1).argmax())
+            raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is {clip.rest[vertex].tolist()}, "
+                            f"not {chosen.rest[vertex].tolist()}), expected clips of one plant")
+    return chosen.rest.astype(chosen.rest_dtype)
+
+
+def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
+    """What all have in common, and under "clips" what each has of its own."""
+    every = [clip.metadata for clip in clips.values()]
+    common = {key: value for key, value in every[0].items() if all(key in each and each[key] == value for each in every)}
+    own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
+           for name, clip in clips.items()}
+    own = {name: metadata for name, metadata in own.items() if metadata}
+    return common | {"clips": own} if own else common
+
+
+def _all_unchanged(clips: Sequence[MotionClip]) -> Any:
+    checks = [clip.unchanged for clip in clips if clip.unchanged is not None]
+    return (lambda: all(check() for check in checks)) if checks else None
+
+
+class _Joined:
+    """(T, N, 3) positions of several, one after the other."""
+
+    def __init__(self, parts: Sequence[Any]):
+        self._parts = parts
+        self._frames = span_frames([Span("", part.shape[0]) for part in parts])
+        self.dtype = np.result_type(*(part.dtype for part in parts))
+        self.shape = (self._frames[-1][1], *parts[0].shape[1:])
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, frames: slice) -> np.ndarray:
+        start, stop, _ = frames.indices(self.shape[0])
+        runs = [np.asarray(part[max(start, first) - first: min(stop, last) - first], self.dtype)
+                for part, (first, last) in zip(self._parts, self._frames) if first < stop and start < last]
+        return runs[0] if len(runs) == 1 else np.concatenate(runs or [np.empty((0, *self.shape[1:]), self.dtype)])
+
+
+class _Blended:
+    """(T - blend, N, 3) positions whose first frames go from what follows their last over to their own."""
+
+    def __init__(self, positions: Any, blend: int):
+        self._positions, self._blend = positions, blend
+        self.dtype, self.shape = positions.dtype, (positions.shape[0] - blend, *positions.shape[1:])
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, frames: slice) -> np.ndarray:
+        start, stop, _ = frames.indices(self.shape[0])
+        shown = np.asarray(self._positions[start:stop])
+        last = min(stop, self._blend)
+        if start >= last:
+            return shown
+        place = np.arange(start, last)[:, None, None] / self._blend
+        weight = place * place * (3 - 2 * place)  # neither place nor speed jumps
+        leaving = np.asarray(self._positions[self.shape[0] + start: self.shape[0] + last], np.float64)
+        blended = shown.astype(self.dtype, copy=True)
+        blended[: last - start] = leaving + (shown[: last - start] - leaving) * weight
+        return blended
