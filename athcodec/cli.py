@@ -9,6 +9,7 @@ progress only where that is a terminal. Exit codes: 0 done, 1 an error or a fail
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import math
 import os
@@ -19,7 +20,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -35,11 +36,12 @@ from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
-from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
-from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
+from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS, Seam
+from athcodec.errors import AthError, ClipError, ClipUnavailable, LevelUnavailable, RemoteError
 from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
 from athcodec.hierarchy import branch_orders
+from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
@@ -49,6 +51,9 @@ INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 
 ROUNDING = 1e-6
 """How far, relatively, the encoder's figure of an error and that of ErrorMeter may differ."""
+
+JUMP = 3
+"""How many times the ways from frame to frame are what the way over a loop's seam should not be."""
 
 TRACEBACK = "show the traceback of an error"
 WRITTEN = "file to write; replaced when the new one is complete"
@@ -93,12 +98,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _encode(args: argparse.Namespace) -> int:
-    _check_output(args.output, args.input)
-    with _read(args, args.input) as clip, _naming(args.input), _progress() as report:
+    paths = [args.input, *(args.paths or ())]
+    output = args.output or paths.pop()
+    for path in paths:
+        _check_output(output, path)
+    with _clip_to_encode(paths, args) as clip, _naming(paths[0]), _progress() as report:
         unit = clip.metadata.get("unit")
-        athcodec.encode(
+        summary = athcodec.encode(
             _with_branches(clip, args.hierarchy),
-            args.output,
+            output,
             segment_frames=args.segment_frames,
             tam=_thresholds(args.tam, unit),
             exact_rest=args.exact_rest, lossless=args.lossless, weights=args.weights,
@@ -108,9 +116,18 @@ def _encode(args: argparse.Namespace) -> int:
             progress=report,
             **_bound(args, unit),
         )
-    with _open(args.output, strict=True) as decoder:
-        _print_file(args.output, decoder, args.json)
+    with _open(output, strict=True) as decoder:
+        _print_file(output, decoder, args.json)
+    for seam in summary.seams:
+        _say_seam(seam, paths[0])
     return 0
+
+
+def _say_seam(seam: Seam, path: str) -> None:
+    jumps = seam.step > JUMP * seam.step_beside + seam.error
+    _say("loop", f"{seam.clip or path}: vertices go up to {seam.step:.3g} from the last frame to the first, "
+                 f"{seam.step_beside:.3g} from frame to frame beside that; the file is off by {seam.error:.3g} there"
+                 + ("; it jumps, --loop-blend smooths it" if jumps else ""))
 
 
 def _batch(args: argparse.Namespace) -> int:
@@ -185,7 +202,10 @@ def _hierarchy(args: argparse.Namespace) -> int:
 
 def _decode(args: argparse.Namespace) -> int:
     _check_output(args.output, args.input)
-    with _open(args.input, args.stats, allow_partial=args.allow_partial) as decoder:
+    with _open(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
+        if args.clip is None and len(decoder.clips) > 1:
+            names = ", ".join(clip.name for clip in decoder.clips)
+            raise ClipUnavailable(f"got several clips, {names}; expected one of them with --clip")
         depth = decoder.deepest if args.depth is None else args.depth
         frames = _frames(args.frames, decoder.frame_count)
         with _progress() as report:
@@ -204,14 +224,16 @@ def _info(args: argparse.Namespace) -> int:
 
 
 def _verify(args: argparse.Namespace) -> int:
-    result: dict[str, Any] = {"file": args.file, "against": args.against, "ok": False}
+    result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
-        with _open(args.file, args.stats, strict=True) as decoder:
+        with _open(args.file, args.stats, strict=True, clip=args.clip) as decoder:
             decoder.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
-            if args.against:
-                result["depths"] = _measure_against(decoder, args)
-                _refuse_broken_promises(result)
+            for played, source in _with_sources(decoder, args):
+                measured = {"name": played.clip.name, "against": source}
+                measured["depths"] = _measure_against(played, source, args)
+                result["clips"].append(measured)
+                _refuse_broken_promises(result, measured)
         result["ok"] = True
     except AthError as error:
         result["error"] = _one_line(error)
@@ -310,6 +332,42 @@ def _export_demo(encoded: Path, page: Path) -> None:
 # ---- what they do with clips and decoders ----
 
 
+def _clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip:
+    """The clip in a file, or all of several as one."""
+    names = args.names or ([Path(path).stem for path in paths] if len(paths) > 1 else [""])
+    if len(names) != len(paths):
+        raise ClipError(f"--names: got {len(names)}, expected {len(paths)}, one for each input")
+    loops = names if args.loop == ["all"] else args.loop or []
+    for name in (*loops, *({name: name for name in names if names.count(name) > 1})):
+        if names.count(name) != 1:
+            raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
+    if args.loop_blend and not loops:
+        raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
+    clips: dict[str, MotionClip] = {}
+    with ExitStack() as opened:
+        for name, path in zip(names, paths):
+            clip = opened.enter_context(_read(args, path))
+            if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
+                clip = dataclasses.replace(clip, rest=next(iter(clips.values())).rest)
+            clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
+        joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
+        opened.pop_all()
+    return joined
+
+
+def _with_sources(decoder: Decoder, args: argparse.Namespace) -> list[tuple[Decoder, str]]:
+    """The clips to verify, and what to compare each with."""
+    if not args.against:
+        return []
+    if args.clip is not None or len(decoder.clips) == 1:
+        played = [decoder]
+    else:
+        played = [decoder.play(clip.name) for clip in decoder.clips]
+    if len(args.against) != len(played):
+        raise ClipError(f"--against: got {len(args.against)} sources, expected {len(played)}, one for each clip")
+    return list(zip(played, args.against))
+
+
 def _read(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
     return athcodec.read(path, args.source_format, rest=getattr(args, "rest", "auto"), fps=args.fps, mesh=args.mesh,
@@ -317,7 +375,7 @@ def _read(args: argparse.Namespace, path: str) -> MotionClip:
 
 
 @contextmanager
-def _open(path: str | Path, stats: bool = False, **options: bool) -> Iterator[Decoder]:
+def _open(path: str | Path, stats: bool = False, **options: Any) -> Iterator[Decoder]:
     with _naming(path), athcodec.open(path, **options) as decoder:
         try:
             yield decoder
@@ -378,9 +436,11 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
     return range(start, stop)
 
 
-def _measure_against(decoder: Decoder, args: argparse.Namespace) -> list[dict[str, Any]]:
-    """One entry per level: what it promises, and how far off the clip in args.against it is."""
-    with _read(args, args.against) as clip, _naming(args.against), clip.watched(), _progress() as report:
+def _measure_against(decoder: Decoder, source: str, args: argparse.Namespace) -> list[dict[str, Any]]:
+    """One entry per level: what it promises, and how far off the source it is."""
+    with _read(args, source) as clip, _naming(source), clip.watched(), _progress() as report:
+        if isinstance(blend := decoder.metadata.get(BLEND), int):
+            clip = athcodec.looped(clip, blend)
         got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
@@ -411,15 +471,15 @@ def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
     }
 
 
-def _refuse_broken_promises(result: dict[str, Any]) -> None:
-    levels = result["depths"]
+def _refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:
+    levels = measured["depths"]
     broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
     if levels[-1]["max_error"] > result["max_error_bound"]:
         broken.append((levels[-1], result["max_error_bound"]))
     for level, promised in broken[:1]:
         raise AthError(
             f"{result['file']}: level {level['depth']}: got max error {level['max_error']:.6g} against "
-            f"{result['against']}, expected at most {promised:.6g}"
+            f"{measured['against']}, expected at most {promised:.6g}"
         )
 
 
@@ -467,7 +527,7 @@ def _facts(path: str | Path, decoder: Decoder) -> dict[str, Any]:
     """decoder.info(), and per level what it adds to the file cut before it."""
     facts = {"file": os.fspath(path)} | decoder.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
-    facts["raw_bytes"] = decoder.frame_count * decoder.vertex_count * 12
+    facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
     before = decoder.container.prelude_length
     for level in facts["depths"]:
@@ -495,7 +555,18 @@ def _print_facts(facts: dict[str, Any]) -> None:
         print(f"Holds levels 0 to {facts['levels'] - 1} of 0 to {facts['full_levels'] - 1}.")
     if facts["missing"]:
         print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or facts["clips"][0]["loop"]:
+        _print_clips(facts)
     _print_levels(facts)
+
+
+def _print_clips(facts: dict[str, Any]) -> None:
+    """Errors at the seam are those of the deepest stored level."""
+    rows = [[clip["name"], f"{clip['frames']:,}", f"{clip['seconds']:.4g}", f"{clip['segments']:,}",
+             f"{clip['seam_errors'][facts['levels'] - 1]:.3g}" if clip["loop"] else "",
+             *(f"{error:.3g}" for error in clip["max_errors"])] for clip in facts["clips"]]
+    levels = [f"max at {level}" for level in range(facts["levels"])]
+    _print_table(["clip", "frames", "seconds", "segments", _head("loop's seam", facts["unit"]), *levels], rows)
 
 
 def _print_levels(facts: dict[str, Any]) -> None:
@@ -539,16 +610,18 @@ def _print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
 
 
 def _print_verdict(result: dict[str, Any]) -> None:
-    levels = result.get("depths", [])
-    if levels:
+    for clip in result["clips"]:
+        if clip["name"]:
+            print(f"{clip['name']}, against {clip['against']}:")
         lengths = [_head(name, result["unit"]) for name in ("promised", "max", "RMS")]
         rows = []
-        for level in levels:
+        for level in clip["depths"]:
             measures = [f"{level[name]:.4g}" for name in MEASURES]
             rows.append([f"{level['depth']}", *measures, "yes" if level["kept"] else "NO"])
         _print_table(["depth", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
     if result["ok"]:
-        more = f"; every depth is as close to {result['against']} as the file says" if levels else ""
+        sources = ", ".join(clip["against"] for clip in result["clips"])
+        more = f"; every depth is as close to {sources} as the file says" if sources else ""
         print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
 
 
@@ -723,13 +796,32 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _encode_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
-    verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
+    verb.usage = "athcodec encode IN [IN ...] OUT.ath [options]"
+    verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists; several "
+                      "of one plant share their hierarchy and rest pose in the file")
+    verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)
+    verb.add_argument("-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front of it or "
+                      "behind")
+    verb.add_argument("--names", metavar="NAME,...", type=_argument(_names),
+                      help="of the clips (default: of several, their files' names without suffix)")
+    verb.add_argument("--loop", metavar="NAME,...", type=_argument(_names),
+                      help="clips that are loops, their first frame following their last; all: every one")
+    verb.add_argument("--loop-blend", metavar="FRAMES", type=_argument(_whole), default=0,
+                      help="for loops that do not end where they began: take so many frames off their end and blend them "
+                      "into those at their beginning")
     _source_arguments(verb)
     _coding_arguments(verb)
     verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4, "
                       "fewer for large meshes); the file is the same whatever their number")
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+class _Output(argparse.Action):
+    """Says where to, so that no further path has to."""
+
+    def __call__(self, parser: argparse.ArgumentParser, args: argparse.Namespace, value: Any, option: Any = None) -> None:
+        args.output = value
+        next(action for action in parser._actions if action.dest == "paths").required = False
 
 
 def _batch_arguments(verb: argparse.ArgumentParser) -> None:
@@ -823,6 +915,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
     verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
+    verb.add_argument("--clip", metavar="NAME", help="the clip to decode, where the file has several")
     _stats_argument(verb)
     verb.add_argument(
         "--depth", metavar="LEVEL", type=_argument(_whole),
@@ -866,7 +959,9 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
-    verb.add_argument("--against", metavar="SOURCE", help="the source: measure the error of every depth")
+    verb.add_argument("--against", metavar="SOURCE", action="append",
+                      help="the source: measure the error of every depth; once for each clip, in the file's order")
+    verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -902,6 +997,10 @@ def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
             raise argparse.ArgumentTypeError(str(error)) from None
 
     return parsed
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
 
 
 def _positive_length(text: str) -> Length:

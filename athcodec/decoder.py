@@ -349,10 +349,15 @@ class Decoder:
     @property
     def depths(self) -> list[Depth]:
         """The stored levels, coarse to fine."""
-        starts = np.array(self.segments)
-        frames = starts[:, 1] - starts[:, 0]
+        return self._depths(self._clip)
+
+    def _depths(self, *clips: Clip) -> list[Depth]:
+        """With the errors of these clips."""
+        segments = [segment for clip in clips for segment in clip.segments]
+        bounds = [np.array(balanced_segments(clip.frame_count, clip.segment_count)) for clip in clips]
+        frames = np.concatenate([stops - starts for starts, stops in (each.T for each in bounds)])
         result = []
-        for depth, errors in enumerate(self.container.errors[:, self._clip.segments]):
+        for depth, errors in enumerate(self.container.errors[:, segments]):
             rms = float(np.sqrt((errors[:, 1] ** 2 * frames).sum() / frames.sum()))
             result.append(Depth(depth, self.nodes_at(depth), self.container.level_end(depth),
                                 float(errors[:, 0].max()), rms, self.available(depth)))
@@ -375,7 +380,7 @@ class Decoder:
             zip(TABLE_KEYS, self.thresholds))
 
     def info(self) -> dict:
-        """What `athcodec info --json` prints."""
+        """What `athcodec info --json` prints: of the whole file, all clips together."""
         return {
             "vertices": self.vertex_count, "frames": self.container.header.frame_count, "fps": self.fps,
             "branches": self.branch_count, "segments": self.container.header.segment_count, "nodes": self._player.info.node_count, "bytes": self.file_length,
@@ -383,10 +388,10 @@ class Decoder:
             "complete": self.complete, "levels": self.level_count, "full_levels": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
             "clips": [{"name": clip.name, "frames": clip.frame_count, "segments": clip.segment_count,
-                       "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors)}
-                      for clip in self.clips],
+                       "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors),
+                       "max_errors": [depth.max_error for depth in self._depths(clip)]} for clip in self.clips],
             "depths": [{"depth": d.depth, "nodes": d.nodes, "bytes": d.bytes, "max_error": d.max_error,
-                        "rms_error": d.rms_error, "available": d.available} for d in self.depths],
+                        "rms_error": d.rms_error, "available": d.available} for d in self._depths(*self.clips)],
         }
 
     # ---- static data, in the source's numbering ----
