@@ -9,10 +9,12 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
 
     strict      opens strictly; no answer
     open        opens for streaming, as all that follow; no answer
-    0, 1, ...   positions of that level: frames x vertices x 3 numbers, little-endian, in source order,
-                binary64 where Wide is set, else binary32
+    0, 1, ...   positions of that level: frames of all clips x vertices x 3 numbers, little-endian, in source
+                order, binary64 where Wide is set, else binary32
     rest        the rest pose: vertices x 3 numbers of Rest_Type, little-endian, in source order
-    time        the time of every frame, binary64, little-endian
+    time        the time of every frame, clip by clip, binary64, little-endian
+    clips       what CLIPS says of every clip, written anew from what the decoder knows of it: frames,
+                segments, flags, name, seams; of a file without CLIPS, what it would hold
     static      Text of METADATA, then the elements of all arrays in file order, unshuffled, gaps included;
                 derived edges as if they were stored
 
@@ -143,7 +145,7 @@ def items(data: bytes) -> list[str]:
         file = rd.AthFile(data)
     except rd.AthError:
         return list(NO_ANSWER)
-    return [*NO_ANSWER, *map(str, range(file.header.level_count)), "rest", "time", "static"]
+    return [*NO_ANSWER, *map(str, range(file.header.level_count)), "rest", "time", "clips", "static"]
 
 
 def result(ask: Callable[[bytes, str], bytes], data: bytes, item: str) -> str:
@@ -327,8 +329,8 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
     parser.add_argument("--only", metavar="GLOB", default="*", help="files whose name in expected.txt fits")
     parser.add_argument("--without", metavar="ITEM", action="append", default=[],
-                        help="leave out what a decoder does not do: strict, open, levels, rest, time, static, "
-                             "limits; again for more")
+                        help="leave out what a decoder does not do: strict, open, levels, rest, time, clips, "
+                             "static, limits; again for more")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="DECODER-COMMAND")
     options = parser.parse_args(words)
     if bool(options.own) == bool(options.command):

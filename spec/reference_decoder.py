@@ -18,6 +18,7 @@ import struct
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from itertools import islice
 
 import numpy as np
 import zstandard
@@ -91,17 +92,17 @@ def crc32c(data: bytes) -> int:
 # ---- the front: header, chunk table, error table -----------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 3)
+VERSION = (0, 4)
 HEADER_BYTES, ENTRY_BYTES, ERROR_BYTES = 64, 16, 8
 SEGMENT_FRAMES, MOST_LEVELS, NO_LEVEL = 256, 32, 255
 
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
-METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
+METADATA, FACES, EDGES, CLIPS = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
 ATTRIBUTE = OPTIONAL | 32
 KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES",
-         EDGES: "EDGES",
+         EDGES: "EDGES", CLIPS: "CLIPS",
          STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
          EXACT: "EXACT",
          ATTRIBUTE: "ATTRIBUTE"}
@@ -118,6 +119,7 @@ class Header:
     segment_count: int
     level_count: int
     full_level_count: int
+    clip_count: int
     wide: bool
     max_error: float
 
@@ -128,10 +130,6 @@ class Header:
     @property
     def chunks_at(self) -> int:
         return self.error_table_at + ERROR_BYTES * self.level_count * self.segment_count
-
-    def segment(self, s: int) -> tuple[int, int]:
-        """First frame of a segment, and the one behind its last."""
-        return self.frame_count * s // self.segment_count, self.frame_count * (s + 1) // self.segment_count
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ def read_header(data: bytes, limits: Limits) -> Header:
         require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
     require(len(data) >= HEADER_BYTES, "ends inside its header", "TRUNCATED")
     header = Header(u32(data, 12), u64(data, 16), u32(data, 24), u32(data, 28), u32(data, 32), u32(data, 36),
-                    u32(data, 40), data[44], data[45], bool(data[47] & 1), f64(data, 48))
+                    u32(data, 40), data[44], data[45], data[46], bool(data[47] & 1), f64(data, 48))
     for name, count, most in (("Vertex_Count", header.vertex_count, limits.vertices),
                               ("Branch_Count", header.branch_count, limits.branches),
                               ("Frame_Count", header.frame_count, limits.frames),
@@ -185,7 +183,7 @@ def read_header(data: bytes, limits: Limits) -> Header:
                         ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
                         ("Full_Level_Count", 2 <= header.full_level_count <= MOST_LEVELS),
                         ("Level_Count", 1 <= header.level_count <= header.full_level_count),
-                        ("Clip_Count", data[46] == 1), ("Flags", data[47] < 2),
+                        ("Clip_Count", header.clip_count > 0), ("Flags", data[47] < 2),
                         ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
                         ("Reserved", u64(data, 56) == 0)):
         require(valid, f"{name} is out of range", "BAD_HEADER")
@@ -229,6 +227,70 @@ def check_kind(kind: int) -> None:
     taken = {known & ~OPTIONAL for known in KINDS}
     skipped = kind & OPTIONAL and kind & ~OPTIONAL not in taken
     require(kind in KINDS or bool(skipped), f"kind {kind:#06x} is not known", "UNKNOWN_CHUNK")
+
+
+# ---- clips -------------------------------------------------------------------------------------------------
+
+CLIP_BYTES = 10  # in front of the name
+
+
+@dataclass(frozen=True)
+class Clip:
+    frames: int
+    segments: int
+    name: str = ""
+    seams: tuple[float, ...] | None = None  # of a loop: Seam_Errors, one for each level
+
+    @property
+    def segment_lengths(self) -> list[int]:
+        """Frames of each segment."""
+        starts = [self.frames * k // self.segments for k in range(self.segments + 1)]
+        return [stop - start for start, stop in zip(starts, starts[1:])]
+
+    def entry(self) -> bytes:
+        """What CLIPS says of it."""
+        name, seams = self.name.encode("utf-8"), self.seams or ()
+        head = struct.pack("<IIBB", self.frames, self.segments, self.seams is not None, len(name))
+        return head + name + struct.pack(f"<{len(seams)}f", *seams)
+
+
+def read_clips(chunk: bytes, header: Header) -> list[Clip]:
+    clips, at = [], 0
+    for _ in range(header.clip_count):
+        clip, at = read_clip(chunk, at, header)
+        clips.append(clip)
+    require(at == len(chunk), "CLIPS has bytes behind its last clip")
+    require(len({clip.name for clip in clips}) == len(clips), "two clips have the same Name")
+    require(sum(clip.frames for clip in clips) == header.frame_count,
+            "Clip_Frames do not add up to Frame_Count")
+    require(sum(clip.segments for clip in clips) == header.segment_count,
+            "Clip_Segments do not add up to Segment_Count")
+    return clips
+
+
+def read_clip(chunk: bytes, at: int, header: Header) -> tuple[Clip, int]:
+    """One entry, and where the next one begins."""
+    require(at + CLIP_BYTES <= len(chunk), "CLIPS ends inside a clip")
+    frames, segments, flags, length = u32(chunk, at), u32(chunk, at + 4), chunk[at + 8], chunk[at + 9]
+    require(1 <= segments <= frames <= SEGMENT_FRAMES * segments,
+            "Clip_Frames or Clip_Segments is out of range")
+    require(flags < 2, "Clip_Flags has reserved bits")
+    require(length > 0 or header.clip_count == 1, "Name_Length is 0 in a file of several clips")
+    name_at, seams_at = at + CLIP_BYTES, at + CLIP_BYTES + length
+    end = seams_at + (4 * header.full_level_count if flags else 0)
+    require(end <= len(chunk), "CLIPS ends inside a clip")
+    seams = tuple(f32(chunk, i) for i in range(seams_at, end, 4)) if flags else None
+    require(all(finite(seam) and seam >= 0.0 for seam in seams or ()), "a seam's error is no length")
+    return Clip(frames, segments, clip_name(chunk[name_at:seams_at]), seams), end
+
+
+def clip_name(name: bytes) -> str:
+    try:
+        text = name.decode("utf-8")
+    except UnicodeDecodeError:
+        raise AthError("BAD_CHUNK", "the Name of a clip is not UTF-8") from None
+    require(all(c >= " " and c != "\x7f" for c in text), "the Name of a clip has a control character")
+    return text
 
 
 # ---- range coder -------------------------------------------------------------------------------------------
@@ -613,18 +675,28 @@ def decode_times(stream: bytes, frame_count: int) -> list[float]:
     return times
 
 
-def frame_times(chunk: bytes, frame_count: int) -> list[float]:
-    """TIME: seconds of every frame."""
+def frame_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
+    """TIME: seconds of every frame of every clip."""
     require(len(chunk) > 0 and chunk[0] <= 2, "TIME has an unknown Method")
-    if chunk[0] == 2:
-        times = decode_times(chunk[1:], frame_count)
-    else:
-        require(len(chunk) == 17, "TIME has not First and Step alone")
-        first, step = f64(chunk, 1), f64(chunk, 9)
+    times = uneven_times(chunk, clips) if chunk[0] == 2 else steady_times(chunk, clips)
+    for own in times:
+        ascending = all(a < b for a, b in zip(own, own[1:]))
+        require(ascending and all(map(finite, own)), "times of a clip are not finite and ascending")
+    return times
+
+
+def uneven_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
+    stream = iter(decode_times(chunk[1:], sum(clip.frames for clip in clips)))
+    return [list(islice(stream, clip.frames)) for clip in clips]
+
+
+def steady_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
+    require(len(chunk) == 1 + 16 * len(clips), "TIME has not First and Step of every clip alone")
+    times = []
+    for c, clip in enumerate(clips):
+        first, step = f64(chunk, 1 + 16 * c), f64(chunk, 9 + 16 * c)
         require(finite(step) and step > 0.0, "Step of TIME is not above 0")
-        times = [first + (float(i) / step if chunk[0] else float(i) * step) for i in range(frame_count)]
-    ascending = all(a < b for a, b in zip(times, times[1:]))
-    require(ascending and all(map(finite, times)), "times are not finite and ascending")
+        times.append([first + (float(i) / step if chunk[0] else float(i) * step) for i in range(clip.frames)])
     return times
 
 
@@ -1656,15 +1728,15 @@ class AthFile:
         self.chunks = read_chunk_table(self.data, self.header, self.limits)
         self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
         self._check_length(strict)
-        frames = -(-self.header.frame_count // self.header.segment_count)
-        require(self.header.vertex_count * (60 * frames + 512) <= self.limits.memory_bytes,
-                "needs too much memory",
-                "LIMIT_EXCEEDED")
+        self._check_memory(-(-self.header.frame_count // self.header.segment_count))
+        self.clips = self._read_clips()
+        self._segment_lengths = [frames for clip in self.clips for frames in clip.segment_lengths]
+        self._check_memory(max(self._segment_lengths))
         with np.errstate(all="ignore"):  # infinities and NaN are results like others
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
             self._read_rest(self.content(REST))
-            self.times = frame_times(self.content(TIME), self.header.frame_count)
+            self.times = frame_times(self.content(TIME), self.clips)
 
     def _check_length(self, strict: bool) -> None:
         behind = [c.offset for c in self.chunks if c.key[0] > 0]
@@ -1673,6 +1745,10 @@ class AthFile:
         if strict:
             require(len(self.data) >= self.header.file_length, "is shorter than File_Length", "TRUNCATED")
             require(len(self.data) <= self.header.file_length, "is longer than File_Length", "TRAILING_BYTES")
+
+    def _check_memory(self, segment_frames: int) -> None:
+        require(self.header.vertex_count * (60 * segment_frames + 512) <= self.limits.memory_bytes,
+                "needs too much memory", "LIMIT_EXCEEDED")
 
     def is_available(self, chunk: Chunk) -> bool:
         return chunk.offset + chunk.length <= len(self.data)
@@ -1692,6 +1768,11 @@ class AthFile:
         return self.bytes_of(chunk)
 
     # Prelude.
+
+    def _read_clips(self) -> list[Clip]:
+        if self.header.clip_count == 1 and not self.find(CLIPS):
+            return [Clip(self.header.frame_count, self.header.segment_count)]
+        return read_clips(self.content(CLIPS), self.header)
 
     def _read_hierarchy(self, chunk: bytes) -> None:
         require(len(chunk) >= 16, "HIERARCHY is too short")
@@ -1764,7 +1845,8 @@ class AthFile:
         return complete
 
     def positions(self, level: int | None = None) -> np.ndarray:
-        """(frames, vertices, 3) in source order, of the deepest complete level or the one named."""
+        """(frames, vertices, 3) in source order, the frames of all clips, of the deepest complete level or
+        the one named."""
         level = self.deepest if level is None else level
         if not 0 <= level < self.header.level_count:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
@@ -1777,8 +1859,7 @@ class AthFile:
         """(vertices, 3, frames) in file order."""
         for chunk in self._needed(s, level):
             require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
-        start, stop = self.header.segment(s)
-        motion = self._motion(s, stop - start, level)
+        motion = self._motion(s, self._segment_lengths[s], level)
         placed = Pose(self.plan, motion, level).placed
         positions = (placed + self.origin[:, None]).astype(self.position_type)
         last = self.plan.height + 1
@@ -1898,7 +1979,9 @@ def raw(file: AthFile, what: str) -> bytes:
     if what == "rest":
         return file.rest().tobytes()
     if what == "time":
-        return np.array(file.times, "<f8").tobytes()
+        return np.concatenate(file.times).astype("<f8").tobytes()
+    if what == "clips":
+        return b"".join(clip.entry() for clip in file.clips)
     return file.positions(int(what)).tobytes()
 
 
@@ -1909,6 +1992,8 @@ def show(options: argparse.Namespace, data: bytes) -> None:
     frames, vertices, _ = positions.shape
     print(f"{frames} frames of {vertices} vertices, {positions.dtype}, "
           f"level {level} of {file.header.level_count - 1}")
+    for clip in file.clips if file.find(CLIPS) else ():
+        print(f"{clip.name!r}: {clip.frames} frames" + (", a loop" if clip.seams is not None else ""))
     if options.checksum:
         print(f"{crc32c(positions.tobytes()):08x}")
     if options.out:
