@@ -36,12 +36,14 @@ from spec.scripted import (
     Plant,
     Stem,
     basis_stream,
+    clip_entry,
     grown,
     hierarchy_chunk,
     hierarchy_script,
     rest_chunk,
     row,
     steady_time,
+    steady_times,
     stems_head,
     uneven_time,
     write,
@@ -252,6 +254,78 @@ valid("thresholds", "Epsilon, Xi, Eta and Lambda at the ends of their range", la
     rd.HIERARCHY,
     content=hierarchy_chunk(lone().draft().content(rd.HIERARCHY)[16:], FLOAT_MAX, 0.0, 2**32 - 1, 0)))
 
+# ---- valid: clips ------------------------------------------------------------------------------------------
+
+CALM, STORM = rd.Clip(3, 1, "calm"), rd.Clip(4, 2, "storm")
+
+
+def two_clips(**fields) -> Draft:
+    """The fork with two clips, of 3 frames, and of 4 in two segments."""
+    return forked(**{"clips": (CALM, STORM)} | fields).draft()
+
+
+def loop(clip: rd.Clip, *seams: float) -> rd.Clip:
+    return replace(clip, seams=seams)
+
+
+def named(*names: str) -> Plant:
+    """One vertex with a clip of a frame for each name."""
+    return lone(clips=tuple(rd.Clip(1, 1, name) for name in names))
+
+
+valid("clips-two", "two clips of different lengths, that share the shapes of pieces", two_clips)
+valid("clips-three", "13 frames in 6 segments, which without the clips would begin elsewhere",
+      lambda: moving(FORK, 28, heads=HEADS, clips=(rd.Clip(5, 2, "a"), rd.Clip(1, 1, "b"), rd.Clip(7, 3, "c"))))
+valid("clips-of-one-frame", "three clips of one frame each, one of them a loop",
+      lambda: moving(FORK, 29, heads=HEADS, clips=(
+          rd.Clip(1, 1, "a"), loop(rd.Clip(1, 1, "b"), 0.0, 0.0, 0.0), rd.Clip(1, 1, "c"))))
+valid("clips-segment-lengths", "a segment of as many frames as there can be before shorter ones",
+      lambda: lone(clips=(rd.Clip(256, 1, "long"), rd.Clip(257, 2, "longer"), rd.Clip(2, 2, "short")),
+                   scripts={(rd.STEMS, 0): row((1, 2, 3))}))
+valid("clips-255", "as many clips as there can be, the last with a segment more",
+      lambda: lone(clips=(*(rd.Clip(1, 1, f"{i}") for i in range(254)), rd.Clip(2, 2, "last")),
+                   scripts={(rd.STEMS, 0): row((1, 2, 3))}))
+valid("clips-loops", "two loops around a clip that is none: seams at the ends of binary32, and -0.0",
+      lambda: two_clips(clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), rd.Clip(2, 1, "once"),
+                               loop(STORM, FLOAT_MAX, 1.0, -0.0))))
+valid("clip-named", "a single clip with a name", lambda: two_clips(clips=(CALM,)))
+valid("clip-loop", "a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
+valid("clip-unnamed", "a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(rd.Clip(4, 2),)))
+valid("clip-unnamed-loop", "a single loop with an empty name",
+      lambda: two_clips(clips=(loop(rd.Clip(4, 2), 0.25, 0.25, 0.0),)))
+valid("clips-time", "First and Step of each clip: the second begins before the first and overlaps it",
+      lambda: two_clips(time=steady_times((10.0, 0.5), (-1.0, 0.25))))
+valid("clips-time-rate", "First and rate of each clip, which all begin at 0",
+      lambda: two_clips(time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)))
+valid("clips-time-uneven", "times one by one, that descend and repeat from clip to clip",
+      lambda: two_clips(time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)))
+valid("clips-time-of-one-frame", "clips of one frame, all at the same time, one by one",
+      lambda: replace(named("a", "b", "c"), time=uneven_time(1.5, 1.5, 1.5)))
+valid("clips-time-vast", "what a time is expected to be, from clips before, overflows to infinity",
+      lambda: replace(named("a", "b", "c", "d"), time=uneven_time(LOWEST, HIGHEST, LOWEST, 0.0)))
+valid("clips-time-step-vanishes", "a Step that vanishes, in a clip of one frame",
+      lambda: two_clips(clips=(CALM, rd.Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)),
+                        scripts={}))
+valid("clips-steps", "segments with steps, rotations and bases of their own, of as many rows as each has frames",
+      lambda: moving(FORK, 30, clips=(CALM, STORM), heads={
+          (1, 0): stems_head(0.5, 3, 8, 3, basis_stream([[100, -100, 100], [128, 0, -128], [1, 2, 3]], 8)),
+          (1, 1): stems_head(0.001, 0, 9, 2, basis_stream([[1, 2], [256, -256]], 9)),
+          (2, 2): stems_head(0.25, 1)}))
+valid("clips-corrections", "corrections in the second clip alone",
+      lambda: Plant(FORK, clips=(CALM, STORM), wide=True, scripts={(rd.CORRECTIONS, 2, 2): lambda: Chance(58)}))
+valid("clips-truncated", "shortened: level 0 of 3, seams of all three",
+      lambda: two_clips(clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))).upto(0))
+valid("clips-lossless", "two loops whose last level is the source's own numbers: seams of four levels",
+      lambda: two_clips(clips=(loop(CALM, 3.0, 2.0, 1.0, 0.0), loop(STORM, 0.5, 0.25, 0.125, 0.0))).with_header(
+          level_count=4, full_level_count=4).add(*(Entry(rd.EXACT, b"", 3, s) for s in range(3))))
+valid("clips-names", "names that differ in case, in accents, in their ends, by spaces alone", lambda: named(
+    "wind", "Wind", "WIND", "win", "winds", " ", "  ", "B\u00f6e", "Bo\u0308e", "\u98ce", "\U0001f333", "\"\\/",
+    "a.b/c"))
+valid("clips-names-ends", "characters at the ends of the ranges of UTF-8", lambda: named(
+    " ", "~", "\x80", "\x9f", "\u07ff", "\u0800", "\ud7ff", "\ue000", "\ufeff", "\ufffe", "\uffff",
+    "\U00010000", "\U0010ffff"))
+valid("clips-names-longest", "names of 255 bytes", lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85))
+
 # ---- valid: rest poses -------------------------------------------------------------------------------------
 
 AWKWARD_FLOATS = [-0.0, FLOAT_TINY, -FLOAT_MAX, FLOAT_MAX, 1.0, -1e-40, 0.0, 1 + 2**-23, -1.0]
@@ -384,7 +458,7 @@ FUTURE = b"from the future"
 valid("unknown-optional",
       "optional kinds that are not known, in every place where they may stand, some twice",
       lambda: fork().add(
-          Entry(0x8000, FUTURE), Entry(0x8007, FUTURE), Entry(0x800F, b""), Entry(0x8015, FUTURE, 0, 1),
+          Entry(0x8000, FUTURE), Entry(0x8008, FUTURE), Entry(0x800F, b""), Entry(0x8015, FUTURE, 0, 1),
           Entry(0x8015, FUTURE, 1, 1), Entry(0x801F, FUTURE, 1, 1), Entry(0x801F, b"", 2, 0),
           Entry(0x8021, FUTURE),
           Entry(0x8021, FUTURE), Entry(0xFFFF, FUTURE), Entry(0xFFFF, b"")))
@@ -577,9 +651,9 @@ def everything() -> Draft:
                                basis_by_chance(random, rank, 5, bits))
              for level, bits, rank in ((1, 11, 3), (2, 8, 1), (4, 16, 5))}
     plant = Plant(
-        EVERYTHING, 10, 2,
+        EVERYTHING, clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.0), rd.Clip(5, 1, "down")),
         rest=coded_rest(EVERYTHING, Chance(71), wide=1, origin=(10.0, -3.5, 0.25), step=0.01),
-        time=uneven_time(*random.random(10).cumsum().tolist()),
+        time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
         vertex_source=random.permutation(vertices).tolist(), wide=True, heads=HEADS | bases,
         scripts={(rd.STEMS, level): lambda level=level: Chance(72 + level) for level in range(5)}
@@ -589,8 +663,8 @@ def everything() -> Draft:
                                9, *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0)))],
            (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))]})
     return plant.draft().with_header(level_count=6, full_level_count=6).add(
-        Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1), Entry(rd.METADATA, b"\1" + WIND_FRAME), Entry(rd.FACES, numbers(FACES_3)),
-        Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
+        Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1), Entry(rd.METADATA, b"\1" + WIND_FRAME),
+        Entry(rd.FACES, numbers(FACES_3)), Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
         Entry(0x8009, FUTURE), Entry(0x8015, FUTURE, 1, 1),
         Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
         Entry(rd.ATTRIBUTE, element(NESTED_16, b"\1", "a")), Entry(0x8040, FUTURE))
@@ -698,7 +772,6 @@ invalid("hierarchy-31-deep", "BAD_HEADER", "open",
         "32 branches, each on the one before: no Full_Level_Count can say 33",
         lambda: moving(chain(32), 1).draft().upto(31).with_header(full_level_count=32))
 header("clips-0", "BAD_HEADER", "Clip_Count 0", clip_count=0)
-header("clips-2", "BAD_HEADER", "Clip_Count 2", clip_count=2)
 for bit in range(1, 8):
     header(f"flags-{bit}", "BAD_HEADER", f"reserved bit {bit} of Flags is set", flags=1 << bit)
 header("max-error-nan", "BAD_HEADER", "Max_Error is NaN", max_error=NAN)
@@ -761,21 +834,21 @@ def moved(kind: int, **place: int) -> Draft:
                    entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1:]))
 
 
-def inserted(at: int, entry: Entry) -> Draft:
+def inserted(at: int, *entries: Entry) -> Draft:
     draft = fork()
-    return replace(draft, entries=(*draft.entries[:at], entry, *draft.entries[at:]))
+    return replace(draft, entries=(*draft.entries[:at], *entries, *draft.entries[at:]))
 
 
-for kind, level, why in ((0x0000, 255, "kind 0"), (0x0007, 255, "in the prelude"), (0x0015, 0, "of motion"),
+for kind, level, why in ((0x0000, 255, "kind 0"), (0x0008, 255, "in the prelude"), (0x0015, 0, "of motion"),
                          (0x0021, 255, "behind the motion"), (0x7FFF, 255, "the last one")):
     table(f"unknown-{kind:04x}", "UNKNOWN_CHUNK", f"a required kind that is not known, {why}",
           lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)))
 for kind, level, name in ((0x8001, 255, "HIERARCHY"), (0x0004, 255, "METADATA"), (0x8010, 1, "STEMS"),
                           (0x8013, 1, "SHAPES"),
-                          (0x0020, 255, "ATTRIBUTE")):
+                          (0x8007, 255, "CLIPS"), (0x0020, 255, "ATTRIBUTE")):
     table(f"twin-{kind:04x}", "UNKNOWN_CHUNK", f"{name} with the wrong bit 15",
           lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)))
-table("clip-1", "BAD_CHUNK_TABLE", "Clip 1", lambda: fork().change(rd.STEMS, 1, 0, clip=1))
+table("reserved", "BAD_CHUNK_TABLE", "Reserved is 1", lambda: fork().change(rd.STEMS, 1, 0, reserved=1))
 table("level-of-prelude", "BAD_CHUNK_TABLE", "HIERARCHY with Level 0",
       lambda: moved(rd.HIERARCHY, level=0))
 table("segment-of-prelude", "BAD_CHUNK_TABLE", "REST with Segment 1",
@@ -818,7 +891,7 @@ table("twice-unknown-motion", "BAD_CHUNK_TABLE", "an unknown optional motion kin
 table("length-limit", "LIMIT_EXCEEDED", "a chunk of 2^28 + 1 bytes",
       lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)).with_header(file_length=1 << 30))
 table("length-limit-of-unknown", "UNKNOWN_CHUNK", "the Kind is checked before the Length",
-      lambda: fork().add(Entry(7, b"", length=2**32 - 1)))
+      lambda: fork().add(Entry(8, b"", length=2**32 - 1)))
 table("length-limit-before-place", "LIMIT_EXCEEDED", "the Length is checked before the Level",
       lambda: fork().add(Entry(0x8009, b"", 0, length=2**32 - 1)))
 table("length-more", "BAD_CHUNK_TABLE", "chunks that end behind File_Length",
@@ -1034,6 +1107,177 @@ invalid("time-code-outside", "BAD_CHUNK", "open", "a stream whose code is outsid
 invalid("time-of-one-infinite", "BAD_CHUNK", "open", "First of a single frame is infinite",
         lambda: lone().draft().change(rd.TIME, content=steady_time(INFINITY)))
 
+# ---- invalid: clips ----------------------------------------------------------------------------------------
+
+CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
+
+
+def clips(name: str, reason: str, *entries: bytes, count: int = 2) -> None:
+    """The two clips with another CLIPS."""
+    invalid(f"clips-{name}", "BAD_CHUNK", "open", reason,
+            lambda: two_clips().with_header(clip_count=count).change(rd.CLIPS, content=b"".join(entries)))
+
+
+def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
+    """One vertex, and any CLIPS."""
+    draft = lone(frames=frames, segments=segments).draft().add(Entry(rd.CLIPS, b"".join(entries)))
+    return draft.with_header(clip_count=len(entries), **header_fields)
+
+
+invalid("clips-missing", "BAD_CHUNK_TABLE", "open", "two clips and no CLIPS",
+        lambda: two_clips().without(rd.CLIPS))
+clips("empty", "no bytes")
+clips("cut-in-entry", "ends inside the fields of the first clip", CALM_ENTRY[:9])
+clips("cut-before-name", "ends before the Name of the first clip", CALM_ENTRY[:10])
+clips("cut-in-name", "ends inside the Name of the second clip", CALM_ENTRY, STORM_ENTRY[:-1])
+clips("less", "one clip of two", CALM_ENTRY)
+clips("less-than-count", "two clips of three", CALM_ENTRY, STORM_ENTRY, count=3)
+clips("more-than-count", "a clip more than Clip_Count", CALM_ENTRY, STORM_ENTRY, clip_entry(1, 1, "more"))
+clips("more-than-one", "two clips where Clip_Count is 1", CALM_ENTRY, STORM_ENTRY, count=1)
+clips("byte-behind", "a byte behind the last clip", CALM_ENTRY, STORM_ENTRY, b"\0")
+clips("frames-0", "Clip_Frames and Clip_Segments are 0", clip_entry(0, 0, "calm"), clip_entry(7, 3, "storm"))
+clips("segments-0", "Clip_Segments 0", clip_entry(3, 0, "calm"), clip_entry(4, 3, "storm"))
+clips("segments-more-than-frames", "Clip_Segments above Clip_Frames",
+      clip_entry(1, 2, "calm"), clip_entry(6, 1, "storm"))
+invalid("clips-frames-257", "BAD_CHUNK", "open", "Clip_Frames 257 in one segment",
+        lambda: lone_clips(513, 3, clip_entry(257, 1, "long"), clip_entry(256, 2, "short")))
+clips("frames-do-not-add-up", "Clip_Frames add up to less than Frame_Count",
+      clip_entry(2, 1, "calm"), STORM_ENTRY)
+clips("frames-add-up-to-more", "Clip_Frames add up to more than Frame_Count",
+      CALM_ENTRY, clip_entry(5, 2, "storm"))
+clips("segments-do-not-add-up", "Clip_Segments add up to less than Segment_Count",
+      CALM_ENTRY, clip_entry(4, 1, "storm"))
+clips("segments-add-up-to-more", "Clip_Segments add up to more than Segment_Count",
+      clip_entry(3, 2, "calm"), STORM_ENTRY)
+clips("sums-wrap", "Clip_Frames and Clip_Segments add up to 2^32 more than they should",
+      clip_entry(2**32 - 4, 2**32 - 4, "calm"), clip_entry(11, 7, "storm"))
+clips("of-one-do-not-add-up", "the only clip has less frames than the file", clip_entry(6, 3, "all"), count=1)
+for bit in range(1, 8):
+    clips(f"flags-{bit}", f"reserved bit {bit} of Clip_Flags is set",
+          clip_entry(3, 1, "calm", flags=1 << bit), STORM_ENTRY)
+clips("name-none", "Name_Length 0 in a file of two clips", CALM_ENTRY, clip_entry(4, 2))
+clips("name-twice", "two clips with the same Name", CALM_ENTRY, clip_entry(4, 2, "calm"))
+clips("name-twice-apart", "the first and the third clip with the same Name",
+      CALM_ENTRY, clip_entry(1, 1, "storm"), clip_entry(3, 1, "calm"), count=3)
+clips("name-length-more", "Name_Length is more than the chunk holds",
+      CALM_ENTRY, clip_entry(4, 2, "storm", length=6))
+clips("name-length-less", "Name_Length is less: a byte remains",
+      CALM_ENTRY, clip_entry(4, 2, "storm", length=4))
+for name, why, text in (
+        ("continuation", "a continuation byte alone", b"\x80"), ("latin-1", "Latin-1", b"B\xf6e"),
+        ("overlong-2", "an overlong form of two bytes", b"\xc1\xbf"),
+        ("overlong-nul", "U+0000 in two bytes", b"\xc0\x80"),
+        ("overlong-3", "an overlong form of three bytes", b"\xe0\x9f\xbf"),
+        ("overlong-4", "an overlong form of four bytes", b"\xf0\x8f\xbf\xbf"),
+        ("surrogate-first", "the first surrogate", b"\xed\xa0\x80"),
+        ("surrogate-last", "the last surrogate", b"\xed\xbf\xbf"),
+        ("surrogates", "a surrogate pair", b"\xed\xa0\xbc\xed\xbc\xb3"),
+        ("beyond", "U+110000", b"\xf4\x90\x80\x80"), ("far-beyond", "U+140000", b"\xf5\x80\x80\x80"),
+        ("five-bytes", "a sequence of five bytes", b"\xf8\x88\x80\x80\x80"),
+        ("fe", "the byte FE", b"a\xfe"), ("ff", "the byte FF", b"a\xff"),
+        ("cut-2", "a sequence cut before its second byte", b"a\xc3"),
+        ("cut-3", "a sequence cut before its third byte", b"a\xe9\xa3"),
+        ("cut-4", "a sequence cut before its fourth byte", b"a\xf0\x9f\x8c"),
+        ("broken", "a letter inside a sequence", b"\xe9\xa3a"),
+        ("broken-4", "a letter behind a first byte", b"\xf0a\x8c\xb3")):
+    clips(f"name-{name}", f"a Name that is not UTF-8: {why}", CALM_ENTRY, clip_entry(4, 2, text))
+invalid("clips-name-cut-before-continuation", "BAD_CHUNK", "open",
+        "a Name that ends inside a sequence, which the Clip_Frames behind it would complete",
+        lambda: lone_clips(131, 2, clip_entry(3, 1, b"\xc3"), clip_entry(128, 1, "b")))
+for code in (0x00, 0x01, 0x0A, 0x1F, 0x7F):
+    clips(f"name-control-{code:02x}", f"U+{code:04X} in a Name",
+          CALM_ENTRY, clip_entry(4, 2, f"st{chr(code)}rm"))
+for what, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
+    clips(f"seam-{what}", f"the last of Seam_Errors is {value}",
+          CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
+clips("seams-missing", "a Loop without Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", flags=1))
+clips("seams-cut", "ends inside Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0, 1.0))[:-1])
+clips("seams-less", "Seam_Errors of two levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0)))
+clips("seams-more", "Seam_Errors of four levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0,) * 4))
+clips("seams-of-none", "Seam_Errors of a clip that is no loop",
+      CALM_ENTRY, clip_entry(4, 2, "storm", (0.0,) * 3, flags=0))
+invalid("clips-seams-of-stored-levels", "BAD_CHUNK", "open",
+        "a shortened file with Seam_Errors of its level 0 alone",
+        lambda: two_clips(clips=(CALM, loop(STORM, 1.0))).upto(0))
+invalid("clips-seam-not-stored-nan", "BAD_CHUNK", "open",
+        "a shortened file whose Seam_Errors of a level not stored is NaN",
+        lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, NAN))).upto(0))
+
+table("twice-clips", "BAD_CHUNK_TABLE", "CLIPS twice", lambda: two_clips().add(Entry(rd.CLIPS, CALM_ENTRY)))
+table("level-of-clips", "BAD_CHUNK_TABLE", "CLIPS with Level 0",
+      lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), level=0)))
+table("segment-of-clips", "BAD_CHUNK_TABLE", "CLIPS with Segment 1",
+      lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), segment=1)))
+table("order-clips", "BAD_CHUNK_TABLE", "METADATA behind CLIPS",
+      lambda: inserted(3, Entry(rd.CLIPS, clip_entry(4, 2)), Entry(rd.METADATA, b"\0{}")))
+table("order-clips-motion", "BAD_CHUNK_TABLE", "CLIPS behind the first motion chunk",
+      lambda: inserted(4, Entry(rd.CLIPS, clip_entry(4, 2))))
+
+invalid("clips-damaged", "BAD_CHECKSUM", "open", "a bit of CLIPS is flipped",
+        lambda: flipped(two_clips().file(), end_of(two_clips(), rd.CLIPS) - 1))
+invalid("clips-cut", "TRUNCATED", "open", "the file ends inside CLIPS",
+        lambda: two_clips().file()[:end_of(two_clips(), rd.CLIPS) - 1])
+invalid("clips-cut-in-motion", "TRUNCATED", 0, "level 0 of the first clip alone has arrived",
+        lambda: two_clips().file()[:end_of(two_clips(), rd.AFFINES, 0, 0)])
+invalid("clips-before-hierarchy", "BAD_CHUNK", "open",
+        "CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first",
+        lambda: two_clips().change(rd.CLIPS, content=CALM_ENTRY).change(rd.HIERARCHY, checksum=0))
+invalid("clips-missing-before-hierarchy", "BAD_CHUNK_TABLE", "open",
+        "CLIPS is missing and HIERARCHY is damaged: CLIPS comes first",
+        lambda: two_clips().without(rd.CLIPS).change(rd.HIERARCHY, checksum=0))
+invalid("clips-damaged-before-hierarchy", "BAD_CHECKSUM", "open",
+        "CLIPS is damaged and HIERARCHY is missing: CLIPS comes first",
+        lambda: two_clips().without(rd.HIERARCHY).change(rd.CLIPS, checksum=0))
+invalid("clips-before-levels", "BAD_CHUNK", "open",
+        "Seam_Errors of the three levels of the hierarchy, while Full_Level_Count says 5: CLIPS comes first",
+        lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5))
+invalid("clips-levels", "BAD_HEADER", "open",
+        "Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3",
+        lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5))
+UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
+invalid("clips-memory", "LIMIT_EXCEEDED", "open",
+        "2^18 vertices and a segment of 256 frames, though the mean is 86",
+        lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18))
+invalid("clips-before-memory", "BAD_CHECKSUM", "open",
+        "CLIPS is damaged, and its longest segment takes too much memory",
+        lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(rd.CLIPS, checksum=0))
+invalid("clips-memory-of-mean", "LIMIT_EXCEEDED", "open",
+        "2^22 vertices are too many, before CLIPS is missed",
+        lambda: lone(frames=2, segments=2).draft().with_header(vertex_count=1 << 22, clip_count=2))
+
+
+def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
+    """TIME of the two clips."""
+    invalid(f"time-{name}", "BAD_CHUNK", "open", reason, lambda: two_clips().change(rd.TIME, content=make()))
+
+
+STEADY = (0.0, 0.25)
+clip_times("of-one-clip", "First and Step of one clip of two", lambda: steady_times(STEADY))
+clip_times("of-three-clips", "First and Step of three clips where two are",
+           lambda: steady_times(STEADY, STEADY, STEADY))
+clip_times("without-last-step", "First of the second clip without its Step",
+           lambda: steady_times(STEADY, STEADY)[:-8])
+invalid("time-of-two-clips", "BAD_CHUNK", "open", "First and Step of two clips where one is",
+        lambda: lone().draft().change(rd.TIME, content=steady_times(STEADY, STEADY)))
+for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    clip_times(f"second-step-{what}", f"Step of the second clip is {value}",
+               lambda value=value: steady_times(STEADY, (0.0, value)))
+    clip_times(f"second-rate-{what}", f"Step of the second clip, by Method 1, is {value}",
+               lambda value=value: steady_times(STEADY, (0.0, value), method=1))
+clip_times("second-first-nan", "First of the second clip is NaN", lambda: steady_times(STEADY, (NAN, 1.0)))
+clip_times("second-stands-still", "Step of the second clip vanishes beside its First",
+           lambda: steady_times(STEADY, (1e30, 1.0)))
+clip_times("first-stands-still", "Step of the first clip vanishes beside its First",
+           lambda: steady_times((1e30, 1.0), STEADY))
+clip_times("second-overflows", "times of the second clip beyond binary64",
+           lambda: steady_times(STEADY, (0.0, HIGHEST)))
+clip_times("uneven-second-equal", "a time twice in the second clip",
+           lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0))
+clip_times("uneven-first-descends", "a time of the first clip before the one before",
+           lambda: uneven_time(0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0))
+clip_times("uneven-more", "a time more than there are frames",
+           lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9))
+
 # ---- invalid: motion ---------------------------------------------------------------------------------------
 
 
@@ -1140,13 +1384,17 @@ def lossless(first: bytes = b"") -> Draft:
         Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
 
 
-table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT", lambda: lossless().without(rd.EXACT, 3, 1))
-table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"", 2, 0)))
-table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2", lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
+table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT",
+      lambda: lossless().without(rd.EXACT, 3, 1))
+table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"",
+      2, 0)))
+table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2",
+      lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
 table("exact-with-corrections", "BAD_CHUNK_TABLE", "CORRECTIONS at level h + 2",
       lambda: lossless().add(Entry(rd.CORRECTIONS, b"", 3, 0)))
 valid("exact-empty", "EXACT without bytes: differences of 32 bits, all of them ones", lossless)
-invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400))
+invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT",
+        lambda: lossless(b"\1" * 400))
 
 
 def corrections(step: float) -> Callable[[], bytes]:

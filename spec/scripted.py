@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -178,7 +178,7 @@ class Entry:
     content: bytes
     level: int = rd.NO_LEVEL
     segment: int = 0
-    clip: int = 0
+    reserved: int = 0
     length: int | None = None
     checksum: int | None = None
 
@@ -189,7 +189,7 @@ class Entry:
     def packed(self) -> bytes:
         length = len(self.content) if self.length is None else self.length
         checksum = crc32c(self.content) if self.checksum is None else self.checksum
-        return ENTRY.pack(self.kind, self.clip, self.level, self.segment, length, checksum)
+        return ENTRY.pack(self.kind, self.reserved, self.level, self.segment, length, checksum)
 
 
 @dataclass(frozen=True)
@@ -334,8 +334,22 @@ def rest_chunk(stream: bytes, *, exact: int = 0, wide: int = 0, origin=(0.0, 0.0
     return struct.pack("<BBH3dd", exact, wide, reserved, *origin, step) + stream
 
 
+def clip_entry(frames: int, segments: int = 1, name: bytes | str = b"", seams: Sequence[float] | None = None, *,
+               flags: int | None = None, length: int | None = None) -> bytes:
+    """A clip in CLIPS, a loop where it has seams."""
+    name = name.encode() if isinstance(name, str) else name
+    flags = int(seams is not None) if flags is None else flags
+    head = struct.pack("<IIBB", frames, segments, flags, len(name) if length is None else length)
+    return head + name + struct.pack(f"<{len(seams or ())}f", *seams or ())
+
+
 def steady_time(first: float = 0.0, step: float = 0.25, method: int = 0) -> bytes:
-    return struct.pack("<Bdd", method, first, step)
+    return steady_times((first, step), method=method)
+
+
+def steady_times(*clips: tuple[float, float], method: int = 0) -> bytes:
+    """First and Step of each clip."""
+    return bytes([method]) + b"".join(struct.pack("<dd", first, step) for first, step in clips)
 
 
 def uneven_time(*times: float | tuple) -> bytes:
@@ -367,6 +381,7 @@ class Plant:
     stems: list[Stem]
     frames: int = 1
     segments: int = 1
+    clips: tuple[rd.Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
     points: list | None = None  # whole numbers of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
     time: bytes | None = None  # TIME
@@ -388,19 +403,24 @@ class Plant:
         self.plan = rd.Plan(branches)
         rest = self._rest(branches)
         self._set_rest(branches, rest)
+        clips = self.clips or (rd.Clip(self.frames, self.segments),)
         entries = [Entry(rd.HIERARCHY, hierarchy_chunk(stream)), Entry(rd.REST, rest),
-                   Entry(rd.TIME, self.time or steady_time())]
+                   Entry(rd.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips)))]
+        if self.clips:
+            entries.append(Entry(rd.CLIPS, b"".join(
+                clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)))
         self.shapes: dict = {}
         for level in range(self.plan.height + 2):
             if (rd.SHAPES, level, 0) in self.scripts:
                 entries.append(Entry(rd.SHAPES, self._shapes(level), level))
-        for s in range(self.segments):
-            entries += self._segment(s)
+        lengths = [frames for clip in clips for frames in clip.segment_lengths]
+        for s, frames in enumerate(lengths):
+            entries += self._segment(s, frames)
         entries.sort(key=lambda entry: entry.key)
         levels = self.plan.height + 2
-        return Draft(dict(vertex_count=vertices, branch_count=len(self.stems), frame_count=self.frames,
-                          segment_count=self.segments, level_count=levels, full_level_count=levels,
-                          flags=int(self.wide)), tuple(entries))
+        return Draft(dict(vertex_count=vertices, branch_count=len(self.stems), frame_count=sum(lengths),
+                          segment_count=len(lengths), level_count=levels, full_level_count=levels,
+                          clip_count=len(clips), flags=int(self.wide)), tuple(entries))
 
     def file(self) -> bytes:
         return self.draft().file()
@@ -426,8 +446,7 @@ class Plant:
         motion = rd.Motion(1, rd.cosine_waves(1), shapes=self.shapes)
         return write(rd.decode_shapes, self.scripts[rd.SHAPES, level, 0], self.plan, motion, level)
 
-    def _segment(self, s: int) -> list[Entry]:
-        frames = self.frames * (s + 1) // self.segments - self.frames * s // self.segments
+    def _segment(self, s: int, frames: int) -> list[Entry]:
         motion = rd.Motion(frames, rd.cosine_waves(frames), shapes=self.shapes)
         entries = []
         for level in range(self.plan.height + 2):
