@@ -222,12 +222,19 @@ def ask_package(decoder, item: str) -> bytes:
         return b""
     if item == "rest":
         return decoder.rest.tobytes()
-    if item == "time":
-        return decoder.time.tobytes()
+    if item == "clips":
+        return b"".join(clip_entry(clip) for clip in decoder.clips)
     if item != "static":
-        return decoder.positions(depth=int(item)).tobytes()
+        played = (decoder.play(clip.name) for clip in decoder.clips)
+        return b"".join((clip.time if item == "time" else clip.positions(depth=int(item))).tobytes()
+                        for clip in played)
     arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
     return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
+
+
+def clip_entry(clip) -> bytes:
+    seams = clip.seam_errors if clip.loop else None
+    return rd.Clip(clip.frame_count, clip.segment_count, clip.name, seams).entry()
 
 
 def metadata_text(decoder) -> bytes:
@@ -251,6 +258,12 @@ const items = {
   rest: (file) => file.rest("source", { out: new (file.info.restWide ? Float64Array : Float32Array)(
     3 * file.info.vertexCount) }),
   time: (file) => file.times(),
+  clips: (file) => Buffer.concat(file.clips.map((clip, i) => entry(file, clip, i))),
+};
+const entry = (file, { name, frameCount, segmentCount, loop }, clip) => {
+  const text = Buffer.from(name), seams = new Float32Array(loop ? file.info.fullLevelCount : 0);
+  const head = Buffer.from([...new Uint8Array(Uint32Array.of(frameCount, segmentCount).buffer), loop, text.length]);
+  return Buffer.concat([head, text, Buffer.from(seams.map((_, level) => file.seamError(clip, level)).buffer)]);
 };
 const positions = (file, level) => {
   const numbers = file.info.wide ? Float64Array : Float32Array, size = 3 * file.info.vertexCount;

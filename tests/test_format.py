@@ -30,6 +30,7 @@ from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened,
 from plants import plant
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
+VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
 TEXT = FORMAT.read_text(encoding="utf-8")
 
 
@@ -77,10 +78,17 @@ def single(x: float) -> float:
 @pytest.fixture(scope="module")
 def spec() -> SimpleNamespace:
     """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
+    def utf8(data: bytes) -> str:
+        try:
+            return data.decode()
+        except UnicodeDecodeError:
+            raise names["Invalid"]("BAD_CHUNK") from None
+
     names = {"u8": reader("<B"), "u16": reader("<H"), "u32": reader("<I"), "f32": reader("<f"),
              "f64": reader("<d"), "sqrt": math.sqrt, "single": single,
              "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
-             "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0]}
+             "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
+             "utf8": utf8}
     for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
         exec(block, names)
     return SimpleNamespace(**names)
@@ -88,12 +96,25 @@ def spec() -> SimpleNamespace:
 
 def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
-            expected = decoder.positions(depth=level)
+            expected = np.concatenate([clip.positions(depth=level) for clip in played])
             got = np.array(spec.decode(data, level), decoder.dtype)
             assert got.tobytes() == expected.tobytes(), f"level {level}"
-        times = spec.frame_times(spec.content(spec.parse_front(data)[1], container.TIME), decoder.frame_count)
-        assert np.array(times).tobytes() == decoder.time.tobytes()
+        header, chunks = spec.parse_front(data)
+        clips = spec.decode_clips(header, chunks)
+        assert by_document(clips) == by_code(decoder)
+        times = spec.frame_times(spec.content(chunks, container.TIME), clips)
+        assert [np.array(own).tobytes() for own in times] == [clip.time.tobytes() for clip in played]
+
+
+def by_document(clips: list) -> list[tuple]:
+    return [(clip.name, clip.frames, clip.segments, clip.seams) for clip in clips]
+
+
+def by_code(decoder: athcodec.Decoder) -> list[tuple]:
+    return [(clip.name, clip.frame_count, clip.segment_count, list(clip.seam_errors) if clip.loop else None)
+            for clip in decoder.clips]
 
 
 # ---- tables and dumps ----
@@ -230,6 +251,29 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
     (1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)])
 def test_pseudo_code_decodes_every_feature(spec, seed, wide, exact):
     assert_same_bits(spec, HandMade(seed, wide, exact).file())
+
+
+@pytest.mark.parametrize("path", sorted(VECTORS.glob("clip*.ath")), ids=lambda path: path.stem)
+def test_pseudo_code_decodes_clips(spec, path):
+    assert_same_bits(spec, path.read_bytes())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_changed_clips_mean_the_same_to_the_document_and_the_code(spec, seed):
+    random = np.random.default_rng(seed)
+    parts = Parts.of((VECTORS / "clips-loops.ath").read_bytes())
+
+    def document(data):
+        return by_document(spec.decode_clips(*spec.parse_front(data)))
+
+    outcomes = []
+    for _ in range(100):
+        content = bytearray(parts.payload(container.CLIPS))
+        content[random.integers(len(content))] ^= 1 << random.integers(8)
+        data = parts.with_payload(container.CLIPS, bytes(content))
+        outcomes.append(outcome(spec, document, data))
+        assert outcomes[-1] == outcome(spec, lambda data: by_code(opened(data)), data)
+    assert 10 < outcomes.count("invalid") < 90
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -444,7 +488,8 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
     rows = stems(spec, file.branches)
     for count in (1, 1, 2, 2, 2, 3, 3, 3, 40):
         assert_same_outcome(spec, random_stream(spec, random, "decode_times", count),
-                            lambda stream: np.array(spec.frame_times(container.pack_time(stream), count)),
+                            lambda stream: np.array(spec.frame_times(container.pack_time(stream),
+                                                                     [spec.Record(frames=count)])),
                             lambda stream: read_times(stream, count))
     for dtype, n in NUMBERS.items():
         assert_same_outcome(

@@ -7,6 +7,7 @@ import io
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from test_format import HandMade, Sapling
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "spec" / "reference_decoder.py"
+VECTORS = ROOT / "spec" / "vectors" / "valid"
 sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
 
 from spec import reference_decoder as reference  # noqa: E402
@@ -29,10 +31,15 @@ def assert_same_bits(data: bytes) -> None:
     """Every level, the rest pose, the times and the static data; NaN only as such."""
     file = reference.AthFile(data, strict=True)
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
+        played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
-            assert_same_numbers(file.positions(level), decoder.positions(depth=level))
+            assert_same_numbers(file.positions(level),
+                                np.concatenate([clip.positions(depth=level) for clip in played]))
         assert_same_numbers(file.rest(), decoder.rest)
-        assert np.array(file.times).tobytes() == decoder.time.tobytes()
+        assert_same_numbers(np.concatenate(file.times), np.concatenate([clip.time for clip in played]))
+        assert [(clip.name, clip.frames, clip.segments, clip.seams) for clip in file.clips] == [
+            (clip.name, clip.frame_count, clip.segment_count, clip.seam_errors if clip.loop else None)
+            for clip in decoder.clips]
         assert file.metadata() == decoder.metadata
         assert_same_static([file.faces(), file.edges(), *file.attributes().values()],
                            [decoder.faces, decoder.edges, *decoder.attributes.values()])
@@ -73,7 +80,7 @@ def test_the_sample_has_the_same_bits(options, sample_clip, tmp_path):
 
 def test_files_with_shapes_and_every_kind_of_chunk_have_the_same_bits(full_ath):
     data = full_ath.read_bytes()
-    assert chunk_kinds(data) == set(athcodec.container.KIND_NAMES.values()) - {"EXACT"}
+    assert chunk_kinds(data) == set(athcodec.container.KIND_NAMES.values()) - {"CLIPS", "EXACT"}
     assert_same_bits(data)
 
 
@@ -140,6 +147,34 @@ def outcome(call) -> object:
         return error.name
 
 
+@pytest.mark.parametrize("name", ["clips-loops", "clips-time-uneven"])
+def test_spoilt_clips_and_times_are_refused_alike_or_mean_the_same(name):
+    parts = Parts.of((VECTORS / f"{name}.ath").read_bytes())
+    outcomes = []
+    for kind, content in changed_contents(parts, {"CLIPS", "TIME"}):
+        data = parts.with_payload(kind, content)
+        outcomes.append(outcome(lambda data=data: assert_same_bits(data)))
+        assert outcomes[-1] == outcome(lambda data=data: opened(data).check())
+    assert 50 < outcomes.count("BAD_CHUNK") < 199
+
+
+def changed_contents(parts: Parts, names: set[str]) -> Iterator[tuple[int, bytes]]:
+    """Contents of chunks of these kinds, each with a bit flipped, a byte less or a byte more."""
+    random = np.random.default_rng(5)
+    chunks = [(c.kind, content) for c, content in parts.chunks if athcodec.container.KIND_NAMES[c.kind] in names]
+    for i in range(200):
+        kind, content = chunks[i % len(chunks)]
+        at, changed = int(random.integers(len(content))), bytearray(content)
+        way = random.integers(6)
+        if way == 0:
+            del changed[at]
+        elif way == 1:
+            changed.insert(at, int(random.integers(256)))
+        else:
+            changed[at] ^= 1 << int(random.integers(8))
+        yield kind, bytes(changed)
+
+
 def test_spoilt_chunks_are_refused_alike_or_mean_the_same(full_ath):
     """Motion, hierarchy, rest and times with some bytes changed, and checksums that fit."""
     parts, rng = Parts.of(full_ath.read_bytes()), np.random.default_rng(0)
@@ -192,6 +227,11 @@ def test_the_command_shows_a_level_and_writes_it(bushy_ath, tmp_path):
     assert np.load(tmp_path / "positions.npy").tobytes() == expected.tobytes()
     assert "level 1 of" in done.stdout
     assert done.stdout.split()[-1] == f"{athcodec.container.crc32c(expected.tobytes()):08x}"
+
+
+def test_the_command_lists_clips():
+    done = run(VECTORS / "clips-loops.ath", "--depth", 0)
+    assert done.stdout.splitlines()[1:] == ["'calm': 3 frames, a loop", "'once': 2 frames", "'storm': 4 frames, a loop"]
 
 
 def test_the_command_names_what_is_wrong_and_fails(bushy_ath, tmp_path):

@@ -23,7 +23,8 @@ from plants import awkward, bush, clip_of, plant, tube
 
 CORPUS = Path(__file__).resolve().parent.parent / "corpus"
 VECTORS = CORPUS.parent.parent / "spec" / "vectors" / "valid"
-MANY_FEATURES = ("everything", "exact-empty", "shapes*", "encoded-*")  # of the vectors; the others try one rule each
+MANY_FEATURES = ("everything", "exact-empty", "shapes*", "clips-loops", "clips-steps", "clips-names", "encoded-*")
+"""Of the vectors; the others try one rule each."""
 LARGEST = 64 << 10
 OPTIONS = 16
 """Bytes behind a file that tell a target how to use it (harness.h)."""
