@@ -143,7 +143,7 @@ ATH_API const ath_clip *ath_clips(const ath_file *file);
 /* The clip of this name, -1: none. */
 ATH_API int32_t ath_clip_named(const ath_file *file, const char *name);
 /* How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is off, scene
- * units; 0 for clips that are no loops. */
+ * units; 0 for clips that are no loops. Known of all full_level_count levels, stored or not. */
 ATH_API double ath_seam_error(const ath_file *file, int32_t clip, int32_t level);
 
 enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };

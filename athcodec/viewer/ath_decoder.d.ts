@@ -213,7 +213,7 @@ export class AthFile {
    * to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): { max: number; rms: number };
   /** How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is
-   * off; 0 for clips that are no loops. */
+   * off; 0 for clips that are no loops. Known of all fullLevelCount levels, stored or not. */
   seamError(clip: number | string, level: number): number;
   /** First frame of a segment; of segmentCount: frameCount. */
   segmentStart(segment: number): number;

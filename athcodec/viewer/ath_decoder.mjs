@@ -148,7 +148,7 @@ return Object.fromEntries(names.map((name, k) =>
 // A string that ends with a zero, of at most 255 bytes.
 text(at) {
 const bytes = new Uint8Array(this.c.memory.buffer).subarray(at >>> 0, (at >>> 0) + 256);
-return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+return new TextDecoder("utf-8", { ignoreBOM: true }).decode(bytes.subarray(0, bytes.indexOf(0)));
 }
 error(code, message, more) {
 return new AthError(code, this.text(this.c.ath_result_name(code)), message, more);
@@ -365,7 +365,8 @@ return this.#core.copy(Float64Array, at, 2);
 return { max, rms };
 }
 seamError(clip, level) {
-return this.#c.ath_seam_error(this.#at, this.#clip(clip), this.#level(level));
+whole(level, 0, this.info.fullLevelCount - 1, "level");
+return this.#c.ath_seam_error(this.#at, this.#clip(clip), level);
 }
 segmentStart(segment) {
 return this.#c.ath_segment_start(this.#at, whole(segment, 0, this.info.segmentCount, "segment"));

@@ -173,7 +173,7 @@ class Core {
   // A string that ends with a zero, of at most 255 bytes.
   text(at) {
     const bytes = new Uint8Array(this.c.memory.buffer).subarray(at >>> 0, (at >>> 0) + 256);
-    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+    return new TextDecoder("utf-8", { ignoreBOM: true }).decode(bytes.subarray(0, bytes.indexOf(0)));
   }
 
   error(code, message, more) {
@@ -434,7 +434,8 @@ export class AthFile {
   }
 
   seamError(clip, level) {
-    return this.#c.ath_seam_error(this.#at, this.#clip(clip), this.#level(level));
+    whole(level, 0, this.info.fullLevelCount - 1, "level");
+    return this.#c.ath_seam_error(this.#at, this.#clip(clip), level);
   }
 
   segmentStart(segment) {
