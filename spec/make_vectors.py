@@ -682,6 +682,7 @@ def encoded(name: str) -> bytes:
              "encoded-wide": [Stem(-1, 5), Stem(0, 4, 3)],
              "encoded-exact-rest": [Stem(-1, 4), Stem(0, 3, 1), Stem(-1, 2)],
              "encoded-noise": [Stem(-1, 4), Stem(0, 3, 2)],
+             "encoded-clips": [Stem(-1, 4), Stem(0, 3, 2)],
              "encoded-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
              "encoded-lossless-wide": [Stem(-1, 3), Stem(0, 2, 1)]}[name]
     random = np.random.default_rng(7)
@@ -693,6 +694,8 @@ def encoded(name: str) -> bytes:
                       rest=rest, time=np.arange(40) / 30,
                       vertex_branch=np.repeat(np.arange(len(stems)), [s.count for s in stems]),
                       branch_parent=np.array([s.parent for s in stems]), metadata={"unit": "m"})
+    if name == "encoded-clips":
+        clip = athcodec.join({"whole": clip, "loop": athcodec.looped(clip, blend=9)})
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "clip.ath"
         athcodec.encode(clip, target, rel_error=2e-3, segment_frames=20,
@@ -703,6 +706,7 @@ def encoded(name: str) -> bytes:
 for each, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "binary64 positions"),
                   ("encoded-exact-rest", "a rest pose bit for bit"),
                   ("encoded-noise", "vertices that follow no plant"),
+                  ("encoded-clips", "two clips, one of them a loop"),
                   ("encoded-lossless", "every bit of the source at the last level"),
                   ("encoded-lossless-wide", "every bit of binary64 positions at the last level")):
     valid(each, f"what athcodec wrote: {why}", lambda each=each: encoded(each), scripted=False)

@@ -253,8 +253,12 @@ def test_pseudo_code_decodes_every_feature(spec, seed, wide, exact):
     assert_same_bits(spec, HandMade(seed, wide, exact).file())
 
 
+def test_pseudo_code_decodes_several_clips(spec, medley_ath):
+    assert_same_bits(spec, medley_ath.read_bytes())
+
+
 @pytest.mark.parametrize("path", sorted(VECTORS.glob("clip*.ath")), ids=lambda path: path.stem)
-def test_pseudo_code_decodes_clips(spec, path):
+def test_pseudo_code_decodes_clips_of_every_sort(spec, path):
     assert_same_bits(spec, path.read_bytes())
 
 

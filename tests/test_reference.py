@@ -40,7 +40,9 @@ def assert_same_bits(data: bytes) -> None:
         assert [(clip.name, clip.frames, clip.segments, clip.seams) for clip in file.clips] == [
             (clip.name, clip.frame_count, clip.segment_count, clip.seam_errors if clip.loop else None)
             for clip in decoder.clips]
-        assert file.metadata() == decoder.metadata
+        common = file.metadata()
+        own = common.pop("clips", {})
+        assert [common | own.get(clip.clip.name, {}) for clip in played] == [clip.metadata for clip in played]
         assert_same_static([file.faces(), file.edges(), *file.attributes().values()],
                            [decoder.faces, decoder.edges, *decoder.attributes.values()])
         assert list(file.attributes()) == list(decoder.attributes)
@@ -114,6 +116,10 @@ def test_learned_time_bases_have_the_same_bits(tmp_path):
 ], ids=["wide", "exact rest", "wide exact rest", "tube", "sheets", "mirrored", "coincident", "chain", "bush"])
 def test_plants_of_all_sorts_have_the_same_bits(make, options, tmp_path):
     assert_same_bits(encoded(make(), tmp_path, effort="fast", **options))
+
+
+def test_several_clips_have_the_same_bits(medley_ath):
+    assert_same_bits(medley_ath.read_bytes())
 
 
 def test_uneven_times_and_static_data_have_the_same_bits(forked_clip, tmp_path):
