@@ -188,7 +188,7 @@ class Decoder:
         header, limits = self.container.header, self.limits
         reasons = {
             BadHeader: f"got Full_Level_Count {header.full_level_count}; expected what the hierarchy has",
-            BadChunkTable: f"got {self._absent_chunk()}; expected those of every segment that the hierarchy asks for",
+            BadChunkTable: f"got {self._absent_chunk()}; expected what the header and the hierarchy ask for",
             LimitExceeded: f"got branches too deep; the limit is {limits.hierarchy_depth}" if error.chunk else
                            f"got {header.vertex_count} vertices and {header.frame_count} frames in "
                            f"{header.segment_count} segments, of which one needs more memory than is allowed; the "
