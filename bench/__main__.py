@@ -16,6 +16,7 @@ from bench import (
     data,
     decode,
     hierarchy,
+    joined,
     large,
     levels,
     memory,
@@ -34,7 +35,7 @@ from bench import (
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large}
+         "large": large, "joined": joined}
 
 
 def main(argv: Sequence[str]) -> int:

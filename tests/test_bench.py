@@ -71,6 +71,13 @@ def test_levels_end_within_the_bound_and_stay_closed_where_the_papers_gape(tmp_p
     assert gaping and all(row["max"] < 1e-6 < 1e-3 < row["paper max"] for row in gaping)
 
 
+def test_motions_of_one_plant_take_less_in_one_file_and_keep_the_bound(tmp_path):
+    _, result = run_bench(tmp_path, "joined", "--motions", "3", "--rel-error", "1e-3")
+    [[row]] = tables_of(result)
+    assert row["kept"] and row["bytes, one file"] < row["bytes, a file each"] and row["frames"] == 120 - 3 * 4
+    assert 0 < row["seam"] <= 2 and result["broken"] == []
+
+
 def test_figures_come_with_command_versions_and_machine(tmp_path):
     _, result = run_bench(tmp_path, "sizes", "--rel-error", "1e-2", "--effort", "fast")
     assert result["command"].startswith("python -m bench sizes --rel-error 1e-2")
