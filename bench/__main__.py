@@ -15,6 +15,7 @@ from bench import (
     batch,
     data,
     decode,
+    forest,
     hierarchy,
     joined,
     large,
@@ -35,7 +36,7 @@ from bench import (
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large, "joined": joined}
+         "large": large, "forest": forest, "joined": joined}
 
 
 def main(argv: Sequence[str]) -> int:

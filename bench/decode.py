@@ -160,8 +160,8 @@ class Case:
         return lines
 
 
-def compile_program(folder: Path) -> Path:
-    """decode.c with the decoder's sources, as CMakeLists.txt names and compiles them."""
+def compile_program(folder: Path, name: str = "decode") -> Path:
+    """The C program of that name here with the decoder's sources, as CMakeLists.txt names and compiles them."""
     here = Path(__file__).resolve().parent
     core = here.parent / "athcodec" / "core"
     cmake = (core / "CMakeLists.txt").read_text()
@@ -172,9 +172,9 @@ def compile_program(folder: Path) -> Path:
     if compiler is None:
         raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
-    program = folder / "decode"
+    program = folder / name
     options = ["-std=c11", "-O3", *flags, f"-I{core}"]
-    files = [here / "decode.c", *(core / name for name in sources[1].split())]
+    files = [here / f"{name}.c", *(core / name for name in sources[1].split())]
     subprocess.run([*compiler.split(), *options, "-o", program, *files, "-lm"], check=True)
     return program
 

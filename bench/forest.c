@@ -1,0 +1,498 @@
+/* Plays a forest for forest.py, which says what is measured and why. One thread, all files in memory, of which a decoder
+ * is fed only what it asks for. Prints one JSON object. Hosted C11 over ath.h alone. Judges nothing.
+ *
+ *     forest units ROUNDS FILE.ath...       what one preparation, pose and choice of a level cost: medians over ROUNDS
+ *     forest play SCENE SECONDS RATE        all instances of a scene, at RATE pictures a second
+ *
+ * A scene is text: the number of phases; that of clips, and a path for each; that of instances, and for each its clip,
+ * distance and phase. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "ath.h"
+
+enum { LEVELS = 32, SLOTS = 3, MOTION = 16, STATIC = 32, SHAPES = 19, UNIT_POSES = 64, CHOICES = 4096 };
+
+static const double FOV = 1.0471975511965976, SCREEN = 1080.0, PIXELS = 1.0; /* vertical; radians, pixels */
+static const double BETWEEN = 0.37; /* of the way to the next frame: what is shown is a blend */
+static const double HASTE = 1.25;   /* preparations go on so much faster than they have to */
+
+/* A clip, at each level in use with the segment that plays, the one before and the one behind it. It has the file to
+ * itself and all of its segments; clips that share a file would share `file` and have some each. */
+typedef struct {
+    uint8_t *bytes;
+    size_t size, memory;
+    ath_file *file;
+    ath_info info;
+    int32_t frame, segment;   /* that play: the later one of those that are blended */
+    int32_t shortest;         /* frames of the shortest segment */
+    long number;              /* of the segment that plays, counted on from loop to loop */
+    double ahead, loop;       /* seconds that the clip is ahead of the clock; of one round */
+    int used[LEVELS];
+    ath_segment *slots[LEVELS][SLOTS];
+} clip;
+
+typedef struct { int32_t clip, phase; double distance; } instance;
+typedef struct { int32_t clip, level, phase; size_t at; } pose; /* at: in floats */
+typedef struct { clip *of; int32_t level, segment; long number; } job;
+
+typedef struct {
+    clip *clips;
+    instance *instances;
+    pose *poses;
+    job *jobs;                /* a ring, oldest first */
+    int32_t *pose_of;         /* by clip, level and phase; -1: nobody shows it */
+    int32_t *shown;           /* the pose of each instance in this picture */
+    int32_t clip_count, instance_count, pose_count, phases;
+    int32_t job_count, first_job, job_room, steps_left, steps_per_picture;
+    int begun;                /* the first job has been */
+    void *work;
+    size_t work_bytes;
+    float *floats;
+    double fed;
+    long held, late;
+} forest;
+
+/* ---- helpers ---- */
+
+static double now_ms(void)
+{
+    struct timespec time;
+    timespec_get(&time, TIME_UTC);
+    return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
+}
+
+static void *memory_of(size_t size)
+{
+    void *memory = aligned_alloc(64, (size + 64) & ~(size_t)63);
+    if (!memory) {
+        fprintf(stderr, "memory: got none, expected %zu bytes\n", size);
+        exit(1);
+    }
+    return memory;
+}
+
+static void expect(int condition, const char *what)
+{
+    if (condition) return;
+    fprintf(stderr, "forest: %s\n", what);
+    exit(1);
+}
+
+static void expect_ok(const char *what, int result)
+{
+    if (result == ATH_OK) return;
+    fprintf(stderr, "%s: got %s, expected OK\n", what, ath_result_name(result));
+    exit(1);
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The value below which `share` of them lie; sorts them. */
+static double quantile(double *values, int count, double share)
+{
+    qsort(values, (size_t)count, sizeof *values, ascending);
+    int at = (int)ceil(share * count) - 1;
+    return values[at < 0 ? 0 : at];
+}
+
+static void put(const char *before, const char *name, double number)
+{
+    printf("%s\"%s\": %.15g", before, name, number);
+}
+
+/* ---- clips ---- */
+
+static void read_file(const char *path, clip *clip)
+{
+    FILE *stream = fopen(path, "rb");
+    expect(stream && fseek(stream, 0, SEEK_END) == 0, path);
+    clip->size = (size_t)ftell(stream);
+    clip->bytes = (uint8_t *)memory_of(clip->size);
+    rewind(stream);
+    expect(fread(clip->bytes, 1, clip->size, stream) == clip->size, path);
+    fclose(stream);
+}
+
+/* From the prelude alone. */
+static void open_clip(const char *path, clip *clip)
+{
+    size_t front, size;
+    read_file(path, clip);
+    expect_ok(path, ath_front(clip->bytes, clip->size, 0, &front, &size));
+    clip->file = (ath_file *)memory_of(size);
+    expect_ok(path, ath_open(clip->file, size, clip->bytes, front, 0));
+    size_t bases = ath_build_size(clip->file);
+    expect_ok(path, ath_build(clip->file, memory_of(bases), bases));
+    ath_get_info(clip->file, &clip->info);
+    expect(clip->info.level_count <= LEVELS, "more levels than expected");
+    clip->memory = size + bases;
+    clip->loop = clip->info.duration * clip->info.frame_count / fmax(1.0, clip->info.frame_count - 1);
+    clip->shortest = clip->info.frame_count;
+    for (int32_t s = 0; s < clip->info.segment_count; s++) {
+        int32_t frames = ath_segment_start(clip->file, s + 1) - ath_segment_start(clip->file, s);
+        if (frames < clip->shortest) clip->shortest = frames;
+    }
+}
+
+/* Feeds what a segment lacks for a level; how many bytes that are. */
+static double feed(const clip *clip, int32_t segment, int32_t level)
+{
+    int32_t count = ath_ranges(clip->file, level, segment, segment, 0, 0, 0);
+    ath_range *ranges = (ath_range *)memory_of((size_t)count * sizeof *ranges);
+    double bytes = 0.0;
+    ath_ranges(clip->file, level, segment, segment, 0, ranges, count);
+    for (int32_t i = 0; i < count; i++) {
+        ath_feed(clip->file, clip->bytes + ranges[i].offset, ranges[i].offset, ranges[i].size);
+        bytes += (double)ranges[i].size;
+    }
+    free(ranges);
+    return bytes;
+}
+
+/* Forgets the bytes of a segment, but not those of shapes, which all segments share. */
+static void drop(const clip *clip, int32_t segment)
+{
+    const ath_chunk *chunks = ath_chunks(clip->file);
+    for (int32_t i = 0; i < clip->info.chunk_count; i++) {
+        const ath_chunk *chunk = chunks + i;
+        if (chunk->kind >= MOTION && chunk->kind < STATIC && chunk->kind != SHAPES && chunk->length > 0
+            && chunk->segment == (uint32_t)segment)
+            ath_drop(clip->file, chunk->offset, chunk->length);
+    }
+}
+
+/* A clip of so few segments that all have a slot stays prepared. */
+static int stays(const clip *clip) { return clip->info.segment_count <= SLOTS; }
+
+static size_t pose_floats(const clip *clip, int32_t level)
+{
+    int32_t nodes, vertices;
+    ath_cut_size(clip->file, level, 0, &nodes, &vertices);
+    return 12 * (size_t)nodes + 3 * (size_t)vertices;
+}
+
+/* Matrices, and exact vertices behind them; whether a frame was held. */
+static int write_pose(const clip *clip, int32_t level, double place, float *out)
+{
+    const ath_segment *const *slots = (const ath_segment *const *)clip->slots[level];
+    int32_t nodes;
+    ath_cut_size(clip->file, level, 0, &nodes, 0);
+    int result = ath_matrices(clip->file, slots, SLOTS, place, out, 12 * sizeof(float));
+    int exact = ath_exact(clip->file, slots, SLOTS, place, out + 12 * nodes, 3 * sizeof(float));
+    expect(result != ATH_NOT_PREPARED && exact == result, "a pose was asked for that is not prepared");
+    return result == ATH_HELD;
+}
+
+/* ---- what one of each costs ---- */
+
+static double prepare_ms(clip *clip, int32_t level, void *work, size_t work_bytes)
+{
+    size_t size = ath_segment_size(clip->file, level);
+    double start = now_ms();
+    for (int32_t s = 0; s < clip->info.segment_count; s++)
+        expect_ok("ath_prepare", ath_prepare(work, work_bytes, clip->file, s, level, clip->slots[level][0], size));
+    return now_ms() - start;
+}
+
+/* Poses of the last segment, which is the one that is left. */
+static double pose_us(const clip *clip, int32_t level, float *out)
+{
+    int32_t last = clip->info.segment_count - 1, first = ath_segment_start(clip->file, last);
+    int32_t frames = clip->info.frame_count - first - 1;
+    double start = now_ms();
+    for (int i = 0; i < UNIT_POSES; i++)
+        write_pose(clip, level, frames > 0 ? first + i % frames + BETWEEN : first, out);
+    return (now_ms() - start) * 1e3 / UNIT_POSES;
+}
+
+static void print_medians(const char *name, double *values, int rounds, int levels)
+{
+    printf(", \"%s\": [", name);
+    for (int level = 0; level < levels; level++)
+        printf("%s%.15g", level ? ", " : "", quantile(values + level * rounds, rounds, 0.5));
+    printf("]");
+}
+
+static void clip_units(const char *path, int rounds, const char *before)
+{
+    clip clip = {0};
+    open_clip(path, &clip);
+    int32_t levels = clip.info.level_count;
+    size_t work_bytes = ath_work_size(clip.file), floats = 12 * (size_t)clip.info.node_count
+                                                           + 3 * (size_t)clip.info.vertex_count;
+    void *work = memory_of(work_bytes);
+    float *out = (float *)memory_of(floats * sizeof *out);
+    double *prepared = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
+    double *posed = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
+    for (int32_t s = 0; s < clip.info.segment_count; s++)
+        for (int32_t level = 0; level < levels; level++) feed(&clip, s, level);
+    for (int32_t level = 0; level < levels; level++)
+        clip.slots[level][0] = (ath_segment *)memory_of(ath_segment_size(clip.file, level));
+    for (int round = -1; round < rounds; round++) /* the first one does not count */
+        for (int32_t level = 0; level < levels; level++) {
+            int at = level * rounds + (round < 0 ? 0 : round);
+            prepared[at] = prepare_ms(&clip, level, work, work_bytes);
+            posed[at] = pose_us(&clip, level, out);
+        }
+    double start = now_ms();
+    for (int i = 0; i < CHOICES; i++) ath_depth_for(clip.file, -1, 10.0 + i, FOV, SCREEN, PIXELS);
+    put(before, "choice_us", (now_ms() - start) * 1e3 / CHOICES);
+    print_medians("prepare_ms", prepared, rounds, levels);
+    print_medians("pose_us", posed, rounds, levels);
+    printf("}");
+}
+
+/* ---- the scene ---- */
+
+static int32_t *slot_of_pose(const forest *forest, int32_t clip, int32_t level, int32_t phase)
+{
+    return forest->pose_of + ((size_t)clip * LEVELS + (size_t)level) * (size_t)forest->phases + phase;
+}
+
+static int32_t level_of(const forest *forest, const instance *instance)
+{
+    return ath_depth_for(forest->clips[instance->clip].file, -1, instance->distance, FOV, SCREEN, PIXELS);
+}
+
+static void read_scene(const char *path, forest *forest)
+{
+    char name[4096];
+    FILE *stream = fopen(path, "r");
+    expect(stream && fscanf(stream, "%d %d ", &forest->phases, &forest->clip_count) == 2, path);
+    forest->clips = (clip *)memory_of((size_t)forest->clip_count * sizeof(clip));
+    memset(forest->clips, 0, (size_t)forest->clip_count * sizeof(clip));
+    for (int32_t c = 0; c < forest->clip_count; c++) {
+        expect(fgets(name, sizeof name, stream) != 0, path);
+        name[strcspn(name, "\n")] = 0;
+        open_clip(name, forest->clips + c);
+        double turns = 0.6180339887498949 * c;
+        forest->clips[c].ahead = forest->clips[c].loop * (1.0 + turns - floor(turns));
+    }
+    expect(fscanf(stream, "%d", &forest->instance_count) == 1, path);
+    forest->instances = (instance *)memory_of((size_t)forest->instance_count * sizeof(instance));
+    for (int32_t i = 0; i < forest->instance_count; i++) {
+        instance *each = forest->instances + i;
+        expect(fscanf(stream, "%d %lf %d", &each->clip, &each->distance, &each->phase) == 3, path);
+        expect(each->clip >= 0 && each->clip < forest->clip_count && each->phase >= 0
+               && each->phase < forest->phases, path);
+    }
+    fclose(stream);
+}
+
+/* Memory for every pose that an instance shows, and slots for the segments behind them. */
+static void plan_poses(forest *forest)
+{
+    size_t places = (size_t)forest->clip_count * LEVELS * (size_t)forest->phases, floats = 0;
+    forest->pose_of = (int32_t *)memory_of(places * sizeof(int32_t));
+    for (size_t i = 0; i < places; i++) forest->pose_of[i] = -1;
+    forest->poses = (pose *)memory_of((size_t)forest->instance_count * sizeof(pose));
+    forest->shown = (int32_t *)memory_of((size_t)forest->instance_count * sizeof(int32_t));
+    for (int32_t i = 0; i < forest->instance_count; i++) {
+        const instance *each = forest->instances + i;
+        clip *of = forest->clips + each->clip;
+        int32_t level = level_of(forest, each), *slot = slot_of_pose(forest, each->clip, level, each->phase);
+        if (*slot >= 0) continue;
+        *slot = forest->pose_count++;
+        forest->poses[*slot] = (pose){each->clip, level, each->phase, floats};
+        floats += pose_floats(of, level);
+        of->used[level] = 1;
+    }
+    forest->floats = (float *)memory_of(floats * sizeof(float));
+    memset(forest->floats, 0, floats * sizeof(float));
+}
+
+static size_t plan_slots(forest *forest)
+{
+    size_t bytes = 0;
+    for (clip *clip = forest->clips; clip < forest->clips + forest->clip_count; clip++) {
+        bytes += clip->memory;
+        if (ath_work_size(clip->file) > forest->work_bytes) forest->work_bytes = ath_work_size(clip->file);
+        for (int32_t level = 0; level < clip->info.level_count; level++)
+            for (int slot = 0; clip->used[level] && slot < SLOTS && slot < clip->info.segment_count; slot++) {
+                size_t size = ath_segment_size(clip->file, level);
+                clip->slots[level][slot] = (ath_segment *)memory_of(size);
+                bytes += size;
+            }
+        forest->job_room += SLOTS * LEVELS;
+    }
+    forest->work = memory_of(forest->work_bytes);
+    forest->jobs = (job *)memory_of((size_t)forest->job_room * sizeof(job));
+    return bytes + forest->work_bytes;
+}
+
+/* ---- preparing ---- */
+
+static void add_job(forest *forest, clip *of, int32_t level, int32_t segment, long number)
+{
+    expect(forest->job_count < forest->job_room, "more preparations than were counted on");
+    forest->fed += feed(of, segment, level);
+    forest->jobs[(forest->first_job + forest->job_count++) % forest->job_room] = (job){of, level, segment, number};
+}
+
+/* Goes on with the oldest preparation for at most so many steps, and returns those left. */
+static int32_t go_on(forest *forest, int32_t steps)
+{
+    job *job = forest->jobs + forest->first_job;
+    clip *of = job->of;
+    if (!forest->begun) {
+        ath_segment *slot = of->slots[job->level][job->number % SLOTS];
+        expect_ok("ath_prepare_start", ath_prepare_start(forest->work, forest->work_bytes, of->file, job->segment,
+                                                         job->level, slot, ath_segment_size(of->file, job->level)));
+        forest->steps_left = ath_prepare_steps(of->file, job->segment, job->level);
+        forest->begun = 1;
+    }
+    int32_t now = steps < forest->steps_left ? steps : forest->steps_left;
+    int result = ath_prepare_step((ath_work *)forest->work, now);
+    forest->steps_left -= now;
+    if (result == ATH_MORE) return steps - now;
+    expect_ok("ath_prepare_step", result);
+    forest->begun = 0;
+    forest->first_job = (forest->first_job + 1) % forest->job_room;
+    forest->job_count--;
+    return steps - now;
+}
+
+/* The segments around the one that a clip is at. */
+static void start_clip(forest *forest, clip *clip, double clock)
+{
+    int32_t count = clip->info.segment_count;
+    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, clock + clip->ahead, ATH_LOOP));
+    clip->segment = blend.segment[1];
+    clip->number = clip->segment + count;
+    for (int32_t level = 0; level < clip->info.level_count; level++)
+        for (int32_t i = 0; clip->used[level] && i < SLOTS && i < count; i++) {
+            long number = stays(clip) ? i : clip->number - 1 + i;
+            add_job(forest, clip, level, (int32_t)(number % count), number);
+        }
+    while (forest->job_count > 0) go_on(forest, INT32_MAX);
+}
+
+/* When the next segment begins, the one behind it is asked for, and the one before the last can go. */
+static void advance(forest *forest, clip *clip, double clock)
+{
+    int32_t count = clip->info.segment_count;
+    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, clock + clip->ahead, ATH_LOOP));
+    if (stays(clip) || blend.segment[1] == clip->segment) return;
+    clip->segment = blend.segment[1];
+    clip->number++;
+    drop(clip, (clip->segment + count - 2) % count);
+    for (int32_t level = 0; level < clip->info.level_count; level++) {
+        if (!clip->used[level]) continue;
+        while (ath_segment_index(clip->slots[level][clip->number % SLOTS]) != clip->segment) {
+            forest->late++;
+            go_on(forest, INT32_MAX);
+        }
+        add_job(forest, clip, level, (clip->segment + 1) % count, clip->number + 1);
+    }
+}
+
+/* So that preparing is spread evenly over the pictures. */
+static void set_pace(forest *forest, double rate)
+{
+    double steps = 0.0;
+    for (const clip *clip = forest->clips; clip < forest->clips + forest->clip_count; clip++)
+        for (int32_t level = 0; !stays(clip) && level < clip->info.level_count; level++)
+            for (int32_t s = 0; clip->used[level] && s < clip->info.segment_count; s++)
+                steps += ath_prepare_steps(clip->file, s, level) / (clip->loop * rate);
+    forest->steps_per_picture = (int32_t)ceil(HASTE * steps);
+}
+
+/* ---- playing ---- */
+
+/* Each instance lags behind its clip by its phase, less than the shortest segment, so that two segments hold all. */
+static double place_of(const forest *forest, const pose *pose, double clock)
+{
+    const clip *clip = forest->clips + pose->clip;
+    double lag = clip->loop / clip->info.frame_count * (clip->shortest - 1) * pose->phase / forest->phases;
+    return ath_frame_at(clip->file, clock + clip->ahead - lag, ATH_LOOP);
+}
+
+typedef struct { double choose, prepare, pose; } parts;
+
+static parts show(forest *forest, double clock)
+{
+    double start = now_ms();
+    for (int32_t i = 0; i < forest->instance_count; i++) {
+        const instance *each = forest->instances + i;
+        forest->shown[i] = *slot_of_pose(forest, each->clip, level_of(forest, each), each->phase);
+    }
+    double chosen = now_ms();
+    for (int32_t c = 0; c < forest->clip_count; c++) advance(forest, forest->clips + c, clock);
+    for (int32_t steps = forest->steps_per_picture; steps > 0 && forest->job_count > 0;) steps = go_on(forest, steps);
+    double prepared = now_ms();
+    for (int32_t i = 0; i < forest->pose_count; i++) {
+        const pose *pose = forest->poses + i;
+        double place = place_of(forest, pose, clock);
+        forest->held += write_pose(forest->clips + pose->clip, pose->level, place, forest->floats + pose->at);
+    }
+    return (parts){chosen - start, prepared - chosen, now_ms() - prepared};
+}
+
+static void print_levels(const forest *forest)
+{
+    int32_t counts[LEVELS] = {0}, most = 0;
+    for (int32_t i = 0; i < forest->instance_count; i++) {
+        int32_t level = forest->poses[forest->shown[i]].level;
+        counts[level]++;
+        if (level > most) most = level;
+    }
+    printf(", \"levels\": [");
+    for (int32_t level = 0; level <= most; level++) printf("%s%d", level ? ", " : "", counts[level]);
+    printf("]");
+}
+
+static void play(const char *scene, double seconds, double rate)
+{
+    forest forest = {0};
+    read_scene(scene, &forest);
+    plan_poses(&forest);
+    size_t bytes = plan_slots(&forest);
+    int pictures = (int)ceil(seconds * rate);
+    double *whole = (double *)memory_of((size_t)pictures * sizeof(double)), start = now_ms();
+    for (int32_t c = 0; c < forest.clip_count; c++) start_clip(&forest, forest.clips + c, 0.0);
+    put("{", "start_ms", now_ms() - start);
+    put(", ", "start_bytes", forest.fed);
+    set_pace(&forest, rate);
+    forest.fed = 0.0;
+    parts sum = {0};
+    for (int picture = 0; picture < pictures; picture++) {
+        parts took = show(&forest, (picture + 1) / rate);
+        whole[picture] = took.choose + took.prepare + took.pose;
+        sum.choose += took.choose / pictures;
+        sum.prepare += took.prepare / pictures;
+        sum.pose += took.pose / pictures;
+    }
+    put(", ", "choose_ms", sum.choose);
+    put(", ", "prepare_ms", sum.prepare);
+    put(", ", "pose_ms", sum.pose);
+    put(", ", "p99_ms", quantile(whole, pictures, 0.99));
+    put(", ", "bytes_per_s", forest.fed * rate / pictures);
+    put(", ", "memory", (double)bytes);
+    put(", ", "poses", forest.pose_count);
+    put(", ", "held", (double)forest.held);
+    put(", ", "late", (double)forest.late);
+    print_levels(&forest);
+    printf("}\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 3 && strcmp(argv[1], "units") == 0) {
+        for (int i = 3; i < argc; i++) clip_units(argv[i], atoi(argv[2]), i == 3 ? "[{" : ",\n {");
+        printf("]\n");
+    } else if (argc == 5 && strcmp(argv[1], "play") == 0) {
+        play(argv[2], atof(argv[3]), atof(argv[4]));
+    } else {
+        fprintf(stderr, "usage: forest units ROUNDS FILE.ath... | play SCENE SECONDS RATE\n");
+        return 2;
+    }
+    return 0;
+}

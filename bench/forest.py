@@ -1,0 +1,321 @@
+"""What a forest costs: bytes a second and milliseconds a picture, from a formula and by playing it.
+
+The forest. A camera looks into a wedge of 90 degrees, about what a vertical field of view of 60 degrees shows on a
+screen of 16:9. Plants stand evenly in it, one on each square as wide as the plant, the first as far away as that. Each
+shows the level that `ath_depth_for` gives for its distance: at most 1 pixel off on 1,080 lines. Plant i, by distance,
+plays clip i modulo the clips.
+
+The player is that of an engine. Clips loop, and are streamed: of each clip and level in use the segment that plays is
+prepared, the one before, and, a few steps a picture, the one behind; nothing else is kept, so that memory does not
+depend on the length of a clip (clips of up to three segments stay). Plants of a clip lag behind it by one of P phases,
+spread over a segment's length. Plants of the same clip, level and phase share a pose (node matrices and exact vertices,
+what a graphics processor needs), made once a picture; what a plant costs by itself is the choice of its level.
+
+On paper, with what one preparation, pose and choice of a clip's level cost alone:
+
+    bytes a second = sum over clips of bytes / seconds of the clip, where bytes are those of
+                         stems up to the deepest level in use, maps of the levels in use, corrections of the last
+    ms a picture   = instances * choice
+                   + sum over clips and levels in use of
+                         phases in use * pose + preparing all segments / (seconds of the clip * pictures a second)
+
+Bytes are of streaming: who keeps the files in memory reads each once. Prelude and shapes are read once, at the start.
+Maps of coarser levels, which subtrees that move as one need at finer ones too, are not on paper.
+
+The measured forest is played by forest.c, one thread, files in memory, for as long as a clip; bytes are what its
+decoders were fed. Clips are made of one clip, each its own way: turned, mirrored, its sway larger or smaller, from
+another frame on; it is played forwards and backwards, slowing down before it turns, so that it loops.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, pi, radians
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec import container as ct
+from bench.clips import add_rel_error
+from bench.decode import compile_program
+from bench.tables import table
+
+INSTANCES, CLIPS, PHASES = (1, 100, 10_000), (1, 10, 100), (16, 0)
+FRAMES, RATE, ROUNDS = 480, 60, 3
+FOV, SCREEN, WEDGE = radians(60), 1080, radians(90)
+GOLDEN = 0.6180339887498949
+SLOTS = 3  # segments that forest.c has prepared of a clip and level
+
+NOTE = """
+Each clip: {frames} frames of {vertices:,} vertices, {seconds:g} s in {segments} segments, made of {source}, bound
+{bound:g}; {rate} pictures a second, one thread, means over {seconds:g} s; medians of {rounds} rounds. Phases: that
+instances of a clip may have, "own": each one its own. Levels: instances at level 0, 1, ... Poses: that are made in each
+picture. Paper: by the formula, from what one preparation, pose and choice cost in the same process with nothing
+beside it; measured: played. p99: of the pictures, the 99th percentile. MB: files opened, bases, prepared segments, one
+work memory; not the compressed bytes, nor the poses.
+"""
+FORMULA = """
+kB/s = sum over clips of (stems up to the deepest level in use, maps of the levels in use, corrections of the last) /
+seconds of the clip. ms a picture = instances * choice + sum over clips and levels in use of (phases in use * pose +
+preparing all segments / (seconds of the clip * pictures a second)). The wedge has {wedge:.0f} degrees with a plant on
+each {side:.3g} x {side:.3g} of ground; level: ath_depth_for, 1 pixel, field of view 60 degrees, 1,080 lines.
+bench/forest.py says why.
+"""
+PARTS_NOTE = """
+Paper and measured, ms a picture: choosing levels, preparing segments, making poses. Late: preparations that had to be
+finished at once. Start: all that is prepared before the first picture.
+"""
+UNITS_NOTE = """
+Means over clips. Prepare: all segments of a clip; pose: one, between two frames; bytes: of motion, to play this level.
+"""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A clip of the forest: its file, and what parts of its work cost alone. It has a file to itself."""
+
+    path: Path
+    choice_us: float
+    prepare_ms: list[float]  # all segments, by level
+    pose_us: list[float]  # one, by level
+
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        with athcodec.open(self.path) as decoder:
+            chunks = [chunk for chunk in decoder.container.chunks if chunk.is_motion]
+            return {"seconds": decoder.frame_count / decoder.fps, "segments": len(decoder.segments),
+                    "vertices": decoder.vertex_count, "prelude": decoder.container.prelude_length,
+                    "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks]}
+
+    @property
+    def seconds(self) -> float:
+        return self.facts["seconds"]
+
+    @property
+    def stays(self) -> bool:
+        """Whether all segments stay prepared."""
+        return self.facts["segments"] <= SLOTS
+
+    def bytes(self, levels: set[int]) -> int:
+        """Of motion that a player of these levels reads in a round."""
+        wanted = {ct.STEMS: range(max(levels) + 1), ct.AFFINES: levels, ct.CORRECTIONS: levels}
+        return sum(length for kind, level, length in self.facts["chunks"] if level in wanted.get(kind, ()))
+
+    def bytes_per_s(self, levels: set[int]) -> float:
+        return 0.0 if self.stays else self.bytes(levels) / self.seconds
+
+    def prepare_share(self, level: int) -> float:
+        """Milliseconds a picture."""
+        return 0.0 if self.stays else self.prepare_ms[level] / (self.seconds * RATE)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
+                        help="what the clips are made of (default: the sample)")
+    parser.add_argument("--instances", type=int, nargs="+", default=list(INSTANCES), metavar="N")
+    parser.add_argument("--clips", type=int, nargs="+", default=list(CLIPS), metavar="N", help="unique ones")
+    parser.add_argument("--phases", type=int, nargs="+", default=list(PHASES), metavar="N",
+                        help="that instances of a clip may have; 0: each its own")
+    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    rows, parts, broken = [], [], []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program = compile_program(folder, "forest")
+        files = _make_clips(args, folder)
+        units = _units(program, files, args.rounds)
+        side = _side(files[0])
+        for scene in _scenes(args, units, side):
+            played = scene.play(program, folder, args.rounds)
+            paper = scene.on_paper()
+            rows.append(scene.row(paper, played))
+            parts.append(scene.parts(paper, played))
+            broken += scene.differences(played)
+        unit_rows, facts = list(_unit_rows(units)), units[0].facts
+    note = NOTE.format(**facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE,
+                       rounds=args.rounds)
+    return {"tables": [table("Forests", rows, note, FORMULA.format(side=side, wedge=np.degrees(WEDGE))),
+                       table("Where the milliseconds go", parts, PARTS_NOTE),
+                       table("What one of each costs", unit_rows, UNITS_NOTE)], "broken": broken}
+
+
+# ---- clips ----
+
+
+def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
+    """As many different ones as the largest forest has."""
+    files = [folder / f"clip_{number}.ath" for number in range(max(args.clips))]
+    with athcodec.read_hdf5(args.of) as clip:
+        for number, file in enumerate(files):
+            athcodec.encode(_variant(clip, number, args.frames), file, rel_error=args.rel_error, effort=args.effort,
+                            attributes="none")
+    return files
+
+
+def _variant(clip: athcodec.MotionClip, number: int, frames: int) -> athcodec.MotionClip:
+    """The plant turned about its height, every other one mirrored, with a sway and a start of its own."""
+    source = clip.block(0, clip.frame_count).astype(np.float64)
+    turns = max(1, round(frames / (2 * clip.frame_count)))
+    swing = np.cos(2 * pi * (turns * np.arange(frames) / frames + GOLDEN * number))
+    place = (clip.frame_count - 1) * (1 - swing) / 2
+    first = np.minimum(place.astype(int), max(0, clip.frame_count - 2))
+    weight = (place - first)[:, None, None]
+    motion = (1 - weight) * source[first] + weight * source[np.minimum(first + 1, clip.frame_count - 1)]
+    sway, rest = 0.8 + 0.4 * (GOLDEN * number * 7 % 1), clip.rest.astype(np.float64)
+    shape = _turn(2 * pi * GOLDEN * number) * (1, 1, -1 if number % 2 else 1)
+    return athcodec.MotionClip(
+        ((rest + sway * (motion - rest)) @ shape.T).astype(np.float32), np.arange(frames) / clip.fps,
+        clip.vertex_branch, clip.branch_parent, (rest @ shape.T).astype(np.float32), stem_index=clip.stem_index)
+
+
+def _turn(angle: float) -> np.ndarray:
+    """About the y axis, (3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def _side(file: Path) -> float:
+    """The longest of the rest pose's box."""
+    with athcodec.open(file) as decoder:
+        return float(np.ptp(decoder.rest, axis=0).max())
+
+
+def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
+    measured = _output(program, "units", rounds, *files)
+    return [Unit(file, **each) for file, each in zip(files, measured, strict=True)]
+
+
+def _output(program: Path, *words: object) -> Any:
+    done = subprocess.run([str(program), *map(str, words)], check=True, stdout=subprocess.PIPE)
+    return json.loads(done.stdout)
+
+
+def _unit_rows(units: list[Unit]) -> Iterator[dict[str, Any]]:
+    for level in range(min(len(unit.pose_us) for unit in units)):
+        yield {"level": level, "prepare ms": np.mean([unit.prepare_ms[level] for unit in units]),
+               "pose us": np.mean([unit.pose_us[level] for unit in units]),
+               "choice us": np.mean([unit.choice_us for unit in units]),
+               "bytes": round(np.mean([unit.bytes({level}) for unit in units])),
+               "prelude": round(np.mean([unit.facts["prelude"] for unit in units]))}
+
+
+# ---- forests ----
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Instances of clips, near ones first. phases 0: each instance its own."""
+
+    units: list[Unit]
+    distances: np.ndarray
+    phases: int
+
+    def clip_of(self, instance: int) -> int:
+        return instance % len(self.units)
+
+    def phase_of(self, instance: int) -> int:
+        return instance // len(self.units) % self.phase_count
+
+    @property
+    def phase_count(self) -> int:
+        return self.phases or ceil(len(self.distances) / len(self.units))
+
+    @cached_property
+    def levels(self) -> list[int]:
+        """Of every instance."""
+        levels = np.zeros(len(self.distances), int)
+        for clip, unit in enumerate(self.units):
+            with athcodec.open(unit.path) as decoder:
+                for instance in range(clip, len(levels), len(self.units)):
+                    levels[instance] = decoder.depth_for(self.distances[instance], FOV, SCREEN)
+        return levels.tolist()
+
+    @cached_property
+    def poses(self) -> Counter:
+        """How many different ones each (clip, level) has."""
+        shown = {(self.clip_of(i), level, self.phase_of(i)) for i, level in enumerate(self.levels)}
+        return Counter((clip, level) for clip, level, _ in shown)
+
+    def on_paper(self) -> dict[str, float]:
+        used: dict[int, set[int]] = {}
+        for clip, level in self.poses:
+            used.setdefault(clip, set()).add(level)
+        units, poses = self.units, self.poses.items()
+        return {"bytes_per_s": sum(units[clip].bytes_per_s(levels) for clip, levels in used.items()),
+                "choose_ms": sum(units[self.clip_of(i)].choice_us for i in range(len(self.distances))) / 1e3,
+                "prepare_ms": sum(units[clip].prepare_share(level) for (clip, level), _ in poses),
+                "pose_ms": sum(count * units[clip].pose_us[level] for (clip, level), count in poses) / 1e3}
+
+    def play(self, program: Path, folder: Path, rounds: int) -> dict[str, Any]:
+        """What forest.c says, medians of its times."""
+        file = folder / "scene.txt"
+        file.write_text("\n".join([
+            f"{self.phase_count} {len(self.units)}", *(str(unit.path) for unit in self.units),
+            f"{len(self.distances)}", *(f"{self.clip_of(i)} {distance!r} {self.phase_of(i)}"
+                                        for i, distance in enumerate(self.distances.tolist()))]))
+        runs = [_output(program, "play", file, max(unit.seconds for unit in self.units), RATE) for _ in range(rounds)]
+        return runs[0] | {name: median(each[name] for each in runs) for name in runs[0] if name.endswith("_ms")}
+
+    def row(self, paper: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
+        on_paper, measured = _ms(paper), _ms(played)
+        return self._name() | {
+            "levels": played["levels"], "poses": played["poses"], "paper kB/s": paper["bytes_per_s"] / 1e3,
+            "kB/s": played["bytes_per_s"] / 1e3, "paper ms": on_paper, "ms": measured, "p99 ms": played["p99_ms"],
+            "ms/paper": measured / on_paper, "us/instance": 1e3 * measured / len(self.distances),
+            "MB": played["memory"] / 1e6}
+
+    def parts(self, paper: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
+        once = sum(unit.facts["prelude"] for unit in self.units) + played["start_bytes"]
+        columns = {}
+        for part in ("choose", "prepare", "pose"):
+            columns |= {f"paper {part}": paper[f"{part}_ms"], part: played[f"{part}_ms"]}
+        return self._name() | columns | {"late": played["late"], "start ms": played["start_ms"], "start kB": once / 1e3}
+
+    def _name(self) -> dict[str, Any]:
+        return {"instances": len(self.distances), "clips": len(self.units), "phases": self.phases or "own"}
+
+    def differences(self, played: dict[str, Any]) -> list[str]:
+        """Where the played forest is another than that on paper."""
+        name = ", ".join(f"{value} {what}" for what, value in self._name().items())
+        levels = np.bincount(self.levels).tolist()
+        lines = [f"{name}: levels: got {played['levels']}; expected {levels}"] if played["levels"] != levels else []
+        if played["poses"] != self.poses.total():
+            lines.append(f"{name}: poses: got {played['poses']}; expected {self.poses.total()}")
+        if played["held"]:
+            lines.append(f"{name}: got {played['held']} poses of a nearer frame; expected none")
+        return lines
+
+
+def _ms(figures: dict[str, float]) -> float:
+    return figures["choose_ms"] + figures["prepare_ms"] + figures["pose_ms"]
+
+
+def _scenes(args: argparse.Namespace, units: list[Unit], side: float) -> Iterator[Scene]:
+    """Every number of instances with every number of clips that it can have."""
+    for instances in args.instances:
+        for clips in args.clips:
+            if clips > instances:
+                continue
+            for phases in args.phases if instances > clips else args.phases[:1]:
+                yield Scene(units[:clips], _distances(instances, side), phases)
+
+
+def _distances(count: int, side: float) -> np.ndarray:
+    """From the camera, ascending: plants spread evenly over the wedge behind the nearest place, `side` away."""
+    area = (np.arange(count) + 0.5) * side**2
+    return np.sqrt(side**2 + 2 * area / WEDGE)
