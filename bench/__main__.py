@@ -25,6 +25,7 @@ from bench import (
     picture,
     quick,
     rd,
+    remote,
     report,
     scale,
     sizes,
@@ -36,7 +37,7 @@ from bench import (
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large, "forest": forest, "joined": joined}
+         "large": large, "forest": forest, "remote": remote, "joined": joined}
 
 
 def main(argv: Sequence[str]) -> int:

@@ -1,4 +1,5 @@
-"""What the verbs share: clips from the command line, a clip encoded into a temporary file, decoded errors."""
+"""What the verbs share: clips from the command line, a clip encoded into a temporary file, decoded errors, and clips
+made larger and longer."""
 
 from __future__ import annotations
 
@@ -9,10 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 import athcodec
+from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
 
 REL_ERROR = 1e-4
+FRAMES_AHEAD = 7
 
 
 @dataclass(frozen=True)
@@ -50,3 +55,36 @@ def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, depth: int | N
     for start, frames in decoder.blocks(depth):
         meter.add(clip.block(start, start + len(frames)), frames)
     return meter
+
+
+@contextmanager
+def stand_of(path: Path) -> Iterator[Stand]:
+    with athcodec.read_hdf5(path) as clip:
+        yield Stand(clip, path.stem)
+
+
+class Stand:
+    """Copies of one plant, all in one place, and its motion for as many frames as wanted."""
+
+    def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
+        self._clip, self.name = clip, name
+        self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
+
+    def write(self, path: Path, plants: int, frames: int) -> None:
+        """An HDF5 clip."""
+        source = self._clip
+        parent, moved = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
+        index = None if source.stem_index is None else np.tile(source.stem_index, plants)
+        with Hdf5Writer(path, time=np.arange(frames) / source.fps,
+                        vertex_branch=(source.vertex_branch + moved).ravel(),
+                        branch_parent=np.where(parent < 0, -1, parent + moved).ravel(),
+                        rest=np.tile(source.rest.astype(np.float32), (plants, 1)), stem_index=index,
+                        metadata=source.metadata) as writer:
+            for frame in range(frames):
+                writer.add(self._moved(frame, plants).reshape(1, -1, 3))
+
+    def _moved(self, frame: int, plants: int) -> np.ndarray:
+        """(plants, N, 3): forwards to the last frame and backwards again, each plant further on."""
+        last = self._clip.frame_count - 1
+        at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
+        return self._positions[np.where(at > last, 2 * last - at, at)]

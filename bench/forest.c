@@ -287,23 +287,24 @@ static void read_scene(const char *path, forest *forest)
     fclose(stream);
 }
 
-/* Memory for every pose that an instance shows, and slots for the segments behind them. */
+/* Poses by clip, level and phase, so that what they have in common is in the processor's caches. */
 static void plan_poses(forest *forest)
 {
     size_t places = (size_t)forest->clip_count * LEVELS * (size_t)forest->phases, floats = 0;
     forest->pose_of = (int32_t *)memory_of(places * sizeof(int32_t));
-    for (size_t i = 0; i < places; i++) forest->pose_of[i] = -1;
     forest->poses = (pose *)memory_of((size_t)forest->instance_count * sizeof(pose));
     forest->shown = (int32_t *)memory_of((size_t)forest->instance_count * sizeof(int32_t));
-    for (int32_t i = 0; i < forest->instance_count; i++) {
-        const instance *each = forest->instances + i;
-        clip *of = forest->clips + each->clip;
-        int32_t level = level_of(forest, each), *slot = slot_of_pose(forest, each->clip, level, each->phase);
-        if (*slot >= 0) continue;
-        *slot = forest->pose_count++;
-        forest->poses[*slot] = (pose){each->clip, level, each->phase, floats};
-        floats += pose_floats(of, level);
-        of->used[level] = 1;
+    memset(forest->pose_of, 0, places * sizeof(int32_t));
+    for (const instance *each = forest->instances; each < forest->instances + forest->instance_count; each++)
+        *slot_of_pose(forest, each->clip, level_of(forest, each), each->phase) = 1;
+    for (size_t i = 0; i < places; i++) {
+        int32_t phase = (int32_t)(i % (size_t)forest->phases), at = (int32_t)(i / (size_t)forest->phases);
+        int32_t clip = at / LEVELS, level = at % LEVELS, is_shown = forest->pose_of[i];
+        forest->pose_of[i] = is_shown ? forest->pose_count : -1;
+        if (!is_shown) continue;
+        forest->poses[forest->pose_count++] = (pose){clip, level, phase, floats};
+        floats += pose_floats(forest->clips + clip, level);
+        forest->clips[clip].used[level] = 1;
     }
     forest->floats = (float *)memory_of(floats * sizeof(float));
     memset(forest->floats, 0, floats * sizeof(float));

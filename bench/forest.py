@@ -61,7 +61,7 @@ Each clip: {frames} frames of {vertices:,} vertices, {seconds:g} s in {segments}
 {bound:g}; {rate} pictures a second, one thread, means over {seconds:g} s; medians of {rounds} rounds. Phases: that
 instances of a clip may have, "own": each one its own. Levels: instances at level 0, 1, ... Poses: that are made in each
 picture. Paper: by the formula, from what one preparation, pose and choice cost in the same process with nothing
-beside it; measured: played. p99: of the pictures, the 99th percentile. MB: files opened, bases, prepared segments, one
+beside it, so from the processor's caches, which the segments of many clips do not fit into; measured: played. p99: of the pictures, the 99th percentile. MB: files opened, bases, prepared segments, one
 work memory; not the compressed bytes, nor the poses.
 """
 FORMULA = """

@@ -66,6 +66,7 @@ class Line(ThreadingHTTPServer):
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True  # the end of an answer would wait 40 ms
     server: Line
 
     def do_GET(self) -> None:

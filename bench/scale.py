@@ -17,24 +17,19 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-import numpy as np
-
 import athcodec
-from athcodec.exporters.hdf5 import Hdf5Writer
-from bench.clips import add_rel_error
+from bench.clips import Stand, add_rel_error, stand_of
 from bench.decode import compile_program
 from bench.suite import cases
 from bench.tables import table
 
 TARGET = 1.5
 ENCODES, DECODES = 3, 5
-FRAMES_AHEAD = 7
 REAL = {"vertices, 200 frames": ("mj_1k_200f", "mj_4k_200f", "mj_8k_200f", "refined_50k_200f"),
         "frames, 1k vertices": ("mj_1k_200f", "mj_1k_1200f"),
         "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f")}
@@ -147,14 +142,20 @@ def _series(args: argparse.Namespace, folder: Path) -> Iterator[_Clip]:
         yield from _clips("given", args.clips)
         return
     stands, stand_frames, lengths, plants = SIZES[args.suite]
-    with _stand(args.of) as stand:
+    with stand_of(args.of) as stand:
         for count in stands:
-            yield stand.clip("copies", folder, count, stand_frames)
+            yield _made("copies", stand, folder, count, stand_frames)
         for frames in lengths:
-            yield stand.clip("repeated frames", folder, plants, frames)
+            yield _made("repeated frames", stand, folder, plants, frames)
     if args.suite == "full":
         for series, names in REAL.items():
             yield from _clips(series, names)
+
+
+def _made(series: str, stand: Stand, folder: Path, plants: int, frames: int) -> _Clip:
+    path = folder / f"{plants}x{frames}.h5"
+    stand.write(path, plants, frames)
+    return _Clip(series, f"{stand.name} x {plants}", path, plants)
 
 
 def _clips(series: str, words: Iterable[str]) -> Iterator[_Clip]:
@@ -163,36 +164,3 @@ def _clips(series: str, words: Iterable[str]) -> Iterator[_Clip]:
             yield _Clip(series, case.name, case.path)
         else:
             print(f"{case.name}: {case.description}", file=sys.stderr)
-
-
-@contextmanager
-def _stand(path: Path) -> Iterator[_Stand]:
-    with athcodec.read_hdf5(path) as clip:
-        yield _Stand(clip, path.stem)
-
-
-class _Stand:
-    """Copies of one plant, all in one place, and its motion for as many frames as wanted."""
-
-    def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
-        self._clip, self._name = clip, name
-        self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
-
-    def clip(self, series: str, folder: Path, plants: int, frames: int) -> _Clip:
-        path, source = folder / f"{plants}x{frames}.h5", self._clip
-        parent, moved = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
-        index = None if source.stem_index is None else np.tile(source.stem_index, plants)
-        with Hdf5Writer(path, time=np.arange(frames) / source.fps,
-                        vertex_branch=(source.vertex_branch + moved).ravel(),
-                        branch_parent=np.where(parent < 0, -1, parent + moved).ravel(),
-                        rest=np.tile(source.rest.astype(np.float32), (plants, 1)), stem_index=index,
-                        metadata=source.metadata) as writer:
-            for frame in range(frames):
-                writer.add(self._moved(frame, plants).reshape(1, -1, 3))
-        return _Clip(series, f"{self._name} x {plants}", path, plants)
-
-    def _moved(self, frame: int, plants: int) -> np.ndarray:
-        """(plants, N, 3): forwards to the last frame and backwards again, each plant further on."""
-        last = self._clip.frame_count - 1
-        at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
-        return self._positions[np.where(at > last, 2 * last - at, at)]

@@ -1,0 +1,132 @@
+"""Requests and bytes over HTTP: opening a long clip and showing one frame of it, a level of it, checking it.
+
+A real server with byte ranges on this machine, with and without a delay before each answer. Each row opens the file
+anew. Requests and bytes are what the reader counts, and have to be those that the server has answered. The clips are
+copies of one plant, all in one place, played forwards and backwards.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec.remote import READ_AHEAD
+from bench.clips import add_rel_error, stand_of
+from bench.line import Line
+from bench.tables import table
+
+PLANTS, FRAMES, FRAME, LATENCY, ROUNDS = (1, 20), 1000, 700, 0.05, 5
+TARGET = 4  # requests to open a file and show a frame of it coarsely
+NAME = "clip.ath"
+
+NOTE = """
+Each row: opening the file, and what it says; {frames:,} frames, bound {bound:g}. Needed: bytes that a reader of a local
+file touches, prelude included; over HTTP {ahead:,} bytes come with the first request whatever they are. Seconds: with
+answers at once, and {latency:g} ms after they were asked for; medians of {rounds}, files in memory, decoding included.
+"""
+
+Step = Callable[[athcodec.Decoder], Any]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
+                        help="the plant (default: the sample)")
+    parser.add_argument("--plants", type=int, nargs="+", default=list(PLANTS), metavar="N",
+                        help="copies of it in a clip (default 1 20)")
+    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
+    parser.add_argument("--frame", type=int, default=FRAME, metavar="N", help="that is shown (default %(default)s)")
+    parser.add_argument("--latency", type=float, default=LATENCY, metavar="SECONDS",
+                        help="before an answer (default %(default)s)")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    rows, broken = [], []
+    with tempfile.TemporaryDirectory() as folder, stand_of(args.of) as stand:
+        for plants in args.plants:
+            file = _make(stand, Path(folder), plants, args)
+            for row, lines in _rows(file, args):
+                rows.append({"plants": plants} | row)
+                broken += lines
+    note = NOTE.format(frames=args.frames, bound=args.rel_error, ahead=READ_AHEAD, latency=1e3 * args.latency,
+                       rounds=args.rounds)
+    return {"tables": [table("A clip behind a URL", rows, note)], "broken": broken}
+
+
+def _make(stand, folder: Path, plants: int, args: argparse.Namespace) -> Path:
+    source, file = folder / "clip.h5", folder / NAME
+    stand.write(source, plants, args.frames)
+    with athcodec.read_hdf5(source) as clip:
+        athcodec.encode(clip, file, rel_error=args.rel_error, effort=args.effort, attributes="none")
+    return file
+
+
+def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
+    """What is done with an opened file, and how many requests it may take."""
+    return {"open": (lambda decoder: None, 1),
+            f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, depth=1), TARGET),
+            f"frame {frame} in full": (lambda decoder: decoder.positions(frame), TARGET),
+            "level 0, all frames": (lambda decoder: decoder.positions(depth=0), TARGET),
+            "level 1, all frames": (lambda decoder: decoder.positions(depth=1), TARGET),
+            "everything": (lambda decoder: decoder.positions(), None),
+            "verify": (lambda decoder: decoder.check(), None)}
+
+
+def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    """A row, and what is wrong with it, for every step."""
+    data = file.read_bytes()
+    for what, (step, allowed) in _steps(args.frame).items():
+        row = {"what": what, "requests": 0, "allowed": allowed, "bytes": 0, "needed": _needed(file, step)}
+        for name, latency in (("s", 0.0), (f"s at {1e3 * args.latency:g} ms", args.latency)):
+            with Line({NAME: data}, latency=latency) as server:
+                row[name], row["requests"], row["bytes"] = _measure(server, step, args.rounds)
+                answered = len(server.log) // args.rounds, server.sent(NAME) // args.rounds
+        lines = []
+        if (row["requests"], row["bytes"]) != answered:
+            lines.append(f"{what}: the reader counts {row['requests']} requests, {row['bytes']} bytes; the server "
+                         f"answered {answered[0]} with {answered[1]}")
+        if allowed is not None and row["requests"] > allowed:
+            lines.append(f"{what}: got {row['requests']} requests; expected at most {allowed}")
+        yield row | {"bytes/needed": row["bytes"] / row["needed"], "file": len(data)}, lines
+
+
+def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
+    """Seconds, the median of some rounds; requests and bytes of one."""
+    seconds = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        with athcodec.open(server.address + NAME) as decoder:
+            step(decoder)
+            seconds.append(time.perf_counter() - start)
+            requests, size = decoder.source.requests, decoder.source.bytes
+    return median(seconds), requests, size
+
+
+class _Plain(io.FileIO):
+    """A file that knows which of its bytes were read."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(file)
+        self.touched = np.zeros(file.stat().st_size, bool)
+
+    def read(self, size: int = -1) -> bytes:
+        start, data = self.tell(), super().read(size)
+        self.touched[start: start + len(data)] = True
+        return data
+
+
+def _needed(file: Path, step: Step) -> int:
+    with _Plain(file) as source, athcodec.open(source) as decoder:
+        step(decoder)
+        return int(source.touched.sum())
