@@ -172,17 +172,20 @@ class _AnySystem:
         return size
 
     def fetch(self, ranges: list[Range]) -> list[tuple[int, bytes]]:
-        return [(offset, self._range(offset, size)) for offset, size in ranges]
+        """All at once, where the file system can."""
+        if not ranges:
+            return []
+        starts, stops = [offset for offset, _ in ranges], [sum(each) for each in ranges]
+        parts = self._try(lambda: self._system.cat_ranges([self._path] * len(ranges), starts, stops, on_error="raise"),
+                          len(ranges))
+        for (offset, size), data in zip(ranges, parts, strict=True):
+            self._remote.bytes += len(data)
+            if len(data) != size:
+                raise RemoteError(f"{self._shown}: got {len(data)} bytes from {offset} on, expected {size}{self.doubt}")
+        return list(zip(starts, parts))
 
-    def _range(self, offset: int, size: int) -> bytes:
-        data = self._try(lambda: self._system.cat_file(self._path, offset, offset + size))
-        self._remote.bytes += len(data)
-        if len(data) != size:
-            raise RemoteError(f"{self._shown}: got {len(data)} bytes from {offset} on, expected {size}{self.doubt}")
-        return data
-
-    def _try(self, ask):
-        self._remote.requests += 1
+    def _try(self, ask, requests: int = 1):
+        self._remote.requests += requests
         try:
             return ask()
         except Exception as error:  # each file system has errors of its own

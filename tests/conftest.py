@@ -13,6 +13,7 @@ from athcodec.sources import read_hdf5, sample_path
 from blender import INSTALL, Blender, build_extension
 from plants import awkward, plant
 from programs import blender_python
+from s3 import S3Server
 
 
 @pytest.fixture
@@ -133,6 +134,20 @@ def full_ath(full_clip, tmp_path_factory):
     path = tmp_path_factory.mktemp("full") / "full.ath"
     athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16)
     return path
+
+
+@pytest.fixture(scope="session")
+def s3_server(tmp_path_factory):
+    with S3Server(tmp_path_factory.mktemp("s3") / "log") as server:
+        yield server
+
+
+@pytest.fixture
+def s3(s3_server, monkeypatch):
+    """A server that speaks S3, which s3:// URLs lead to."""
+    for name, value in s3_server.environment.items():
+        monkeypatch.setenv(name, value)
+    return s3_server
 
 
 @pytest.fixture(scope="session")

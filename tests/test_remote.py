@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
+import fsspec
 import numpy as np
 import pytest
 
@@ -473,18 +474,57 @@ def test_messages_keep_passwords_and_keys_to_themselves(server):
     assert "hush" not in str(caught.value) and "/tree.ath" in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["file", "memory"])
-def test_other_systems_of_fsspec_work(kind, large_ath, local):
-    url = f"file://{large_ath}"
-    if kind == "memory":
-        import fsspec
+@pytest.fixture(params=["file", "memory", "s3"])
+def other_url(request, large_ath):
+    """The URL of the large file on another file system than HTTP."""
+    if request.param == "file":
+        return f"file://{large_ath}"
+    if request.param == "s3":
+        return request.getfixturevalue("s3").put({"deep/tree.ath": large_ath.read_bytes()}) + "/deep/tree.ath"
+    fsspec.filesystem("memory").pipe("/deep/tree.ath", large_ath.read_bytes())
+    return "memory://deep/tree.ath"
 
-        fsspec.filesystem("memory").pipe("/tree.ath", large_ath.read_bytes())
-        url = "memory://tree.ath"
-    with athcodec.open(url) as decoder:
+
+def test_other_systems_of_fsspec_work(other_url, local):
+    with athcodec.open(other_url) as decoder:
         decoder.check()
         assert np.array_equal(decoder.positions(), local.positions())
         assert decoder.source.requests == 3, "one of them for the length"
+
+
+def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local, tmp_path, capsys):
+    """As few requests as over HTTP, and one for the length."""
+    size, out = local.file_length, tmp_path / "a.h5"
+    assert cli.main(["info", other_url, "--json", "--stats"]) == 0
+    printed, err = capsys.readouterr()
+    assert json.loads(printed)["vertices"] == local.vertex_count
+    assert err == f"athcodec: stats: 2 requests, {READ_AHEAD:,} bytes fetched of {size:,}\n"
+    assert cli.main(["verify", other_url, "--stats"]) == 0
+    assert f"3 requests, {size:,} bytes" in capsys.readouterr().err
+    assert cli.main(["decode", other_url, str(out), "--depth", "1", "--frames", "200:210", "--stats"]) == 0
+    requests, fetched = re.search(r"stats: (\d) requests, ([\d,]+) bytes", capsys.readouterr().err).groups()
+    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.depths[1].bytes)
+    with athcodec.read_hdf5(out) as clip:
+        assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), depth=1))
+
+
+def test_requests_to_an_object_store_are_those_that_it_answers(s3, large_ath, local):
+    url = s3.put({"tree.ath": large_ath.read_bytes()}) + "/tree.ath"
+    before = len(s3.answers())
+    with athcodec.open(url) as decoder:
+        assert np.array_equal(decoder.positions(local.frame_count - 1), local.positions(local.frame_count - 1))
+        counted = decoder.source.requests
+    asked = s3.answers()[before:]
+    assert len(asked) == counted > 3
+    assert asked[0] == "HEAD /plants/tree.ath 200" and set(asked[1:]) == {"GET /plants/tree.ath 206"}
+
+
+@pytest.mark.parametrize("name", ["none.ath", "none/none.ath"])
+def test_what_an_object_store_does_not_have_is_one_line_without_keys(name, s3, capsys):
+    url = f"{s3.put({})}/{name}"
+    assert cli.main(["info", url]) == 1
+    assert re.fullmatch(rf"athcodec: error: {url}: FileNotFoundError[^\n]*\n", err := capsys.readouterr().err)
+    assert "hush" not in err
 
 
 @pytest.mark.parametrize("url, message", [
