@@ -828,7 +828,8 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("inputs", metavar="IN", nargs="*", help="files, directories, patterns such as 'trees/**/*.h5', "
                       "or URLs of them that fsspec knows (a directory's ends in a slash)")
     verb.add_argument("--list", metavar="FILE", help="a file with further inputs, one per line; - is stdin")
-    verb.add_argument("--out", metavar="DIR", required=True, help="directory of the .ath files and of the manifest")
+    verb.add_argument("--out", metavar="DIR", required=True, help="directory of the .ath files and of the manifest, or the "
+                      "URL of one that fsspec can write to")
     verb.add_argument("--settings", metavar="FILE.toml", help='settings by pattern of the clip\'s name: ["oaks/*"] and '
                       'below it options of encode, such as max_error = "1mm"; they come before those given here')
     verb.add_argument("--workers", metavar="N", type=_argument(_jobs), help="processes (default: one per core)")
@@ -837,7 +838,7 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--split", metavar="SEGMENTS", type=_argument(_jobs), help="clips of more segments are "
                       "coded so many at a time by whatever worker is free (default 4)")
     verb.add_argument("--manifest", metavar="FILE.jsonl", help="what is done and what failed (default: "
-                      "athcodec-batch.jsonl in DIR)")
+                      "athcodec-batch.jsonl in DIR; needed where that is a URL)")
     verb.add_argument("--redo", action="store_true", help="encode everything again")
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")

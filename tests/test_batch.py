@@ -18,6 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import distributed
+import fsspec
 import psutil
 import pytest
 
@@ -331,6 +332,66 @@ def test_an_input_whose_server_tells_nothing_is_known_by_its_content(clips, serv
     assert len(batch.run(items, out, scheduler=cluster).done) == 1
 
 
+# ---- object stores ----
+
+
+def test_clips_in_an_object_store_become_files_there_and_a_second_run_does_what_is_missing(clips, s3, tmp_path):
+    url = s3.put({f"in/{path.relative_to(clips)}": path.read_bytes() for path in clips.rglob("*.h5")})
+    notes, store = tmp_path / "notes" / "n.jsonl", s3.system()
+
+    def run() -> tuple[int, int]:
+        words = [f"{url}/in/**/*.h5", "--out", f"{url}/out", "--manifest", str(notes), "--split", "3", "--verify"]
+        done = subprocess.run([*BATCH, *words, *WORDS, "--workers", "2", "--json"], capture_output=True, text=True,
+                              timeout=120)
+        assert done.returncode == 0, done.stderr
+        result = json.loads(done.stdout)
+        return result["done"], result["kept"]
+
+    assert run() == (4, 0)
+    names = {f"plants/out/{name}.ath" for name in ("a", "b", "long", "sub/c")}
+    assert set(store.find("plants/out")) == names
+    for name in ("a", "long", "sub/c"):
+        assert store.cat_file(f"plants/out/{name}.ath") == alone(clips / f"{name}.h5", tmp_path, **FAST)
+    assert [path.name for path in notes.parent.iterdir()] == ["n.jsonl"]
+    assert run() == (0, 4)
+    store.rm_file("plants/out/a.ath")
+    store.pipe_file("plants/out/b.ath", b"something else")
+    store.put_file(str(clips / "a.h5"), "plants/in/sub/c.h5")
+    assert run() == (3, 1) and run() == (0, 4)
+    assert store.cat_file("plants/out/sub/c.ath") == store.cat_file("plants/out/a.ath")
+
+
+def test_clips_in_an_object_store_become_local_files(clips, s3, tmp_path):
+    url = s3.put({f"in/{name}.h5": (clips / f"{name}.h5").read_bytes() for name in ("a", "b")})
+    code, err = finished(start(f"{url}/in/", tmp_path / "out"))
+    assert code == 0 and done_once(tmp_path / "out") == {"a.ath", "b.ath"}, err
+
+
+def test_memory_serves_workers_in_this_process_and_is_no_place_for_others(clips, tmp_path, cluster):
+    memory = fsspec.filesystem("memory")
+    for path in clips.rglob("*.h5"):
+        memory.pipe(f"/in/{path.relative_to(clips)}", path.read_bytes())
+    items = batch.find(["memory://in/**/*.h5"], "memory://out", settings=FAST)
+    assert [item.name for item in items] == ["a.h5", "b.h5", "long.h5", "sub/c.h5"]
+    with distributed.LocalCluster(processes=False, n_workers=1, dashboard_address="127.0.0.1:0") as here:
+        outcome = batch.run(items, "memory://out", manifest=tmp_path / "here", scheduler=here.scheduler_address)
+    assert len(outcome.done) == 4 and not outcome.failed
+    assert memory.cat_file("/out/sub/c.ath") == alone(clips / "sub/c.h5", tmp_path, **FAST)
+    items = batch.find([clips / "a.h5"], "memory://elsewhere", settings=FAST)
+    outcome = batch.run(items, "memory://elsewhere", manifest=tmp_path / "there", scheduler=cluster)
+    assert "workers need a file system that all share" in outcome.failed[0]["reason"]
+
+
+@pytest.mark.parametrize("out, message", [
+    ("memory://out", "memory://out: got no manifest, expected a file of this machine where outputs go to a URL"),
+    ("https://me:hush@example.org/out?key=hush", "https://example.org/out: got a chain of file systems or a query"),
+])
+def test_an_output_url_that_will_not_do_is_one_line(out, message, clips, capsys):
+    assert cli.main(["batch", str(clips / "a.h5"), "--out", out]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and message in err and "hush" not in err
+
+
 # ---- what is shown ----
 
 
@@ -417,7 +478,7 @@ def many(tmp_path):
 ALL = {*(f"c{seed:02}.ath" for seed in range(11)), "long.ath"}
 
 
-def start(source: Path, out: Path, *words: str, **options) -> subprocess.Popen:
+def start(source: Path | str, out: Path, *words: str, **options) -> subprocess.Popen:
     command = [*BATCH, str(source), "--out", str(out), *WORDS, "--workers", "2", "--split", "3", *words]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 

@@ -31,7 +31,7 @@ TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified",
 
 @dataclass(frozen=True)
 class Item:
-    """A clip of a batch: its name, where it is (absolute path or URL), its file (absolute path), its settings."""
+    """A clip of a batch: its name, where it is and where its file goes (absolute paths or URLs), its settings."""
 
     name: str
     input: str
@@ -52,7 +52,7 @@ class Item:
 def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
          settings: Mapping[str, Any] | None = None,
          patterns: Mapping[str, Mapping[str, Any]] | None = None) -> list[Item]:
-    """The clips that `inputs` name, by name, with outputs in the directory `output`.
+    """The clips that `inputs` name, by name, with outputs in the directory `output`, a path or a URL.
 
     settings: those of all clips; patterns: further ones by pattern, see settings.py. Raises ClipError where an input
     names nothing, settings do not exist, or two inputs would have one output; OSError.
@@ -61,14 +61,24 @@ def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str
     patterns = {pattern: check_settings(each, f'["{pattern}"]') for pattern, each in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
-        target = os.path.abspath(os.path.join(output, _stem(name, path) + ".ath"))
+        target = _target(os.fspath(output), _stem(name, path) + ".ath")
         item = Item(name, path, target, settings_of((name, path), default, patterns))
         other = items.setdefault(target, item)
         if other.input != path:
-            raise ClipError(f"{item.shown}: would be {target}, as would {other.shown}; expected a name of its own")
+            place = _without_secrets(target) if is_url(target) else target
+            raise ClipError(f"{item.shown}: would be {place}, as would {other.shown}; expected a name of its own")
     if not items:
         raise ClipError("inputs: got no clips, expected at least one")
     return sorted(items.values(), key=lambda item: item.name)
+
+
+def _target(output: str, name: str) -> str:
+    if not is_url(output):
+        return os.path.abspath(os.path.join(output, name))
+    if "::" in output or "?" in output:
+        raise ClipError(f"{_without_secrets(output)}: got a chain of file systems or a query, expected the plain URL "
+                        "of a directory")
+    return f"{output.rstrip('/')}/{name}"
 
 
 def _stem(name: str, path: str) -> str:
@@ -166,14 +176,25 @@ def download(url: str, path: str) -> str:
     return sha256(path)
 
 
-# ---- what an input is known again by ----
+def upload(path: str, url: str) -> dict[str, Any]:
+    """Stores a file, whole; its identity there. Raises RemoteError, OSError."""
+    system, target = file_system(url)
+    try:
+        system.makedirs(system._parent(target), exist_ok=True)
+        system.put_file(path, target)
+    except Exception as error:
+        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+    return remote_identity(url)
+
+
+# ---- what a file is known again by ----
 
 
 def identity(item: Item) -> dict[str, Any]:
     """Size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats that
     spread over several files, others than numbered series, only the named file counts. Raises OSError."""
     if is_url(item.input):
-        known = _remote_identity(item.input)
+        known = remote_identity(item.input)
     else:
         known = _files_identity(_frames(item.input))
     others = [item.settings[name] for name in ("mesh", "hierarchy") if os.path.isabs(item.settings.get(name, ""))]
@@ -197,8 +218,10 @@ def _files_identity(paths: list[str]) -> dict[str, Any]:
     return known | ({"files": len(stats)} if len(stats) > 1 else {})
 
 
-def _remote_identity(url: str) -> dict[str, Any]:
+def remote_identity(url: str) -> dict[str, Any]:
+    """What the file system says of a file now: listings may be old, or tell times more exactly. Raises RemoteError."""
     system, path = file_system(url)
+    system.invalidate_cache()
     try:
         info = system.info(path)
     except Exception as error:

@@ -2,7 +2,7 @@
 
 Only this process writes the manifest, and only when a clip's file is in its place. Clips that fail are noted and
 do not stop the others. Drafts and coded segments of long clips, and inputs that were downloaded, lie in a folder
-beside the outputs, which goes when the run ends, or when the next one begins.
+beside the outputs (the manifest, where those go to a URL), which goes when the run ends, or when the next one begins.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from typing import Any
 
 import athcodec
 from athcodec.batch import tasks
-from athcodec.batch.inputs import Item, identity, is_telling, sha256
-from athcodec.batch.manifest import Manifest, Record, read_records
+from athcodec.batch.inputs import Item, identity, is_telling, remote_identity, sha256
+from athcodec.batch.manifest import Manifest, ManifestError, Record, read_records
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
 from athcodec.files import is_url, remove_leftovers_of, scratch_folder
+from athcodec.remote import _without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
@@ -76,17 +77,18 @@ class Todo:
 def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
             redo: bool = False) -> list[Todo]:
     """What `run` would do with each clip. Nothing is written."""
-    records = read_records(manifest or os.path.join(output, MANIFEST))
+    records = read_records(_manifest_path(output, manifest))
     return [_todo(item, records.get(_key(item, output)), redo) for item in items]
 
 
 def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
         workers: int | None = None, scheduler: str | None = None, split: int = SPLIT, verify: bool = False,
         redo: bool = False, show: Show | None = None) -> Outcome:
-    """Encodes what is left to do of some items, whose outputs are in the directory `output`.
+    """Encodes what is left to do of some items, whose outputs are in the directory `output`, a path or a URL.
 
-    manifest: its file (default: athcodec-batch.jsonl in `output`); clips that it has as done, with the same settings
-    and input, and whose file has the checksum that it says, are kept. workers: processes on this machine (default: one
+    manifest: its file (default: athcodec-batch.jsonl in `output`; needed where that is a URL); clips that it has as
+    done, with the same settings and input, and whose file has the checksum that it says, are kept; of files behind a
+    URL, what their server says has to be as it was. workers: processes on this machine (default: one
     per core); scheduler: the address of a scheduler of Dask to use instead, whose workers have the same athcodec and
     see inputs and outputs under the same paths. split: a clip of more segments is coded that many at a time, in any
     workers. verify: each file is opened and every level decoded before it is noted. redo: keep nothing. Raises
@@ -94,11 +96,11 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
     """
     if find_spec("distributed") is None:
         raise MissingExtra('batch: needs dask.distributed: pip install "athcodec[batch]"')
-    output, start, outcome = os.path.abspath(output), time.monotonic(), Outcome()
-    os.makedirs(output, exist_ok=True)
-    show = show or Show()
-    with (Manifest(manifest or os.path.join(output, MANIFEST)) as notes,
-          scratch_folder(os.path.join(output, SCRATCH)) as folder):
+    start, outcome, show = time.monotonic(), Outcome(), show or Show()
+    manifest = _manifest_path(output, manifest)
+    place = os.path.dirname(manifest) if is_url(output) else os.path.abspath(output)
+    os.makedirs(place, exist_ok=True)
+    with Manifest(manifest) as notes, scratch_folder(os.path.join(place, SCRATCH)) as folder:
         os.chmod(folder, 0o700)  # workers unpickle what lies there
         todo = []
         for item in items:
@@ -110,10 +112,17 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
                 with _client(workers, scheduler) as client:
                     _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
         finally:
-            _tidy(each.item.output for each in todo)
+            _tidy(each.item.output for each in todo if not is_url(each.item.output))
             show.end()
     outcome.seconds = time.monotonic() - start
     return outcome
+
+
+def _manifest_path(output: str | os.PathLike[str], manifest: str | os.PathLike[str] | None) -> str:
+    if manifest is None and is_url(output):
+        raise ManifestError(f"{_without_secrets(output)}: got no manifest, expected a file of this machine where "
+                            "outputs go to a URL")
+    return os.path.abspath(manifest or os.path.join(output, MANIFEST))
 
 
 def _tidy(outputs: Iterable[str]) -> None:
@@ -128,6 +137,8 @@ def _tidy(outputs: Iterable[str]) -> None:
 
 def _key(item: Item, output: str | os.PathLike[str]) -> str:
     """What the manifest calls an output: the directory may be moved with it."""
+    if is_url(item.output):
+        return item.output[len(os.fspath(output).rstrip("/")) + 1:]
     return Path(os.path.relpath(item.output, output)).as_posix()
 
 
@@ -138,11 +149,20 @@ def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
         return Todo(item, "failed before")
     if record["settings"] != item.settings:
         return Todo(item, "other settings")
+    fault = _fault_of_output(item, record)
+    return Todo(item, fault) if fault else _todo_by_input(item, record)
+
+
+def _fault_of_output(item: Item, record: Record) -> str:
+    if is_url(item.output):
+        try:
+            return "" if remote_identity(item.output) == record.get("stored") else "output was changed"
+        except AthError:
+            return "output is missing"
     if not os.path.exists(item.output):
-        return Todo(item, "output is missing")
-    if os.path.getsize(item.output) != record["bytes"] or sha256(item.output) != record["sha256"]:
-        return Todo(item, "output was changed")
-    return _todo_by_input(item, record)
+        return "output is missing"
+    same = os.path.getsize(item.output) == record["bytes"] and sha256(item.output) == record["sha256"]
+    return "" if same else "output was changed"
 
 
 def _todo_by_input(item: Item, record: Record) -> Todo:
@@ -238,7 +258,8 @@ class _Run:
         self.client.subscribe_topic(self.topic, show)
         try:
             for each in todo:
-                os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
+                if not is_url(each.item.output):
+                    os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
                 self._submit(each.item, "begin", tasks.begin, self._folder(each.item), split=self.split,
                              verify=self.verify, version=athcodec.__version__, topic=self.topic, known=each.known)
             while self.pending:
@@ -315,6 +336,9 @@ class _Run:
             self.outcome.kept.append(item)
             self.show.kept(item)
             return
+        if "done" in result and is_url(item.output) and _fault_of_output(item, result["done"]):
+            result = {"failed": f"{_without_secrets(item.output)}: a worker has stored it, expected to find it there; "
+                                "workers need a file system that all share"}
         status = "done" if "done" in result else "failed"
         record = {"output": _key(item, self.output), "input": item.shown, "status": status, "settings": item.settings,
                   "version": athcodec.__version__}

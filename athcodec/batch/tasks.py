@@ -3,7 +3,8 @@
 `begin` encodes a clip of few segments, and of others makes the draft, `code` some of its segments, `finish` the file.
 Draft and coded segments lie as files in the run's scratch folder, beside the outputs, which all workers see under the
 same path; only names and figures go between tasks. A task that is run again, for its worker died, finds what it has
-finished. Whatever goes wrong with a clip is its result, in one line: nothing is raised but what ends the worker.
+finished. A file that goes to a URL is made in that folder too, and stored when it is whole. Whatever goes wrong with a
+clip is its result, in one line: nothing is raised but what ends the worker.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 import athcodec
 from athcodec import container as ct
 from athcodec import discovery, encoder
-from athcodec.batch.inputs import Item, download, identity, is_telling, sha256
+from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoder import CodedSegment, Draft
@@ -69,7 +70,7 @@ def _begin(item: Item, folder: str, split: int, verify: bool, version: str, repo
     with _opened(item, folder, source) as clip:
         options = coding_options(item.settings, clip.metadata.get("unit"))
         if _segment_count(clip, options) <= split:
-            summary = athcodec.encode(clip, item.output, jobs=1, progress=report, **options)
+            summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)
             return _done(item, source, summary, verify, start)
         draft = encoder.draft(clip, jobs=1, progress=report, **options)
     _pickle(path, [(draft, source, time.perf_counter() - start)])
@@ -91,20 +92,21 @@ def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, repo
     start = time.perf_counter()
     draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
-        summary = encoder.write(clip, draft, _coded(parts), item.output, progress=report)
+        summary = encoder.write(clip, draft, _coded(parts), _target(item, folder), progress=report)
     return _done(item, source, summary, verify, start - seconds - sum(part["seconds"] for part in parts))
 
 
 def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: bool, start: float) -> Result:
     if verify:
-        with athcodec.open(item.output, strict=True) as decoder:
+        with athcodec.open(summary.path, strict=True) as decoder:
             decoder.check()
+    stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
     last = summary.depths[-1]
-    return {"done": {
+    return {"done": stored | {
         "source": source, "bytes": summary.bytes, "raw_bytes": summary.raw_bytes,
         "max_error_bound": summary.max_error_bound, "relative_bound": summary.relative_bound,
         "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.depths),
-        "sha256": sha256(item.output), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
+        "sha256": sha256(summary.path), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
 
 
 # ---- the clip ----
@@ -140,6 +142,11 @@ def _check_source(item: Item, source: dict[str, Any]) -> None:
 
 def _local_path(item: Item, folder: str) -> str:
     return os.path.join(folder, os.path.basename(item.name)) if is_url(item.input) else item.input
+
+
+def _target(item: Item, folder: str) -> str:
+    """Where the file is made."""
+    return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
 
 
 def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
