@@ -15,6 +15,7 @@ from bench import (
     batch,
     data,
     decode,
+    drill,
     forest,
     hierarchy,
     joined,
@@ -37,7 +38,7 @@ from bench import (
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large, "forest": forest, "remote": remote, "joined": joined}
+         "large": large, "forest": forest, "remote": remote, "drill": drill, "joined": joined}
 
 
 def main(argv: Sequence[str]) -> int:

@@ -63,12 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
-        source, vertices = Path(folder, "in"), _make_clips(args, Path(folder, "in"))
+        source, vertices = Path(folder, "in"), make_clips(args, Path(folder, "in"))
         settings = {"rel_error": args.rel_error, "effort": args.effort}
         runs: dict[str, list[dict[str, float]]] = {}
         broken: list[str] = []
         for number in range(args.rounds):
-            runs.setdefault("loop", []).append(_loop(source, Path(folder, f"loop_{number}"), settings))
+            runs.setdefault("loop", []).append(encode_in_loop(source, Path(folder, f"loop_{number}"), settings))
             for workers in args.workers:
                 out = Path(folder, f"{workers}_{number}")
                 runs.setdefault(str(workers), []).append(_run(source, out, settings, workers))
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                        table("One worker over several", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}
 
 
-def _make_clips(args: argparse.Namespace, folder: Path) -> int:
+def make_clips(args: argparse.Namespace, folder: Path) -> int:
     """Windows of a clip as files; how many vertices they have."""
     folder.mkdir()
     with athcodec.read_hdf5(args.of) as clip:
@@ -95,7 +95,7 @@ def _make_clips(args: argparse.Namespace, folder: Path) -> int:
         return clip.vertex_count
 
 
-def _loop(source: Path, out: Path, settings: dict[str, Any]) -> dict[str, float]:
+def encode_in_loop(source: Path, out: Path, settings: dict[str, Any]) -> dict[str, float]:
     out.mkdir()
     load, start = _load(), time.perf_counter()
     for path in sorted(source.iterdir()):
