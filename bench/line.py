@@ -32,7 +32,7 @@ class Line(ThreadingHTTPServer):
         self._free, self._turn = 0.0, threading.Lock()
 
     def __enter__(self) -> Line:
-        threading.Thread(target=self.serve_forever, daemon=True).start()
+        threading.Thread(target=self.serve_forever, args=(0.02,), daemon=True).start()
         return self
 
     def __exit__(self, *_) -> None:

@@ -31,17 +31,17 @@ class NoPlots(Exception):
 def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path,
          prefix: str = "") -> list[Path]:
     """Writes the pictures of a clip and returns their files. Raises NoPlots."""
-    figure_of = _pyplot()
+    figure_of = pyplot(INCHES)
     points = measured(point for point in contents["points"] if point["clip"] == clip)
     pictures = {error: _rate_picture(figure_of, points, error, clip) for error in ERRORS if points}
     for result in contents["curves"]:
         if result["clip"] == clip:
             pictures["progressive"] = _progressive_picture(figure_of, result, clip)
-    return [_save(figure, folder / file_name(prefix + clip, what)) for what, figure in pictures.items()]
+    return [save(figure, folder / file_name(prefix + clip, what)) for what, figure in pictures.items()]
 
 
-def _pyplot():
-    """A function that makes a figure and its axes, without a screen."""
+def pyplot(inches: tuple[float, float]):
+    """A function that makes a figure of a size and its axes, without a screen. Raises NoPlots."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -49,7 +49,7 @@ def _pyplot():
         raise NoPlots(MISSING) from None
 
     def figure_of():
-        figure = Figure(figsize=INCHES, dpi=DPI, layout="constrained")
+        figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         return figure, figure.add_subplot()
 
@@ -118,6 +118,6 @@ def _label(axes, title: str, across: str, up: str) -> None:
     axes.grid(True, which="major", color="#dddddd", linewidth=0.8)
 
 
-def _save(figure, file: Path) -> Path:
+def save(figure, file: Path) -> Path:
     figure.savefig(file, metadata={"Software": None})
     return file

@@ -1,4 +1,4 @@
-"""Everything in small, in two minutes: some codecs, the decoder, the paper's table, scaling, the report.
+"""Everything in small, in two minutes: codecs, the decoder, the paper's table, scaling, forests, URLs, the report.
 
 Each step is a command of its own, as it would be typed; its JSON and the report go to one folder. What takes
 long is left out: most codecs, most bounds, large clips. That nothing breaks is what it is for; figures to
@@ -58,9 +58,12 @@ def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     files = [clip for clip in clips if Path(clip).is_file()][:1]  # of the sample where none is given
     bounds = [f"{bound:g}" for bound in args.bounds]
     few = ["--rounds", "2", "--seeks", "20", "--instances", "20"]
+    made = ["--of", *files] if files else []
     steps = {"rd": [*clips, "--codecs", *args.codecs, "--bounds", *bounds], "decode": [*files, *few],
              "paper": [*files, "--rel-error", "1e-4"],
-             "scale": ["--encodes", "1", *(["--of", *files] if files else [])]}
+             "scale": ["--encodes", "1", *made],
+             "forest": ["--instances", "1", "100", "--clips", "1", "4", "--rounds", "1", *made],
+             "remote": ["--plants", "1", "--frames", "240", "--frame", "200", "--rounds", "1", *made]}
     for verb, words in steps.items():
         yield verb, [*words, "--json", str(out / f"{verb}.json")]
     yield "report", ["--results", str(out)]

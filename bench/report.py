@@ -1,7 +1,7 @@
 """One page from all results: what the clips are, every table with the command that made it, pictures.
 
 Reads the JSON files of a folder (of any verb) and writes report.md and, where matplotlib is installed, the
-pictures of plots.py beside them. Measures nothing: a verb that has no file there has no section.
+pictures of plots.py and charts.py beside them. Measures nothing: a verb that has no file there has no section.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from bench import plots, rd
+from bench import charts, plots, rd
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
 TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
           "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
-          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "batch": "Many clips"}
+          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "large": "Large clips",
+          "forest": "Forests", "batch": "Many clips", "drill": "What a batch survives", "remote": "Behind a URL"}
 
 ORDER = {verb: place for place, verb in enumerate(TITLES)}
 
@@ -64,11 +65,11 @@ def _verb(result: dict[str, Any]) -> str:
 
 
 def _pictures(name: str, result: dict[str, Any], folder: Path) -> tuple[dict[str, list[Path]], str]:
-    """Files by clip, and why there are none."""
-    if _verb(result) != "rd":
-        return {}, ""
-    prefix = "" if name == "rd" else f"{name}_"
+    """Files by clip, or by no clip's name where they are about all of them; and why there are none."""
+    verb, prefix = _verb(result), "" if name == "rd" else f"{name}_"
     try:
+        if verb != "rd":
+            return {"": charts.draw(verb, name, result, folder)}, ""
         return {row["clip"]: plots.draw(result, row["clip"], folder, prefix) for row in result["clips"]}, ""
     except plots.NoPlots as error:
         return {}, str(error)
@@ -78,10 +79,14 @@ def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: s
     verb = _verb(result)
     head = f"## {TITLES.get(verb, verb)}\n"
     if verb != "rd":
-        return f"{head}\n{as_text(result)}\n"
+        above = [f"{missing}\n"] if missing else _shown(pictures[""])
+        return "\n".join([head, *above, as_text(result), ""])
     contents, clips = {key: result[key] for key in rd.KEYS}, [row["clip"] for row in result["clips"]]
     commands = dict.fromkeys(row["command"] for rows in contents.values() for row in rows)
     whole = result | rd.summary(contents, clips, None) | {"command": "`, `".join(commands)}
-    above = {rd.title(clip): "".join(f"![{file.stem}]({file.name})\n\n" for file in files)
-             for clip, files in pictures.items()}
+    above = {rd.title(clip): "\n".join([*_shown(files), ""]) for clip, files in pictures.items()}
     return f"{head}\n{missing or PICTURES}\n\n{as_text(whole, above)}\n"
+
+
+def _shown(files: list[Path]) -> list[str]:
+    return [f"![{file.stem}]({file.name})\n" for file in files]

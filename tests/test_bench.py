@@ -20,7 +20,7 @@ from athcodec.container import KIND_NAMES
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import compare, paper, plots  # noqa: E402
+from bench import charts, compare, paper, plots  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store  # noqa: E402
 
@@ -245,7 +245,65 @@ def test_a_growing_prefix_shows_what_the_table_of_the_file_says(tmp_path, bushy_
     assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
 
 
+# ---- beyond one clip and one machine ----
+
+
+def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path, bushy_file):
+    _, result = run_bench(tmp_path, "forest", "--of", bushy_file, "--instances", "1", "900", "--clips", "1", "3",
+                          "--phases", "2", "0", "--frames", "600", "--rounds", "1")
+    forests, parts, units = tables_of(result)
+    assert result["broken"] == []
+    assert [(row["instances"], row["clips"], row["phases"]) for row in forests] == [
+        (1, 1, 2), (900, 1, 2), (900, 1, "own"), (900, 3, 2), (900, 3, "own")]
+    assert all(sum(row["levels"]) == row["instances"] for row in forests)
+    for row in forests:
+        assert row["kB/s"] == pytest.approx(row["paper kB/s"], rel=0.1) and 0 < row["ms"]
+        shown = sum(count > 0 for count in row["levels"])
+        assert row["poses"] == 900 if row["phases"] == "own" else row["poses"] <= 2 * shown * row["clips"]
+    one, three = (row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2)
+    assert 2 < three / one < 4
+    assert all(row["prepare"] > 0 for row in parts), "of five segments one goes and one comes"
+    assert [row["bytes"] for row in units] == sorted(row["bytes"] for row in units)
+
+
+def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
+    _, result = run_bench(tmp_path, "forest", "--of", bushy_file, "--instances", "20", "--clips", "2", "--phases", "3",
+                          "--frames", "300", "--rounds", "1")
+    [row] = tables_of(result)[0]
+    assert row["kB/s"] == row["paper kB/s"] == 0 and result["broken"] == []
+
+
+def test_what_a_frame_behind_a_url_takes_is_counted_and_limited(tmp_path, bushy_file):
+    _, result = run_bench(tmp_path, "remote", "--of", bushy_file, "--plants", "1", "20", "--frames", "300", "--frame",
+                          "250", "--rounds", "1", "--latency", "0.01")
+    [rows] = tables_of(result)
+    assert result["broken"] == []
+    for row in rows:
+        assert 1 <= row["requests"] <= (row["allowed"] or 8) and row["needed"] <= row["bytes"] <= row["file"]
+        assert row["s at 10 ms"] > 0.01 * row["requests"] / 2
+    large = {row["what"]: row for row in rows if row["plants"] == 20}
+    assert large["frame 250 at level 1"]["bytes"] < large["everything"]["bytes"] / 2
+    assert large["verify"]["bytes"] == large["verify"]["needed"] == large["verify"]["file"]
+
+
+@pytest.mark.slow
+def test_the_drill_finds_every_clip_once(tmp_path):
+    _, result = run_bench(tmp_path, "drill", "--clips", "16", "--frames", "20", "--effort", "fast")
+    runs, [end] = tables_of(result)
+    assert result["broken"] == [] and runs[0]["exit code"] == -9
+    assert [(row["done"], row["failed"]) for row in runs[2:]] == [(1, 0), (0, 0)]
+    assert sum(row["new"] for row in runs) == end["files"] == end["once"] == end["verified"] == end["same"] == 16
+
+
 # ---- the whole of it ----
+
+
+@pytest.mark.parametrize("verb", charts.CHARTS)
+def test_results_of_the_repository_have_pictures(verb, tmp_path):
+    pytest.importorskip("matplotlib", reason=plots.MISSING)
+    result = json.loads((ROOT / "bench" / "results" / f"{verb}.json").read_text())
+    [picture] = charts.draw(verb, verb, result, tmp_path)
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):
@@ -259,10 +317,11 @@ def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
     _, result = run_bench(tmp_path, "quick", bushy_file, "--codecs", "athcodec", "bench_codecs:Rounded",
                           "--bounds", "1e-2", "1e-3", "--out", str(folder))
     steps = [row["step"] for row in result["tables"][0]["rows"]]
-    assert steps == ["rd", "decode", "paper", "scale", "report", "all"]
+    assert steps == ["rd", "decode", "paper", "scale", "forest", "remote", "report", "all"]
     text = (folder / "report.md").read_text()
-    assert all(f"`python -m bench {verb} " in text for verb in ("rd", "decode", "paper", "scale"))
+    assert all(f"`python -m bench {verb} " in text for verb in steps[:-2])
     pictures = {f"bushy_{name}.png" for name in ("max", "rms", "progressive")}
+    pictures |= {f"{name}.png" for name in ("scale", "forest", "remote")}
     if find_spec("matplotlib") is None:  # the extra `bench` has it
         assert plots.MISSING in text and not list(folder.glob("*.png"))
     else:
