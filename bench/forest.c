@@ -134,7 +134,7 @@ static void open_clip(const char *path, clip *clip)
     ath_get_info(clip->file, &clip->info);
     expect(clip->info.level_count <= LEVELS, "more levels than expected");
     clip->memory = size + bases;
-    clip->loop = clip->info.duration * clip->info.frame_count / fmax(1.0, clip->info.frame_count - 1);
+    clip->loop = ath_clips(clip->file)->duration * clip->info.frame_count / fmax(1.0, clip->info.frame_count - 1);
     clip->shortest = clip->info.frame_count;
     for (int32_t s = 0; s < clip->info.segment_count; s++) {
         int32_t frames = ath_segment_start(clip->file, s + 1) - ath_segment_start(clip->file, s);
@@ -243,7 +243,7 @@ static void clip_units(const char *path, int rounds, const char *before)
             posed[at] = pose_us(&clip, level, out);
         }
     double start = now_ms();
-    for (int i = 0; i < CHOICES; i++) ath_depth_for(clip.file, -1, 10.0 + i, FOV, SCREEN, PIXELS);
+    for (int i = 0; i < CHOICES; i++) ath_depth_for(clip.file, 0, clip.info.segment_count - 1, 10.0 + i, FOV, SCREEN, PIXELS);
     put(before, "choice_us", (now_ms() - start) * 1e3 / CHOICES);
     print_medians("prepare_ms", prepared, rounds, levels);
     print_medians("pose_us", posed, rounds, levels);
@@ -259,7 +259,8 @@ static int32_t *slot_of_pose(const forest *forest, int32_t clip, int32_t level, 
 
 static int32_t level_of(const forest *forest, const instance *instance)
 {
-    return ath_depth_for(forest->clips[instance->clip].file, -1, instance->distance, FOV, SCREEN, PIXELS);
+    const clip *played = forest->clips + instance->clip;
+    return ath_depth_for(played->file, 0, played->info.segment_count - 1, instance->distance, FOV, SCREEN, PIXELS);
 }
 
 static void read_scene(const char *path, forest *forest)
@@ -365,7 +366,7 @@ static int32_t go_on(forest *forest, int32_t steps)
 static void start_clip(forest *forest, clip *clip, double clock)
 {
     int32_t count = clip->info.segment_count;
-    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, clock + clip->ahead, ATH_LOOP));
+    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, 0, clock + clip->ahead, ATH_LOOP));
     clip->segment = blend.segment[1];
     clip->number = clip->segment + count;
     for (int32_t level = 0; level < clip->info.level_count; level++)
@@ -380,7 +381,7 @@ static void start_clip(forest *forest, clip *clip, double clock)
 static void advance(forest *forest, clip *clip, double clock)
 {
     int32_t count = clip->info.segment_count;
-    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, clock + clip->ahead, ATH_LOOP));
+    ath_blend blend = ath_blend_at(clip->file, ath_frame_at(clip->file, 0, clock + clip->ahead, ATH_LOOP));
     if (stays(clip) || blend.segment[1] == clip->segment) return;
     clip->segment = blend.segment[1];
     clip->number++;
@@ -413,7 +414,7 @@ static double place_of(const forest *forest, const pose *pose, double clock)
 {
     const clip *clip = forest->clips + pose->clip;
     double lag = clip->loop / clip->info.frame_count * (clip->shortest - 1) * pose->phase / forest->phases;
-    return ath_frame_at(clip->file, clock + clip->ahead - lag, ATH_LOOP);
+    return ath_frame_at(clip->file, 0, clock + clip->ahead - lag, ATH_LOOP);
 }
 
 typedef struct { double choose, prepare, pose; } parts;
