@@ -7,7 +7,6 @@ predicted from what the decoder will have, corrections are found on what it will
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -19,6 +18,7 @@ from athcodec import quantize as qz
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip
+from athcodec.crew import ALONE, Crew, default_jobs
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.shapes import Shapes
@@ -34,7 +34,7 @@ def threads(jobs: int | None, source: Source) -> int:
     """Segments, or candidates, that are worked on at once: `jobs`, or one per core, at most 4 and few enough for
     memory."""
     fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
-    return jobs or max(1, min(4, os.cpu_count() or 1, fit))
+    return jobs or max(1, min(default_jobs(), fit))
 
 
 @dataclass
@@ -47,6 +47,7 @@ class Source:
     segment_frames: int
     exact_rest: bool
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
+    crew: Crew = ALONE
     rest: np.ndarray = field(init=False)  # (N, 3) float64
     origin: np.ndarray = field(init=False)  # (3,) float64
     wide: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
@@ -107,7 +108,7 @@ class Source:
 
     def relative(self, block: np.ndarray) -> np.ndarray:
         """(N, 3, T) float64 of a block in file order, less the origin."""
-        return gather(block, self.hierarchy.vertex_source, self.origin)
+        return gather(block, self.hierarchy.vertex_source, self.origin, self.crew)
 
     def positions(self, segment: int) -> np.ndarray:
         """(N, 3, T) float64 positions of a segment, less the origin."""
@@ -150,7 +151,7 @@ class Shape:
                              + LOOSE * settings.loose)
         branches["lag"] = settings.lags
         self.hierarchy_stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-        self.plan = Plan(branches, hierarchy.vertex_count)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.crew)
         self.rest_chunk = self._code_rest(source, branches, settings)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
 
@@ -298,7 +299,8 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
     factor = 1.0
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step)
+        corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step,
+                                                plan.crew)
         if corrections is not None:
             return Coded(segment, stems, corrections, decoded, step)
         factor *= 0.5
@@ -328,7 +330,7 @@ def code_segment(shape: Shape, settings: Settings, positions: np.ndarray, shapes
     errors = np.zeros((plan.level_count + (exact is not None), 2))
     for level in range(plan.level_count):
         decoded = coded.decoded if level == last else segment.pose(level, shape.origin, shape.dtype)
-        largest, squares = position_error(decoded, positions, shape.origin)
+        largest, squares = position_error(decoded, positions, shape.origin, plan.crew)
         errors[level] = largest, math.sqrt(squares / (positions.shape[0] * positions.shape[2]))
     if errors[last, 0] > settings.largest_bound:
         raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.largest_bound}")

@@ -28,6 +28,7 @@ from athcodec import quantize as qz
 from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
+from athcodec.crew import Crew, default_jobs
 from athcodec.decoder import Decoder
 from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
@@ -339,9 +340,10 @@ class _Job:
         clip, factors = _completed(clip, found, weights)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
+        crew = Crew(jobs or default_jobs())
         seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
         source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
-                        None if factors is None else factors[hierarchy.vertex_source])
+                        None if factors is None else factors[hierarchy.vertex_source], crew)
         return cls(source, tam, attributes == "all", effort, lossless, report, jobs, found, weights)
 
     @classmethod
@@ -354,7 +356,7 @@ class _Job:
         clip, factors = _completed(clip, draft.found, draft.weights)
         options = dict(draft.options)
         source = Source(clip, hierarchy, seen, options.pop("segment_frames"), options.pop("exact_rest"),
-                        None if factors is None else factors[hierarchy.vertex_source])
+                        None if factors is None else factors[hierarchy.vertex_source], Crew(jobs or default_jobs()))
         return cls(source, **options, report=report, jobs=jobs, found=draft.found, weights=draft.weights)
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec._native import BRANCH, address, encode_stream, lib
+from athcodec.crew import ALONE, Crew, ranges
 from athcodec.shapes import Shapes
 from athcodec.transform import Plan, SegmentMotion
 
@@ -84,14 +85,34 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
                          address(source, positions.dtype, positions.size))
 
 
-def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray,
-                     limit: float | np.ndarray, step: float) -> np.ndarray | None:
+def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float | np.ndarray, step: float,
+                     crew: Crew = ALONE) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
     Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.
     """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
+
+    def found(start: int, stop: int) -> np.ndarray | None:
+        rows = _corrections(positions[start:stop], source[start:stop], origin, limits[start:stop], step)
+        if rows is not None:
+            rows[:, 0] += start
+        return rows
+
+    parts = crew.each(found, ranges(vertices, 3 * frames))
+    if any(rows is None for rows in parts):
+        return None
+    corrections = np.concatenate(parts)
+    lib.ath_apply_corrections(frames, positions.dtype == np.float64,
+                              address(positions, positions.dtype, positions.size), step, corrections.ctypes.data,
+                              len(corrections))
+    return corrections
+
+
+def _corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray,
+                 step: float) -> np.ndarray | None:
+    vertices, _, frames = positions.shape
     capacity = 1024
     while True:
         rows = np.empty((capacity, 5), np.int32)

@@ -249,4 +249,4 @@ class Search:
     def _errors_of_maps(self, shape: Shape, segment: SegmentMotion) -> np.ndarray:
         """RMS errors of the sample at the levels that have maps."""
         poses = (segment.pose(level, shape.origin, shape.dtype) for level in self._map_levels(shape.plan))
-        return np.sqrt([position_error(pose, self.sample, shape.origin)[1] for pose in poses])
+        return np.sqrt([position_error(pose, self.sample, shape.origin, shape.plan.crew)[1] for pose in poses])

@@ -7,8 +7,10 @@ decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from ctypes import addressof
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,12 +28,14 @@ from athcodec._native import (
     address,
     lib,
 )
+from athcodec.crew import ALONE, Crew, ranges
 
 if TYPE_CHECKING:
     from athcodec.shapes import Shapes
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 128 << 20
+SHARES, LEAST_SHARE = 24, 1024  # of a plant's vertices that one thread takes at a time
 
 
 def decoding_bytes(vertex_count: int, frames: int) -> int:
@@ -72,8 +76,8 @@ class Plan:
     branches: (B,) of _native.BRANCH in file order. rest: (N, 3) float64, less the origin.
     """
 
-    def __init__(self, branches: np.ndarray, vertex_count: int):
-        self.branches = branches
+    def __init__(self, branches: np.ndarray, vertex_count: int, crew: Crew = ALONE):
+        self.branches, self.crew = branches, crew
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
         if piece_count <= 0:
@@ -110,6 +114,34 @@ class Plan:
                            self.bases.ctypes.data)
         self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
         lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
+
+    @cached_property
+    def shares(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+        """Ranges of pieces that much hangs on, in order, and of those that several threads may do once these are done:
+        whole subtrees of branches, up to a SHARES-th of the vertices."""
+        most = max(LEAST_SHARE, self.vertex_count // SHARES)
+        vertices = np.append(self.branches["first"], self.vertex_count).tolist()
+        after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
+        carrying, carried, branch = [], [], 0
+        while branch < len(after):
+            stop = after[branch]
+            if vertices[stop] - vertices[branch] > most and stop > branch + 1:
+                stop = branch + 1
+                carrying.append((branch, stop))
+            else:
+                while stop < len(after) and vertices[after[stop]] - vertices[branch] <= most:
+                    stop = after[stop]
+                carried.append((branch, stop))
+            branch = stop
+        first_piece = np.searchsorted(self.pieces["branch"], np.arange(len(after) + 1)).tolist()
+        return tuple([(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried))
+
+    @cached_property
+    def node_shares(self) -> list[tuple[int, int]]:
+        """Ranges of nodes that several threads may do."""
+        share = np.cumsum(self.nodes["count"]) // max(LEAST_SHARE, self.vertex_count // 4)
+        bounds = np.unique(share, return_index=True)[1].tolist()
+        return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
     @property
     def base_level(self) -> np.ndarray:
@@ -162,7 +194,6 @@ class SegmentMotion:
         self.node_steps = np.zeros(shape.node_count, np.int32)
         self._carriers = np.empty(lib.ath_carrier_size(shape.carrier_rows, frames))
         self.cosines = cosine_basis(frames)
-        self._work = np.empty(lib.ath_motion_work(shape.longest, frames))
         self._bind()
 
     def _bind(self) -> None:
@@ -174,7 +205,7 @@ class SegmentMotion:
             c_stream.step, c_stream.omega = stream.step, stream.omega
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-                             carriers=self._carriers.ctypes.data, work=self._work.ctypes.data, frames=self.frames)
+                             carriers=self._carriers.ctypes.data, frames=self.frames)
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
         if self.shapes is not None:
@@ -191,20 +222,43 @@ class SegmentMotion:
 
     def analyse(self, source: np.ndarray, dead_zone: float) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
-        lib.ath_analyse(self.plan.shape, self.motion, self.integers, self._source(source), dead_zone)
+        at = self._source(source)
+        self._piecewise(lambda motion, first, stop: lib.ath_analyse(
+            self.plan.shape, motion, self.integers, first, stop, at, dead_zone))
 
     def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
 
         A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
-        lib.ath_analyse_nodes(self.plan.shape, self.motion, self.integers, self._source(source),
-                              address(level_steps, np.float64, self.plan.level_count), dead_zone)
+        at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
+        self._nodewise(lambda motion, first, stop: lib.ath_analyse_nodes(
+            self.plan.shape, motion, self.integers, first, stop, at, steps, dead_zone))
 
     def clear_nodes(self) -> None:
         """Forgets the maps of the nodes."""
         self.node_tracks.fill(0)
         self.node_steps.fill(0)
+
+    def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
+        """Calls with a motion and each range of pieces, those that others hang on first."""
+        carrying, carried = self.plan.shares
+        for share in carrying:
+            self._shared(call)(*share)
+        self.plan.crew.each(self._shared(call), carried)
+
+    def _nodewise(self, call: Callable[[Motion, int, int], None]) -> None:
+        self.plan.crew.each(self._shared(call), self.plan.node_shares)
+
+    def _shared(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
+        """The call with scratch memory of its own."""
+        def run(first: int, stop: int) -> None:
+            motion = Motion.from_buffer_copy(self.motion)
+            work = np.empty(lib.ath_motion_work(self.plan.shape.longest, self.frames))
+            motion.work = work.ctypes.data
+            call(motion, first, stop)
+
+        return run
 
     def _source(self, source: np.ndarray) -> int:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
@@ -212,26 +266,41 @@ class SegmentMotion:
     def pose(self, level: int, origin: np.ndarray, dtype) -> np.ndarray:
         """Positions at `level`, corrections not included: (N, 3, frames) float32 or float64, origin added."""
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
-        lib.ath_pose(self.plan.shape, self.motion, self.integers, level, address(origin, np.float64, 3),
-                     positions.dtype == np.float64, positions.ctypes.data)
+        into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
+        self._piecewise(lambda motion, first, stop: lib.ath_pose(
+            self.plan.shape, motion, self.integers, first, stop, *into))
+        self._nodewise(lambda motion, first, stop: lib.ath_pose_nodes(
+            self.plan.shape, motion, self.integers, first, stop, *into))
         return positions
 
 
-def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Source positions, (T, N, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin."""
-    frames, vertices, _ = block.shape
+def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, crew: Crew = ALONE) -> np.ndarray:
+    """Source positions, (T, M, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin;
+    vertex_source (N,) int32: the N of its M vertices that are wanted."""
+    frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
     out = np.empty((vertices, 3, frames))
-    lib.ath_gather(vertices, frames, address(vertex_source, np.int32, vertices), block.dtype == np.float64,
-                   block.ctypes.data, address(origin, np.float64, 3), out.ctypes.data)
+
+    def fill(start: int, stop: int) -> None:
+        lib.ath_gather(stop - start, frames, address(vertex_source[start:stop], np.int32, stop - start),
+                       block.shape[1], block.dtype == np.float64, block.ctypes.data, address(origin, np.float64, 3),
+                       out[start:stop].ctypes.data)
+
+    crew.each(fill, ranges(vertices, 3 * frames))
     return out
 
 
-def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray) -> tuple[float, float]:
+def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray,
+                   crew: Crew = ALONE) -> tuple[float, float]:
     """Largest distance, and sum of squared distances, of decoded positions from the source."""
     vertices, _, frames = positions.shape
-    result = np.empty(2)
-    lib.ath_error(vertices, frames, positions.dtype == np.float64, address(positions, positions.dtype, 0),
-                  address(source, np.float64, positions.size), address(origin, np.float64, 3),
-                  result[:1].ctypes.data, result[1:].ctypes.data)
-    return float(result[0]), float(result[1])
+
+    def measured(start: int, stop: int) -> np.ndarray:
+        result, part = np.empty(2), positions[start:stop]
+        lib.ath_error(stop - start, frames, part.dtype == np.float64, address(part, part.dtype, 0),
+                      address(source[start:stop], np.float64, part.size), address(origin, np.float64, 3),
+                      result[:1].ctypes.data, result[1:].ctypes.data)
+        return result
+
+    largest, squares = np.transpose(crew.each(measured, ranges(vertices, 3 * frames)))
+    return float(largest.max()), float(sum(squares))

@@ -226,11 +226,11 @@ static void analyse_piece(const ath_shape *shape, const ath_motion *motion, cons
     ath_pose_rows(shape, motion, p, &rows, scratch);
 }
 
-void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, const double *source,
-                 double dead_zone)
+void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+                 int32_t stop, const double *source, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(shape, motion);
-    for (int32_t p = 0; p < shape->piece_count; p++)
+    for (int32_t p = first; p < stop; p++)
         analyse_piece(shape, motion, integers, p, &scratch, source, dead_zone);
 }
 
@@ -310,11 +310,11 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, const
     if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_row(rows->rows, 3, T));
 }
 
-void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
-                       const double *source, const double *level_steps, double dead_zone)
+void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+                       int32_t stop, const double *source, const double *level_steps, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(shape, motion);
-    for (int32_t n = 0; n < shape->node_count; n++) {
+    for (int32_t n = first; n < stop; n++) {
         const ath_node *node = shape->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
         if (node->coded) analyse_node(shape, motion, node, &rows, &scratch, source, level_steps[node->level], dead_zone);

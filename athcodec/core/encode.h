@@ -44,23 +44,29 @@ ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t 
 /* Bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
-/* Source positions, (frames, vertices, 3) in the source's order, float or (wide) double, to vertex-major doubles less
- * the origin. */
-ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide,
-                        const void *source, const double origin[3], double *out);
+/* Some of the source's positions, (frames, source_count, 3) in its order, float or (wide) double, to vertex-major
+ * doubles less the origin. */
+ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
+                        int32_t source_count, int wide, const void *source, const double origin[3], double *out);
 
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
  * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
  * its number of vertices: the same error in all of them together costs the same everywhere. Carriers are to be kept
- * (ath_plan). */
+ * (ath_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment, each with
+ * scratch memory of its own, once the pieces that theirs hang on are done. */
 ATH_ENCODER_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
-                         const double *source, double dead_zone);
+                         int32_t first, int32_t stop, const double *source, double dead_zone);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
-                               const double *source, const double *level_steps, double dead_zone);
+                               int32_t first, int32_t stop, const double *source, const double *level_steps,
+                               double dead_zone);
 
-/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (wide) double. */
-ATH_ENCODER_API void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t level,
-                      const double origin[3], int wide, void *positions);
+/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (wide) double.
+ * By ranges of pieces, which keep the rule above, and then of nodes. */
+ATH_ENCODER_API void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+                      int32_t first, int32_t stop, int32_t level, const double origin[3], int wide, void *positions);
+ATH_ENCODER_API void ath_pose_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+                            int32_t first, int32_t stop, int32_t level, const double origin[3], int wide,
+                            void *positions);
 
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
@@ -69,12 +75,13 @@ ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MO
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
                        const double origin[3], double *max_error, double *sum_squares);
 
-/* Finds the corrections that bring every vertex within its own limit, applies them to `positions` and fills rows of
- * (vertex, frame, x, y, z). Returns their number; when it is above `capacity` nothing was applied; -1: the step cannot
- * express them. */
-ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions,
+/* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of (vertex, frame, x, y,
+ * z). Returns how many there are; -1: the step cannot express them. */
+ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, const void *positions,
                                      const double *source, const double origin[3], const double *limits, double step,
                                      int32_t *corrections, int64_t capacity);
+ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int wide, void *positions, double step,
+                                   const int32_t *corrections, int64_t count);
 
 /* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,

@@ -3,12 +3,12 @@
 
 enum { TILE = 16 };
 
-void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int wide, const void *source,
-                const double origin[3], double *out)
+void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count, int wide,
+                const void *source, const double origin[3], double *out)
 {
-    size_t T = (size_t)frames, N = (size_t)vertex_count;
+    size_t T = (size_t)frames, N = (size_t)source_count;
     for (int32_t start = 0; start < frames; start += TILE)
-        for (size_t v = 0; v < N; v++)
+        for (size_t v = 0; v < (size_t)vertex_count; v++)
             for (size_t axis = 0; axis < 3; axis++)
                 for (int32_t t = start; t < ath_min(start + TILE, frames); t++) {
                     size_t at = ((size_t)t * N + (size_t)vertex_source[v]) * 3 + axis;
@@ -48,18 +48,24 @@ static void pose_node(const ath_shape *shape, const ath_motion *motion, const at
     }
 }
 
-void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t level,
-              const double origin[3], int wide, void *positions)
+void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+              int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(shape, motion);
-    for (int32_t p = 0; p < shape->piece_count; p++) {
+    for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = shape->pieces + p;
         ath_piece_rows rows = ath_rows_of_piece(shape, integers, motion->frames, p);
         if (piece->level > level) continue;
         const double *placed = ath_pose_piece(shape, motion, p, &rows, &scratch);
         store(placed, piece->first, piece->count, motion->frames, origin, wide, positions);
     }
-    for (int32_t n = 0; n < shape->node_count; n++)
+}
+
+void ath_pose_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+                    int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
+{
+    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    for (int32_t n = first; n < stop; n++)
         if (ath_is_shown(shape->nodes + n, level))
             pose_node(shape, motion, integers, n, &scratch, origin, wide, positions);
 }
@@ -141,9 +147,9 @@ static int choose_correction(int wide, const double here[3], const double want[3
     return found;
 }
 
-int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, void *positions, const double *source,
-                             const double origin[3], const double *limits, double step, int32_t *corrections,
-                             int64_t capacity)
+int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, const void *positions,
+                             const double *source, const double origin[3], const double *limits, double step,
+                             int32_t *corrections, int64_t capacity)
 {
     size_t T = (size_t)frames;
     int64_t count = 0;
@@ -167,7 +173,13 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, voi
             }
             count++;
         }
-    if (count > capacity) return count;
+    return count;
+}
+
+void ath_apply_corrections(int32_t frames, int wide, void *positions, double step, const int32_t *corrections,
+                           int64_t count)
+{
+    size_t T = (size_t)frames;
     for (int64_t i = 0; i < count; i++) {
         const int32_t *row = corrections + 5 * i;
         for (size_t k = 0; k < 3; k++) {
@@ -176,5 +188,4 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, voi
             if (row[2 + k] != 0) set_position(wide, positions, at, ath_corrected(here, row[2 + k], step));
         }
     }
-    return count;
 }
