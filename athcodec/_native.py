@@ -104,6 +104,8 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_carrier_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),
+    "ath_differences": (None, [c_int32, c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
+                               c_double, c_void_p, c_void_p, c_void_p]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
     "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,

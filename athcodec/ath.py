@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from athcodec._native import address, lib
+from athcodec.crew import ALONE, Crew
 from athcodec.hierarchy import Hierarchy, hierarchy_of
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ _LEAST_SCALE = 1e-2         # MIN_STRETCH is relative to this at least: a subtre
 _SMALLEST_EXTENT = 1e-100    # squares of what is smaller have no inverse
 _POINT_EXTENT = 1e-12       # of the plant's: below it a subtree is one point
 _READ_VALUES = 3 << 21      # numbers read from the clip at once
-_WORK_VERTICES = 1 << 16    # vertex-frames in work at once: a few arrays of them fit a processor's cache
+_WORK_VERTICES = 1 << 17    # vertex-frames in work at once, of one thread
 
 
 @dataclass(frozen=True)
@@ -316,6 +318,7 @@ def survey(
     progress: Callable[[float], object] | None = None,
     *,
     eta: int = 0,
+    crew: Crew = ALONE,
 ) -> Survey:
     """All that the ATH needs of a clip's frames, for thresholds that are chosen afterwards.
 
@@ -325,6 +328,7 @@ def survey(
     max_depth  nodes at this depth are taken whole, whatever they do
     progress   called now and then with the part of the frames done, at last with 1.0
     eta        frames; the largest eta that Survey.ath() will be asked for
+    crew       threads; what comes out does not depend on their number
 
     Raises ValueError where a number is negative or xi is missing, and ClipError for positions that are NaN
     or infinite.
@@ -338,18 +342,24 @@ def survey(
         hierarchy = hierarchy_of(clip)
     rest = np.asarray(clip.rest, float)[hierarchy.vertex_source]
     branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
-    differences = _Differences(_tested_pieces(hierarchy, rest, branches), limits)
-    extent = _Extent(rest)
-    for portion in _file_order_portions(clip, hierarchy):
-        extent.add(portion)
-        differences.add(_seen_from(differences.pieces.origin, portion))
+    pieces = _tested_pieces(hierarchy, rest, branches)
+    xi = limits.xi if limits.lam else None
+
+    def measured(portion: np.ndarray) -> tuple[_Extent, _Differences]:
+        frames = _in_file_order(portion, hierarchy)
+        return _Extent.of(frames, rest), _Differences.of(_seen_from(pieces.origin, frames), pieces, xi)
+
+    extent, differences, gads = None, None, _Largest(limits.eta + 1)
+    for where, how in crew.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * crew.jobs):
+        extent, differences = (where, how) if extent is None else (extent | where, differences | how)
+        gads.add(how.gads)
         if progress is not None:
             progress(extent.frame_count / clip.frame_count)
     return Survey(
         hierarchy=hierarchy, rest=rest, max_depth=max_depth, frame_count=extent.frame_count,
-        low=extent.low, high=extent.high, rms_motion=extent.rms_motion(), branches=branches,
-        largest_gads=differences.largest_gads.rows(), largest_distance=differences.largest_distance,
-        xi=limits.xi if limits.lam else None, most_beyond_xi=differences.most_beyond_xi,
+        low=extent.low, high=extent.high, rms_motion=extent.rms_motion(len(rest)), branches=branches,
+        largest_gads=gads.rows(), largest_distance=differences.largest_distance,
+        xi=xi, most_beyond_xi=None if xi is None else differences.most_beyond_xi,
     )
 
 
@@ -396,53 +406,48 @@ def _thresholds(
     return Thresholds(epsilon, eta, xi, lam)
 
 
+@dataclass(frozen=True)
 class _Extent:
-    """Bounding box, motion about the rest pose (N,3) and number of the frames added."""
+    """Bounding box (3,), number of frames, and sum of squared distances from the rest pose."""
 
-    def __init__(self, rest: np.ndarray) -> None:
-        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.frame_count = 0
-        self._rest = np.ascontiguousarray(rest.T)[:, None]
-        self._square_sum = 0.0
+    low: np.ndarray
+    high: np.ndarray
+    frame_count: int
+    square_sum: float
 
-    def add(self, frames: np.ndarray) -> None:
-        """Add frames (3,k,N) in the scene's coordinates."""
-        self.low = np.minimum(self.low, frames.min(axis=(1, 2)))
-        self.high = np.maximum(self.high, frames.max(axis=(1, 2)))
-        self.frame_count += frames.shape[1]
-        moved = frames - self._rest
+    @classmethod
+    def of(cls, frames: np.ndarray, rest: np.ndarray) -> _Extent:
+        """Of frames (3,k,N) in the scene's coordinates, rest (N,3)."""
+        moved = frames - rest.T[:, None]
         moved *= moved
-        self._square_sum += float(moved.sum())
+        low, high = (corner.astype(float) for corner in (frames.min(axis=(1, 2)), frames.max(axis=(1, 2))))
+        return cls(low, high, frames.shape[1], float(moved.sum()))
 
-    def rms_motion(self) -> float:
-        return float(np.sqrt(self._square_sum / (self.frame_count * self._rest.shape[2])))
+    def __or__(self, other: _Extent) -> _Extent:
+        return _Extent(np.minimum(self.low, other.low), np.maximum(self.high, other.high),
+                       self.frame_count + other.frame_count, self.square_sum + other.square_sum)
+
+    def rms_motion(self, vertex_count: int) -> float:
+        return float(np.sqrt(self.square_sum / (self.frame_count * vertex_count)))
 
 
+@dataclass(frozen=True)
 class _Differences:
-    """GAD and LAD of all pieces, as far as TAM asks for them over all frames; see Survey."""
+    """GAD (k,C) and LAD of C pieces in some frames: the largest distance and the most vertices beyond xi, (C,)."""
 
-    def __init__(self, pieces: _Pieces, limits: Thresholds) -> None:
-        self.pieces = pieces
-        self.largest_gads = _Largest(limits.eta + 1)
-        self.largest_distance = np.zeros(len(pieces.first))
-        self.most_beyond_xi = np.zeros(len(pieces.first), np.int64) if limits.lam else None
-        self._xi = limits.xi
+    gads: np.ndarray
+    largest_distance: np.ndarray
+    most_beyond_xi: np.ndarray
 
-    def add(self, frames: np.ndarray) -> None:
-        """Add frames (3,k,N), seen from the origin of the pieces."""
-        pieces = self.pieces
-        fit = pieces.fit(frames)
-        gad = np.empty((frames.shape[1], len(pieces.first)))
-        for level in pieces.levels:
-            distance, counts = fit.distances(level), pieces.counts[level]
-            starts = _starts(counts)
-            gad[:, level] = np.add.reduceat(distance, starts, axis=1) / counts
-            largest = np.maximum.reduceat(distance.max(axis=0), starts)
-            self.largest_distance[level] = np.maximum(self.largest_distance[level], largest)
-            if self.most_beyond_xi is not None:
-                beyond = np.add.reduceat(distance > self._xi, starts, axis=1, dtype=np.int64).max(axis=0)
-                self.most_beyond_xi[level] = np.maximum(self.most_beyond_xi[level], beyond)
-        self.largest_gads.add(gad)
+    @classmethod
+    def of(cls, frames: np.ndarray, pieces: _Pieces, xi: float | None) -> _Differences:
+        """Of frames (3,k,N), seen from the origin of the pieces."""
+        return pieces.fit(frames).differences(np.inf if xi is None else xi)
+
+    def __or__(self, other: _Differences) -> _Differences:
+        """Both together, but for the GADs."""
+        return _Differences(other.gads, np.maximum(self.largest_distance, other.largest_distance),
+                            np.maximum(self.most_beyond_xi, other.most_beyond_xi))
 
 
 class _Largest:
@@ -505,22 +510,25 @@ def _file_order_frames(
     positions: MotionClip | np.ndarray, hierarchy: Hierarchy, origin: np.ndarray
 ) -> Iterator[np.ndarray]:
     """Frames in working portions: (3,k,N) float64, vertices in file order, seen from `origin`."""
-    for portion in _file_order_portions(positions, hierarchy):
-        yield _seen_from(origin, portion)
+    for portion in _portions(positions, hierarchy.vertex_count):
+        yield _seen_from(origin, _in_file_order(portion, hierarchy))
 
 
 def _seen_from(origin: np.ndarray, portion: np.ndarray) -> np.ndarray:
     return portion.astype(float) - origin[:, None, None]
 
 
-def _file_order_portions(positions: MotionClip | np.ndarray, hierarchy: Hierarchy) -> Iterator[np.ndarray]:
-    """Frames in working portions as they are: (3,k,N) in the source's dtype, vertices in file order."""
-    count = hierarchy.vertex_count
-    at_once = max(1, _WORK_VERTICES // count)
-    for block in _blocks(positions, count):
+def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
+    """Frames in working portions as they are, (k,N,3)."""
+    at_once = max(1, _WORK_VERTICES // vertex_count)
+    for block in _blocks(positions, vertex_count):
         for start in range(0, len(block), at_once):
-            axes = np.moveaxis(block[start : start + at_once], 2, 0)
-            yield np.take(axes, hierarchy.vertex_source, axis=2)
+            yield block[start : start + at_once]
+
+
+def _in_file_order(portion: np.ndarray, hierarchy: Hierarchy) -> np.ndarray:
+    """(3,k,N) of a portion in the source's dtype, vertices in file order."""
+    return np.take(np.moveaxis(portion, 2, 0), hierarchy.vertex_source, axis=2)
 
 
 def _blocks(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
@@ -679,16 +687,19 @@ class _Fit:
         offset = self.centroid[:, some] - (linear @ self.pieces.centroid[some][..., None])[..., 0]
         return _map_points(linear, offset, self.pieces.rest[:, None, vertices], counts)
 
-    def distances(self, some: np.ndarray) -> np.ndarray:
-        """How far the residuals of some pieces are from their base places (eq. 5): (k, vertices of each)."""
-        pieces = self.pieces
-        counts, vertices = pieces.counts[some], pieces.vertices(some)
-        inverse = self.inverse[:, some]
-        offset = pieces.centroid[some] - (inverse @ self.centroid[:, some, :, None])[..., 0]
-        residual = _map_points(inverse, offset, np.take(self.frames, vertices, axis=2), counts)
-        residual -= pieces.rest[:, None, vertices]
-        residual *= residual
-        return np.sqrt(residual[0] + residual[1] + residual[2])
+    def differences(self, xi: float) -> _Differences:
+        """How far the residuals are from their base places."""
+        pieces, (_, frames, vertices) = self.pieces, self.frames.shape
+        inverse, offset = self.inverse_maps()
+        count = len(pieces.first)
+        found = _Differences(np.empty((frames, count)), np.empty(count), np.empty(count, np.int32))
+        lib.ath_differences(vertices, frames, count, address(pieces.first, np.int64, count),
+                            address(pieces.stop, np.int64, count), address(inverse, np.float64, frames * count * 9),
+                            address(offset, np.float64, frames * count * 3),
+                            address(pieces.rest, np.float64, 3 * vertices),
+                            address(self.frames, np.float64, self.frames.size), xi, found.gads.ctypes.data,
+                            found.largest_distance.ctypes.data, found.most_beyond_xi.ctypes.data)
+        return found
 
 
 def _starts(counts: np.ndarray) -> np.ndarray:

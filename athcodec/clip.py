@@ -270,9 +270,9 @@ def check_float_dtype(name: str, dtype: np.dtype) -> None:
 def check_finite(frames: np.ndarray, start: int = 0) -> None:
     """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite numbers whose
     squares are finite in float32 arithmetic too."""
-    usable = np.abs(frames) <= LARGEST_COORDINATE
-    if usable.all():
+    if -LARGEST_COORDINATE <= frames.min() and frames.max() <= LARGEST_COORDINATE:  # not so where one is NaN
         return
+    usable = np.abs(frames) <= LARGEST_COORDINATE
     frame, vertex = np.argwhere(~usable.all(axis=2))[0]
     point = _point(frames[frame, vertex])
     raise ClipError(f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers up to "

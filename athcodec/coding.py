@@ -280,21 +280,30 @@ class Coded:
         return ct.pack_corrections(self.correction_step, stream)
 
 
+def analyse(shape: Shape, settings: Settings, positions: np.ndarray,
+            shapes: Shapes | None) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
+    """The integers of the stems, and the time bases of the levels that learn theirs."""
+    bases = _learn_bases(shape, settings, positions)
+    streams = _streams(settings, shape.plan.level_count, bases)
+    segment = SegmentMotion(shape.plan, positions.shape[2], streams, shapes)
+    segment.analyse(positions, qz.DEAD_ZONE)
+    return segment, bases
+
+
 def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: Shapes | None) -> Coded:
     """Streams of the stems and the corrections that keep the limit."""
     plan = shape.plan
-    bases = _learn_bases(shape, settings, positions)
-    streams = _streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], streams, shapes)
-    segment.analyse(positions, qz.DEAD_ZONE)
-    stems = {}
-    for level in range(plan.level_count):
-        if plan.has_stems(level):
-            head = ct.StemsHead(settings.step_of(level), settings.omega[level])
-            if level in bases:
-                head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
-                head.basis = entropy.encode_temporal(bases[level], head.bits)
-            stems[level] = ct.pack_stems(head, entropy.encode_stems(segment, level))
+    segment, bases = analyse(shape, settings, positions, shapes)
+
+    def stream(level: int) -> bytes:
+        head = ct.StemsHead(settings.step_of(level), settings.omega[level])
+        if level in bases:
+            head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
+            head.basis = entropy.encode_temporal(bases[level], head.bits)
+        return ct.pack_stems(head, entropy.encode_stems(segment, level))
+
+    levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
+    stems = dict(zip(levels, plan.crew.each(stream, [(level,) for level in levels])))
     decoded = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
     factor = 1.0
     while True:

@@ -22,11 +22,12 @@ def default_jobs() -> int:
 
 
 class Crew:
-    """So many threads, or with one none but the caller's. What they are given must not call on the crew itself."""
+    """So many threads; with one there are none but the caller's, unless there is to be one `beside` it. What they are
+    given must not call on the crew itself."""
 
-    def __init__(self, jobs: int = 1):
+    def __init__(self, jobs: int = 1, beside: bool = False):
         self.jobs = jobs
-        self._pool = ThreadPoolExecutor(jobs) if jobs > 1 else None
+        self._pool = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
     def each(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
         """What function(*item) gives for each, in order."""

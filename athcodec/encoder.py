@@ -13,9 +13,7 @@ import dataclasses
 import hashlib
 import math
 import tempfile
-from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -341,7 +339,7 @@ class _Job:
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
         crew = Crew(jobs or default_jobs())
-        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), **_survey_options(tam))
+        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), crew=crew, **_survey_options(tam))
         source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
                         None if factors is None else factors[hierarchy.vertex_source], crew)
         return cls(source, tam, attributes == "all", effort, lossless, report, jobs, found, weights)
@@ -503,19 +501,19 @@ class _Job:
                 store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
-        """Some segments, coded a few at a time."""
+        """Some segments, coded a few at a time, while the next one is read."""
+        def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
+            index, blocks = taken
+            positions, exact = self._positions(blocks.pop())  # not held any longer
+            return CodedSegment(index, *code_segment(decided.shape, decided.settings, positions, decided.shapes, exact))
+
         at_once = threads(self.jobs, self.source)
-        with ThreadPoolExecutor(at_once) as pool:
-            pending: deque[tuple[int, Future]] = deque()
-            for index in segments:
-                if len(pending) == at_once:
-                    yield _coded(*pending.popleft())
-                block = self.source.block(index)
-                exact = self.source.exact(block) if self.lossless else None
-                pending.append((index, pool.submit(code_segment, decided.shape, decided.settings,
-                                                   self.source.relative(block), decided.shapes, exact)))
-            while pending:
-                yield _coded(*pending.popleft())
+        crew = Crew(at_once, beside=self.source.crew.jobs > 1)
+        return crew.ordered(code, ((index, [self.source.block(index)]) for index in segments), at_once)
+
+    def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """What is coded of a block, and its own numbers where these are to come back."""
+        return self.source.relative(block), self.source.exact(block) if self.lossless else None
 
     def _add_motion(self, store: ct.ChunkStore, shape: Shape, coded: Iterable[CodedSegment]) -> np.ndarray:
         """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
@@ -532,10 +530,6 @@ class _Job:
         if missing:
             raise ValueError(f"segments: got {self.segment_count - len(missing)}, expected all {self.segment_count}")
         return errors
-
-
-def _coded(index: int, future: Future) -> CodedSegment:
-    return CodedSegment(index, *future.result())
 
 
 def _bound_for_size(job: _Job, target: int) -> float:

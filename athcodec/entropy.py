@@ -85,8 +85,8 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
                          address(source, positions.dtype, positions.size))
 
 
-def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float | np.ndarray, step: float,
-                     crew: Crew = ALONE) -> np.ndarray | None:
+def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float | np.ndarray,
+                     step: float, crew: Crew = ALONE) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
     Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.

@@ -16,7 +16,17 @@ import numpy as np
 from athcodec import entropy
 from athcodec import quantize as qz
 from athcodec.ath import Ath
-from athcodec.coding import Settings, Shape, Source, analyse_finely, code_stems, lags, loose_branches, threads
+from athcodec.coding import (
+    Settings,
+    Shape,
+    Source,
+    analyse,
+    analyse_finely,
+    code_stems,
+    lags,
+    loose_branches,
+    threads,
+)
 from athcodec.errors import BoundError
 from athcodec.shapes import Components, Shapes, components, estimated_bits, learn
 from athcodec.transform import Plan, SegmentMotion, position_error
@@ -24,6 +34,7 @@ from athcodec.transform import Plan, SegmentMotion, position_error
 EFFORTS = ("fast", "default", "best")
 WALKS = 3  # of both steps
 LEARNING_SEGMENTS = 4  # of a clip, that shapes are learned from
+SHAPES_KEPT = 6  # between trials
 
 Progress = Callable[[str, float], None]
 
@@ -39,6 +50,7 @@ class Search:
         self.levels = ath.height + 2
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
+        self._shapes: dict[tuple, Shape] = {}
         self.sample = source.positions(len(source.segments) // 2)
         self.start = Settings(
             bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
@@ -94,7 +106,7 @@ class Search:
         return self._known[varied]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        shape = Shape(self.source, self.ath, settings)
+        shape = self._shape(settings)
         shapes = self.shapes(shape.plan, settings)
         try:
             coded = code_stems(shape, settings, self.sample, shapes)
@@ -116,7 +128,7 @@ class Search:
             return None
         known = settings.omega, settings.sheet.tobytes()
         if known not in self._components:
-            shape, count = Shape(self.source, self.ath, settings), len(self.source.segments)
+            shape, count = self._shape(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             self._components[known] = components(shape.plan, (
                 analyse_finely(shape, settings, self.source.positions(segment)) for segment in some))
@@ -124,15 +136,12 @@ class Search:
 
     def _with_shapes(self, settings: Settings) -> Settings:
         """Learned shapes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
-        shape = Shape(self.source, self.ath, settings)
+        shape = self._shape(settings)
         shapes, plain = self.shapes(shape.plan, settings, everywhere=True), replace(settings, shaped=None)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         pieces = np.repeat(np.arange(len(shapes.counts)), shape.plan.pieces["count"])
-        try:
-            modes, tracks = (estimated_bits(code_stems(shape, plain, self.sample, some).segment.coefficients, pieces,
-                                            len(shapes.counts)) for some in (None, shapes))
-        except BoundError:
-            return settings
+        modes, tracks = (estimated_bits(analyse(shape, plain, self.sample, some)[0].coefficients, pieces,
+                                        len(shapes.counts)) for some in (None, shapes))
         owners = np.repeat(np.arange(len(shapes.counts)), shapes.counts)
         price = estimated_bits(shapes.integers, owners, len(shapes.counts))
         wanted = [(shapes.counts > 0) & ((tracks * scale + price) * doubt < modes * scale) for doubt in qz.SHAPE_DOUBTS]
@@ -145,8 +154,22 @@ class Search:
         return counts / counts.sum()
 
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
+        some = {self._shape_key(settings): settings for settings in candidates}  # by shape, each to be made once
         with ThreadPoolExecutor(threads(self.jobs, self.source)) as pool:
+            list(pool.map(self._shape, some.values()))
             return list(pool.map(self.cost, candidates))
+
+    def _shape(self, settings: Settings) -> Shape:
+        """As in earlier trials, where one had it."""
+        key = self._shape_key(settings)
+        shape = self._shapes.pop(key, None) or Shape(self.source, self.ath, settings)
+        self._shapes[key] = shape  # the last one used
+        while len(self._shapes) > SHAPES_KEPT:
+            self._shapes.pop(next(iter(self._shapes)))
+        return shape
+
+    def _shape_key(self, settings: Settings) -> tuple:
+        return settings.rest_step, settings.sheet.tobytes()
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
@@ -218,10 +241,10 @@ class Search:
 
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
-        shape, errors = Shape(self.source, self.ath, settings), self._level_errors(settings.bound)
-        coded = code_stems(shape, settings, self.sample, self.shapes(shape.plan, settings))
+        shape, errors = self._shape(settings), self._level_errors(settings.bound)
+        segment, _ = analyse(shape, settings, self.sample, self.shapes(shape.plan, settings))
         scale = self.source.clip.frame_count / self.sample.shape[2]
-        rest = coded.bytes * scale + shape.prelude_bytes
+        rest = self.cost(settings)[1].sum() * scale + shape.prelude_bytes
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         roots = int((self.source.hierarchy.branch_parent < 0).sum())
         chosen = limits = None
@@ -229,15 +252,15 @@ class Search:
             steps = quality * errors
             if roots <= qz.FEW_ROOTS:
                 steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
-            coded.segment.clear_nodes()
-            coded.segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
+            segment.clear_nodes()
+            segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:
-                size = sum(len(entropy.encode_affines(coded.segment, level)) for level in self._map_levels(shape.plan))
+                size = sum(len(entropy.encode_affines(segment, level)) for level in self._map_levels(shape.plan))
                 if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
-                chosen, limits = steps, self._errors_of_maps(shape, coded.segment)
+                chosen, limits = steps, self._errors_of_maps(shape, segment)
                 limits[1:] = np.minimum(qz.NODE_HARM * limits[1:], limits[:-1])  # a deeper level stays the better one
-            elif (self._errors_of_maps(shape, coded.segment) <= limits).all():
+            elif (self._errors_of_maps(shape, segment) <= limits).all():
                 chosen = steps
             else:
                 break

@@ -44,6 +44,14 @@ ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t 
 /* Bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
+/* How far the residuals of pieces, ranges of vertices that each move by one affine map, are from their base places:
+ * the mean of each piece in each frame, its largest distance, and the most vertices beyond xi in a frame.
+ * rest: 3 x vertices; positions: 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which
+ * take a position to its residual. */
+ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
+                             const int64_t *stop, const double *inverse, const double *offset, const double *rest,
+                             const double *positions, double xi, double *mean, double *largest, int32_t *most_beyond);
+
 /* Some of the source's positions, (frames, source_count, 3) in its order, float or (wide) double, to vertex-major
  * doubles less the origin. */
 ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
