@@ -138,18 +138,23 @@ class Settings:
         return qz.single(self.step * self.level_steps[level])
 
 
+def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.ndarray:
+    """(B,) of _native.BRANCH."""
+    branches = np.zeros(hierarchy.branch_count, BRANCH)
+    branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
+    branches["attach"] = hierarchy.attach
+    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * settings.loose
+    branches["lag"] = settings.lags
+    return branches
+
+
 class Shape:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
     def __init__(self, source: Source, ath: Ath, settings: Settings):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
-        branches = np.zeros(hierarchy.branch_count, BRANCH)
-        branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
-        branches["attach"] = hierarchy.attach
-        branches["flags"] = (SHEET * settings.sheet + WHOLE * ath.whole_branches()
-                             + LOOSE * settings.loose)
-        branches["lag"] = settings.lags
+        branches = branch_records(hierarchy, ath, settings)
         self.hierarchy_stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.plan = Plan(branches, hierarchy.vertex_count, source.crew)
         self.rest_chunk = self._code_rest(source, branches, settings)

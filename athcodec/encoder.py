@@ -32,7 +32,7 @@ from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.search import EFFORTS, Progress, Search
+from athcodec.search import EFFORTS, Progress, decide
 from athcodec.shapes import Shapes
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 
@@ -382,10 +382,7 @@ class _Job:
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
                        self.source.reach)
         ath = self.seen.ath(self.thresholds(bound))
-        search = Search(self.source, ath, bound, self.effort, self.report, self.jobs)
-        settings = search.best()
-        shape = Shape(self.source, ath, settings)
-        return _Decided(ath, settings, shape, search.shapes(shape.plan, settings))
+        return _Decided(ath, *decide(self.source, ath, bound, self.effort, self.report, self.jobs))
 
     def draft(self, decided: _Decided) -> Draft:
         options = {"tam": self.tam, "keep_static": self.keep_static, "effort": self.effort, "lossless": self.lossless,

@@ -1,15 +1,16 @@
 """Which settings make the smallest file: candidates code a sample of the segments, and their bytes are counted.
 
-Bases, rotations, time bases and steps are searched one after the other. `Search` knows what to try; what a trial does
-is coding.py's business.
+Bases, rotations, time bases and steps are searched one after the other, on a part of the plant where that is large.
+`Search` knows what to try; what a trial does is coding.py's business.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +23,14 @@ from athcodec.coding import (
     Source,
     analyse,
     analyse_finely,
+    branch_records,
     code_stems,
     lags,
     loose_branches,
     threads,
 )
 from athcodec.errors import BoundError
+from athcodec.part import Part, Share, part_of
 from athcodec.shapes import Components, Shapes, components, estimated_bits, learn
 from athcodec.transform import Plan, SegmentMotion, position_error
 
@@ -39,25 +42,44 @@ SHAPES_KEPT = 6  # between trials
 Progress = Callable[[str, float], None]
 
 
-class Search:
-    """Finds settings by coding a sample of the segments with each candidate and counting the bytes."""
+def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
+           jobs: int | None = None) -> tuple[Settings, Shape, Shapes | None]:
+    """Settings, and what follows from them: hierarchy and rest pose as coded, learned shapes."""
+    sample = source.positions(len(source.segments) // 2)
+    search = Search(source, ath, first_settings(source, ath, bound, sample), sample, effort, report, jobs)
+    part = part_of(source, ath)
+    settings = search.best() if part is None else search.best_of_part(part)
+    shape = search.shape(settings)
+    return settings, shape, search.shapes(shape.plan, settings)
 
-    def __init__(self, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
-                 jobs: int | None = None):
+
+def first_settings(source: Source, ath: Ath, bound: float, sample: np.ndarray) -> Settings:
+    """Where a search starts from."""
+    relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
+    step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+    levels = ath.height + 2
+    return Settings(
+        bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
+        level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.wide,
+        loose=loose_branches(source, sample), lags=lags(source, rest_step), omega=(0,) * levels,
+        learned=(False,) * levels, shaped=None, node_steps=np.full(levels, step))
+
+
+class Search:
+    """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
+
+    share: what the clip is a part of, if it is one.
+    """
+
+    def __init__(self, source: Source, ath: Ath, start: Settings, sample: np.ndarray, effort: str, report: Progress,
+                 jobs: int | None = None, share: Share | None = None):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
-        relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
-        step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
-        self.levels = ath.height + 2
+        self.start, self.sample, self.levels = start, sample, ath.height + 2
+        self.share = share or Share.everything(self.levels)
+        self.doubt: float | None = None  # of SHAPE_DOUBTS, that the shapes found best had to overcome
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
         self._shapes: dict[tuple, Shape] = {}
-        self.sample = source.positions(len(source.segments) // 2)
-        self.start = Settings(
-            bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
-            level_steps=np.ones(self.levels), rest_step=qz.single(rest_step), sheet=source.wide,
-            loose=loose_branches(source, self.sample), lags=lags(source, rest_step),
-            omega=(0,) * self.levels, learned=(False,) * self.levels, shaped=None,
-            node_steps=np.full(self.levels, step))
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -67,7 +89,7 @@ class Search:
         some = np.linspace(0, self.sample.shape[2] - 1, min(8, self.sample.shape[2])).astype(int)
         frames = np.empty((len(some), *self.sample.shape[:2]))
         frames[:, self.source.hierarchy.vertex_source] = np.moveaxis(self.sample[:, :, some], 2, 0) + self.source.origin
-        nodes = self._inner_nodes()
+        nodes = self.inner_nodes()
         errors = np.full(self.levels, bound)
         for level in np.flatnonzero(nodes):
             left = self.ath.approximation(frames, int(level)) - frames
@@ -75,7 +97,7 @@ class Search:
             errors[level] = whole * math.sqrt(self.source.clip.vertex_count / nodes[level])
         return errors
 
-    def _inner_nodes(self) -> np.ndarray:
+    def inner_nodes(self) -> np.ndarray:
         """Nodes of more than one branch, per level."""
         hierarchy, branches = self.source.hierarchy, self.ath.node_branch
         branches = branches[hierarchy.subtree_branches[branches] > 1]
@@ -97,6 +119,27 @@ class Search:
         self.report("search", 1.0)
         return settings
 
+    def best_of_part(self, part: Part) -> Settings:
+        """What is best for a part of the plant, for all of it; its pieces are asked one by one for their shapes."""
+        start, kept = self.start, part.branches
+        limit = start.limit if np.isscalar(start.limit) else start.limit[part.vertices]
+        some = replace(start, sheet=part.source.wide, loose=start.loose[kept], lags=start.lags[kept], limit=limit)
+        share = Share.of(branch_records(self.source.hierarchy, self.ath, start),
+                         branch_records(part.source.hierarchy, part.ath, some))
+        search = Search(part.source, part.ath, some, self.sample[part.vertices], self.effort, self.report, self.jobs,
+                        share)
+        found = search.best()
+        inner, all_inner = search.inner_nodes(), self.inner_nodes()
+        coarser = np.where(inner > 0, np.sqrt(share.vertices * inner / np.maximum(all_inner, 1)), 1.0)
+        as_wide = np.array_equal(found.sheet, part.source.wide)
+        settings = replace(
+            start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step, omega=found.omega,
+            learned=found.learned, sheet=start.sheet if as_wide else np.full_like(start.sheet, found.sheet[0]),
+            node_steps=found.node_steps * coarser)
+        if search.doubt is None:
+            return settings
+        return replace(settings, shaped=self._pieces_for_shapes(settings, [search.doubt])[0])
+
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, bytes per level in the sample) at these settings."""
         varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.omega, settings.learned,
@@ -106,21 +149,30 @@ class Search:
         return self._known[varied]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        shape = self._shape(settings)
+        shape = self.shape(settings)
         shapes = self.shapes(shape.plan, settings)
         try:
             coded = code_stems(shape, settings, self.sample, shapes)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
-        levels = np.zeros(self.levels)
-        shape_bytes = sum(map(len, entropy.encode_shapes(shape.plan, shapes).values()))
+        levels, shape_bytes = np.zeros(self.levels), 0.0
+        for level, data in entropy.encode_shapes(shape.plan, shapes).items():
+            shape_bytes += len(data) * self.share.rows[level]
         for level, data in coded.stems.items():
             levels[level] = len(data)
         corrections = len(coded.correction_chunk)
         if corrections:
-            levels += corrections * self._share(shape.plan, coded.corrections)
-        scale = self.source.clip.frame_count / self.sample.shape[2]
-        return levels.sum() * scale + shape_bytes + shape.prelude_bytes, levels
+            levels += corrections * self._corrected(shape.plan, coded.corrections)
+        levels *= self.share.rows
+        return levels.sum() * self._scale + shape_bytes + self._prelude_bytes(shape), levels
+
+    @property
+    def _scale(self) -> float:
+        """Frames of the clip over those of the sample."""
+        return self.source.clip.frame_count / self.sample.shape[2]
+
+    def _prelude_bytes(self, shape: Shape) -> float:
+        return shape.prelude_bytes * self.share.vertices
 
     def shapes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> Shapes | None:
         """Shapes of the pieces that are to have some, or of all, learned from segments spread over the clip."""
@@ -128,7 +180,7 @@ class Search:
             return None
         known = settings.omega, settings.sheet.tobytes()
         if known not in self._components:
-            shape, count = self._shape(settings), len(self.source.segments)
+            shape, count = self.shape(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             self._components[known] = components(shape.plan, (
                 analyse_finely(shape, settings, self.source.positions(segment)) for segment in some))
@@ -136,18 +188,25 @@ class Search:
 
     def _with_shapes(self, settings: Settings) -> Settings:
         """Learned shapes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
-        shape = self._shape(settings)
-        shapes, plain = self.shapes(shape.plan, settings, everywhere=True), replace(settings, shaped=None)
-        scale = self.source.clip.frame_count / self.sample.shape[2]
+        plain = replace(settings, shaped=None)
+        wanted = dict(zip(qz.SHAPE_DOUBTS, self._pieces_for_shapes(plain, qz.SHAPE_DOUBTS)))
+        tried = {None: plain} | {doubt: replace(plain, shaped=some) for doubt, some in wanted.items() if some.any()}
+        self.doubt, settings = self._cheapest_of(tried)
+        return settings
+
+    def _pieces_for_shapes(self, plain: Settings, doubts: Sequence[float]) -> list[np.ndarray]:
+        """(P,) bool for each doubt: the pieces that seem to take so many times fewer bits with shapes."""
+        shape = self.shape(plain)
+        shapes = self.shapes(shape.plan, plain, everywhere=True)
         pieces = np.repeat(np.arange(len(shapes.counts)), shape.plan.pieces["count"])
         modes, tracks = (estimated_bits(analyse(shape, plain, self.sample, some)[0].coefficients, pieces,
                                         len(shapes.counts)) for some in (None, shapes))
         owners = np.repeat(np.arange(len(shapes.counts)), shapes.counts)
         price = estimated_bits(shapes.integers, owners, len(shapes.counts))
-        wanted = [(shapes.counts > 0) & ((tracks * scale + price) * doubt < modes * scale) for doubt in qz.SHAPE_DOUBTS]
-        return self._cheapest([plain, *(replace(settings, shaped=some) for some in wanted if some.any())])
+        return [(shapes.counts > 0) & ((tracks * self._scale + price) * doubt < modes * self._scale)
+                for doubt in doubts]
 
-    def _share(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
+    def _corrected(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
         """Fractions of the corrections that fall on the pieces of each level."""
         level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
         counts = np.bincount(level_of_vertex[corrections[:, 0]], minlength=self.levels)
@@ -156,10 +215,10 @@ class Search:
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
         some = {self._shape_key(settings): settings for settings in candidates}  # by shape, each to be made once
         with ThreadPoolExecutor(threads(self.jobs, self.source)) as pool:
-            list(pool.map(self._shape, some.values()))
+            list(pool.map(self.shape, some.values()))
             return list(pool.map(self.cost, candidates))
 
-    def _shape(self, settings: Settings) -> Shape:
+    def shape(self, settings: Settings) -> Shape:
         """As in earlier trials, where one had it."""
         key = self._shape_key(settings)
         shape = self._shapes.pop(key, None) or Shape(self.source, self.ath, settings)
@@ -197,8 +256,11 @@ class Search:
         return self._cheapest([settings, mixed, *candidates])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
-        costs = [cost for cost, _ in self._costs(candidates)]
-        return candidates[int(np.argmin(costs))]
+        return self._cheapest_of(dict(enumerate(candidates)))[1]
+
+    def _cheapest_of(self, candidates: dict) -> tuple[Any, Settings]:
+        costs = [cost for cost, _ in self._costs(list(candidates.values()))]
+        return list(candidates.items())[int(np.argmin(costs))]
 
     def _with_learned(self, settings: Settings) -> Settings:
         """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
@@ -241,10 +303,9 @@ class Search:
 
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
-        shape, errors = self._shape(settings), self._level_errors(settings.bound)
+        shape, errors = self.shape(settings), self._level_errors(settings.bound)
         segment, _ = analyse(shape, settings, self.sample, self.shapes(shape.plan, settings))
-        scale = self.source.clip.frame_count / self.sample.shape[2]
-        rest = self.cost(settings)[1].sum() * scale + shape.prelude_bytes
+        rest = self.cost(settings)[1].sum() * self._scale + self._prelude_bytes(shape)
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         roots = int((self.source.hierarchy.branch_parent < 0).sum())
         chosen = limits = None
@@ -255,8 +316,9 @@ class Search:
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:
-                size = sum(len(entropy.encode_affines(segment, level)) for level in self._map_levels(shape.plan))
-                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                size = sum(len(entropy.encode_affines(segment, level)) * self.share.nodes[level]
+                           for level in self._map_levels(shape.plan))
+                if size * self._scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(shape, segment)
                 limits[1:] = np.minimum(qz.NODE_HARM * limits[1:], limits[:-1])  # a deeper level stays the better one

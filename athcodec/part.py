@@ -1,0 +1,131 @@
+"""A part of a large plant that stands for all of it, where only totals matter: whole subtrees chosen evenly along the
+plant, and what they hang on. The search for settings (search.py) looks at such a part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from athcodec.ath import Ath
+from athcodec.clip import MotionClip
+from athcodec.coding import Source
+from athcodec.hierarchy import Hierarchy
+from athcodec.sources.frames import Frames
+from athcodec.transform import Plan
+
+LARGE = 1 << 16  # vertices: a smaller plant is looked at as a whole
+LEAST_PART = 1 << 14  # vertices of a part
+SHORTER = 3000  # frames of a clip over those in which a part has as many vertices as it: work in proportion
+SUBTREES = 8  # of a part, at least
+
+
+class Part:
+    """Some branches of a plant, each with what it hangs on, as a source of their own with the plant's segments.
+
+    branches, vertices  those that it has, ascending in file order
+    """
+
+    def __init__(self, source: Source, ath: Ath, branches: np.ndarray):
+        whole = source.hierarchy
+        kept = np.zeros(whole.branch_count, bool)
+        kept[branches] = True
+        self.branches, self.vertices = branches, np.flatnonzero(np.repeat(kept, whole.stem_count))
+        self._number = np.cumsum(kept) - 1
+        self.source = self._source(source)
+        self.ath = self._ath(ath)
+
+    def _source(self, source: Source) -> Source:
+        clip, places = source.clip, source.hierarchy.vertex_source[self.vertices]
+        chosen = np.sort(places)
+        some = MotionClip(Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen),
+                                 clip.dtype), clip.time, rest=clip.rest[chosen].astype(clip.rest_dtype))
+        part = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
+                       weights=None if source.weights is None else source.weights[self.vertices])
+        part.segments = source.segments
+        return part
+
+    def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:
+        parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]
+        number_of_vertex = np.zeros(whole.vertex_count, np.int64)
+        number_of_vertex[self.vertices] = np.arange(len(self.vertices))
+        return Hierarchy.from_parts(np.where(parent < 0, -1, self._number[parent]), whole.stem_count[self.branches],
+                                    np.where(attach < 0, -1, number_of_vertex[attach]), vertex_source,
+                                    np.argsort(np.argsort(whole.branch_source[self.branches])))
+
+    def _ath(self, whole: Ath) -> Ath:
+        chosen = np.flatnonzero(np.isin(whole.node_branch, self.branches))
+        parent = whole.node_parent[chosen]
+        return Ath(self.source.hierarchy, whole.thresholds, whole.rest[self.vertices],
+                   self._number[whole.node_branch[chosen]].astype(np.int32),
+                   np.where(parent < 0, -1, np.searchsorted(chosen, parent)).astype(np.int32),
+                   whole.node_depth[chosen], whole.whole[chosen])
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many times as much the plant has as its part: vertices, and for each level, (levels,), rows of its stream and
+    nodes that have maps."""
+
+    vertices: float
+    rows: np.ndarray
+    nodes: np.ndarray
+
+    @classmethod
+    def everything(cls, levels: int) -> Share:
+        """Of a plant that is no part."""
+        return cls(1.0, np.ones(levels), np.ones(levels))
+
+    @classmethod
+    def of(cls, whole: np.ndarray, part: np.ndarray) -> Share:
+        """Of branches, (B,) of _native.BRANCH."""
+        plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, part)]
+        rows, nodes = (np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
+                       for counts in zip(*map(_counts, plans)))
+        return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes)
+
+
+def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of stems, and nodes with maps, per level."""
+    pieces, levels = plan.pieces, plan.level_count
+    low = np.bincount(plan.base_level, pieces["low_modes"], levels)
+    high = np.bincount(pieces["level"], pieces["count"] - pieces["low_modes"], levels)
+    return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
+
+
+def part_of(source: Source, ath: Ath) -> Part | None:
+    """A part that looks like all of a large plant, with a branch of every level; None where there is no need for one.
+
+    The longer the clip, the larger the part: what is spent on it remains the same share of the work.
+    """
+    count = source.clip.vertex_count
+    if count <= LARGE:
+        return None
+    wanted = min(max(count * source.clip.frame_count // SHORTER, LEAST_PART), LARGE)
+    branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
+    part = Part(source, ath, branches)
+    return part if len(part.vertices) < count // 2 else None
+
+
+def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
+    """Branches with about so many vertices, `deepest` among them."""
+    vertices = np.append(hierarchy.first_vertex, hierarchy.vertex_count).tolist()
+    after = (np.arange(hierarchy.branch_count) + hierarchy.subtree_branches).tolist()
+    kept = np.zeros(hierarchy.branch_count, bool)
+    kept[deepest] = True
+    branch, due, share = 0, 0.0, wanted / hierarchy.vertex_count
+    while branch < len(after):
+        size = vertices[after[branch]] - vertices[branch]
+        if size > wanted // SUBTREES and after[branch] > branch + 1:
+            branch += 1
+            continue
+        due += share * size
+        if 2 * due >= size:
+            kept[branch: after[branch]] = True
+            due -= size
+        branch = after[branch]
+    for branch, parent in reversed(list(enumerate(hierarchy.branch_parent.tolist()))):
+        if kept[branch] and parent >= 0:
+            kept[parent] = True
+    return np.flatnonzero(kept)
