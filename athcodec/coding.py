@@ -271,6 +271,7 @@ class Coded:
     corrections: np.ndarray
     decoded: np.ndarray  # (N, 3, T)
     correction_step: float
+    heads: dict[int, int]  # bytes of each stream that are the same for few pieces and for many: its time basis
 
     @property
     def bytes(self) -> int:
@@ -300,15 +301,16 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
     plan = shape.plan
     segment, bases = analyse(shape, settings, positions, shapes)
 
-    def stream(level: int) -> bytes:
+    def streams(level: int) -> tuple[bytes, int]:
         head = ct.StemsHead(settings.step_of(level), settings.omega[level])
         if level in bases:
             head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
             head.basis = entropy.encode_temporal(bases[level], head.bits)
-        return ct.pack_stems(head, entropy.encode_stems(segment, level))
+        return ct.pack_stems(head, entropy.encode_stems(segment, level)), len(head.basis)
 
     levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
-    stems = dict(zip(levels, plan.crew.each(stream, [(level,) for level in levels])))
+    coded = plan.crew.each(streams, [(level,) for level in levels])
+    stems, heads = ({level: each[i] for level, each in zip(levels, coded)} for i in range(2))
     decoded = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
     factor = 1.0
     while True:
@@ -316,7 +318,7 @@ def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: 
         corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step,
                                                 plan.crew)
         if corrections is not None:
-            return Coded(segment, stems, corrections, decoded, step)
+            return Coded(segment, stems, corrections, decoded, step, heads)
         factor *= 0.5
         if factor < 1e-3:
             raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "

@@ -146,7 +146,6 @@ class Decoder:
             self._player = player.File(self.container.prelude(), player.Limits.of(self.limits))
         except player.PlayError as error:
             raise self._refusal(error, "header") from None
-        self._player.build()
 
     def _read_clips(self) -> tuple[Clip, ...]:
         """All that the file holds, in its order."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from athcodec import quantize as qz
 from athcodec.ath import Ath
 from athcodec.clip import MotionClip
 from athcodec.coding import Source
@@ -16,8 +17,8 @@ from athcodec.sources.frames import Frames
 from athcodec.transform import Plan
 
 LARGE = 1 << 16  # vertices: a smaller plant is looked at as a whole
-LEAST_PART = 1 << 14  # vertices of a part
-SHORTER = 3000  # frames of a clip over those in which a part has as many vertices as it: work in proportion
+LEAST_PART = 1 << 15  # vertices of a part
+SEGMENT_PART = 1 / 64  # of the plant that a part may have more for each segment: work in proportion
 SUBTREES = 8  # of a part, at least
 
 
@@ -66,16 +67,17 @@ class Part:
 @dataclass(frozen=True)
 class Share:
     """How many times as much the plant has as its part: vertices, and for each level, (levels,), rows of its stream and
-    nodes that have maps."""
+    nodes that have maps. And how coarse a rest pose may be tried, over the bound."""
 
     vertices: float
     rows: np.ndarray
     nodes: np.ndarray
+    rest_cap: float
 
     @classmethod
     def everything(cls, levels: int) -> Share:
         """Of a plant that is no part."""
-        return cls(1.0, np.ones(levels), np.ones(levels))
+        return cls(1.0, np.ones(levels), np.ones(levels), qz.REST_CAP)
 
     @classmethod
     def of(cls, whole: np.ndarray, part: np.ndarray) -> Share:
@@ -83,7 +85,7 @@ class Share:
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, part)]
         rows, nodes = (np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
                        for counts in zip(*map(_counts, plans)))
-        return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes)
+        return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes, qz.SAFE_REST_CAP)
 
 
 def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +104,7 @@ def part_of(source: Source, ath: Ath) -> Part | None:
     count = source.clip.vertex_count
     if count <= LARGE:
         return None
-    wanted = min(max(count * source.clip.frame_count // SHORTER, LEAST_PART), LARGE)
+    wanted = min(max(int(count * len(source.segments) * SEGMENT_PART), LEAST_PART), LARGE)
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
     part = Part(source, ath, branches)
     return part if len(part.vertices) < count // 2 else None

@@ -8,6 +8,7 @@ Vertices are in file order unless said otherwise; positions are in scene units.
 from __future__ import annotations
 
 import ctypes
+import threading
 from ctypes import (
     POINTER,
     Structure,
@@ -126,7 +127,7 @@ class File:
             raise PlayError(result, self._chunk(lib.ath_fault(self._file)))
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
-        self._build = None
+        self._build, self._building = None, threading.Lock()
 
     @staticmethod
     def _check(result: int) -> int:
@@ -135,9 +136,12 @@ class File:
         return result
 
     def build(self) -> None:
-        """Computes the bases that all segments share."""
-        self._build = aligned(lib.ath_build_size(self._file))
-        self._check(lib.ath_build(self._file, self._build.ctypes.data, len(self._build)))
+        """Computes the bases that all segments share, unless that is done."""
+        with self._building:
+            if self._build is None:
+                memory = aligned(lib.ath_build_size(self._file))
+                self._check(lib.ath_build(self._file, memory.ctypes.data, len(memory)))
+                self._build = memory
 
     def _array(self, address: int, dtype, count: int) -> np.ndarray:
         dtype = np.dtype(dtype)
@@ -209,6 +213,7 @@ class File:
 
     def prepare(self, work: Work, segment: int, level: int, into: Segment) -> None:
         """Decodes a segment at a level."""
+        self.build()
         result = lib.ath_prepare(work.memory.ctypes.data, len(work.memory), self._file, segment, level, into.pointer,
                                  len(into.memory))
         if result != OK:

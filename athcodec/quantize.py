@@ -23,6 +23,7 @@ TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis ma
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
 LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
 REST_CAP = 1.6  # rest pose step over bound: there its own error reaches the bound
+SAFE_REST_CAP = 2 / 3**0.5  # where no vertex's can be beyond it
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 TEMPORAL_BITS = 14

@@ -155,15 +155,15 @@ class Search:
             coded = code_stems(shape, settings, self.sample, shapes)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
-        levels, shape_bytes = np.zeros(self.levels), 0.0
+        levels, heads, shape_bytes = np.zeros(self.levels), np.zeros(self.levels), 0.0
         for level, data in entropy.encode_shapes(shape.plan, shapes).items():
             shape_bytes += len(data) * self.share.rows[level]
         for level, data in coded.stems.items():
-            levels[level] = len(data)
+            levels[level], heads[level] = len(data), coded.heads[level]
         corrections = len(coded.correction_chunk)
         if corrections:
             levels += corrections * self._corrected(shape.plan, coded.corrections)
-        levels *= self.share.rows
+        levels += (levels - heads) * (self.share.rows - 1)
         return levels.sum() * self._scale + shape_bytes + self._prelude_bytes(shape), levels
 
     @property
@@ -281,7 +281,7 @@ class Search:
             before, settings = settings, self._walk(settings, "step", factor, math.inf)
             if self.source.exact_rest:
                 break
-            settings = self._walk(settings, "rest_step", rest_factor, qz.REST_CAP * settings.bound)
+            settings = self._walk(settings, "rest_step", rest_factor, self.share.rest_cap * settings.bound)
             if (settings.step, settings.rest_step) == (before.step, before.rest_step):
                 break
         return settings

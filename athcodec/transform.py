@@ -109,9 +109,18 @@ class Plan:
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         at = address(self.rest, np.float64, 3 * vertices)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
-        self.bases, work = np.empty(size), np.empty(2 * PIECE_VERTICES ** 2)
-        lib.ath_basis_fill(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, work.ctypes.data,
-                           self.bases.ctypes.data)
+        self.bases = np.empty(size)
+
+        def fill_modes(first: int, stop: int) -> None:
+            work = np.empty(2 * PIECE_VERTICES ** 2)
+            lib.ath_basis_modes(self.pieces.ctypes.data, first, stop, gaps.ctypes.data, work.ctypes.data,
+                                self.bases.ctypes.data)
+
+        def fill_sheets(first: int, stop: int) -> None:
+            lib.ath_basis_sheets(self.pieces.ctypes.data, first, stop, at, self.bases.ctypes.data)
+
+        for fill in fill_modes, fill_sheets:
+            self.crew.each(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
         self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
         lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
 

@@ -281,21 +281,31 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps, double *work,
+                     double *bases)
+{
+    int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
+    for (int32_t p = 0; p < stop; p++) {
+        const ath_piece *piece = pieces + p;
+        int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
+        if (p >= first && piece->modes >= laid_out)
+            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, bases + piece->modes, work);
+        last += (int64_t)piece->count * piece->count;
+        if (last > laid_out) laid_out = last;
+    }
+}
+
+void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
+{
+    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
+        if (piece->flags & ATH_SHEET) piece->rank = sheet(piece, rest, bases + piece->modes, bases + piece->basis);
+}
+
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases)
 {
-    int64_t filled = 0;
-    for (int32_t p = 0; p < piece_count; p++) {
-        ath_piece *piece = pieces + p;
-        if (piece->modes >= filled) {
-            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, bases + piece->modes, work);
-            filled = piece->modes + (int64_t)piece->count * piece->count;
-        }
-        if (piece->flags & ATH_SHEET) {
-            piece->rank = sheet(piece, rest, bases + piece->modes, bases + piece->basis);
-            filled = piece->basis + (int64_t)piece->count * piece->count;
-        }
-    }
+    ath_basis_modes(pieces, 0, piece_count, gaps, work, bases);
+    ath_basis_sheets(pieces, 0, piece_count, rest, bases);
 }
 
 /* cos(x) and sin(x) for 0 <= x <= pi/4 by their series. */

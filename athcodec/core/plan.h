@@ -63,8 +63,13 @@ ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count,
                                  int32_t *table);
 /* work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
-ATH_ENCODER_API void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps,
-                            double *work, double *bases);
+void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
+                    double *bases);
+/* The same by ranges of pieces, in two passes: the sheets of one need the modes of any. */
+ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps,
+                             double *work, double *bases);
+ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
+                              double *bases);
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
 void ath_rest_basis(int32_t n, double *basis, double *work);
 /* Eigenvalues, in descending order, and eigenvectors, a row each, of symmetric n x n matrices, which are destroyed;
