@@ -287,9 +287,9 @@ def _view(args: argparse.Namespace) -> int:
     with _naming(args.file):
         if args.export:
             _check_output(args.export, args.file)
-            print(f"{args.export}: {view.export_page(args.file, args.export):,} bytes, opens in any browser")
+            print(f"{args.export}: {view.export_page(args.file, args.export, args.clip):,} bytes, opens in any browser")
             return 0
-        view.serve(args.file, args.port, lambda address: _say_where(address, args.no_browser))
+        view.serve(args.file, args.port, lambda address: _say_where(address, args.no_browser), args.clip)
     return 0
 
 
@@ -979,6 +979,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     verb.add_argument("--port", metavar="PORT", type=_argument(_whole), default=0,
                       help="of the address (default: a free one)")
+    verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     verb.add_argument("--export", metavar="PAGE.html",
                       help="write one page with the file and the viewer inside, and serve nothing")

@@ -32,15 +32,16 @@ _POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' da
            "img-src data: blob:; worker-src blob:; connect-src 'none'; base-uri 'none'; form-action 'none'")
 
 
-def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str]) -> int:
+def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip: str | None = None) -> int:
     """Writes one page that plays the file at `path` (or URL) without any other file or server; returns its bytes.
 
-    Raises AthError where `path` is no .ath file, OSError.
+    clip: the name of the one to begin with (default: the first). Raises AthError where `path` is no .ath file or has no
+    such clip, OSError.
     """
     data = _read(path)
-    with open_ath(io.BytesIO(data)):
+    with open_ath(io.BytesIO(data), clip=clip):
         pass
-    text = self_contained(data, file_name(path)).encode()
+    text = self_contained(data, file_name(path), clip).encode()
     with new_file(page) as out:
         out.write(text)
     return len(text)
@@ -55,14 +56,15 @@ def _read(path: str | os.PathLike[str]) -> bytes:
         return file.read()
 
 
-def self_contained(data: bytes, name: str) -> str:
+def self_contained(data: bytes, name: str, clip: str | None = None) -> str:
     """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
     text = PAGE.read_text("utf-8")
     modules = json.loads(_MAP.search(text)[1])["imports"]
     inside = json.dumps({"imports": {name: _data_url(WEB / file) for name, file in modules.items()}})
     main = _script((WEB / "viewer.js").read_text("utf-8"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
-    file = (f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}">'
+    first = "" if clip is None else f' data-clip="{html.escape(clip)}"'
+    file = (f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}"{first}>'
             f"{base64.b64encode(data).decode()}</script>")
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
@@ -91,10 +93,11 @@ def file_name(path: str | os.PathLike[str]) -> str:
     return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
 
 
-def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print) -> None:
+def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print,
+          clip: str | None = None) -> None:
     """Serves the viewer with the file at `path` (or URL) on 127.0.0.1 until it is interrupted; `ready` is called with
-    the page's address. Port 0: a free one. Raises MissingExtra, AthError, OSError."""
-    _check(path)
+    the page's address. Port 0: a free one. clip: as in export_page. Raises MissingExtra, AthError, OSError."""
+    _check(path, clip)
     import asyncio
 
     from aiohttp import web
@@ -107,7 +110,7 @@ def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], No
             site = web.TCPSite(runner, "127.0.0.1", port)
             await site.start()
             address = f"http://127.0.0.1:{site._server.sockets[0].getsockname()[1]}"
-            ready(f"{address}/?file={quote(place)}")
+            ready(f"{address}/?file={quote(place)}" + ("" if clip is None else f"&clip={quote(clip, safe='')}"))
             await asyncio.Event().wait()
         finally:
             await runner.cleanup()
@@ -115,13 +118,13 @@ def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], No
     asyncio.run(run())
 
 
-def _check(path: str | os.PathLike[str]) -> None:
+def _check(path: str | os.PathLike[str], clip: str | None) -> None:
     try:
         import aiohttp  # noqa: F401
     except ImportError:
         raise MissingExtra(f"athcodec view: needs aiohttp: {INSTALL}; --export PAGE works without") from None
     _refuse_other_urls(path)
-    with open_ath(path):
+    with open_ath(path, clip=clip):
         pass
 
 

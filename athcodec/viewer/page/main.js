@@ -12,15 +12,17 @@ import { $, bytesText, Choice, countText, lengthText, paintReady, rateText, rows
 
 const SPEEDS = ["0.1", "0.25", "0.5", "1", "2", "4"];
 const GOLDEN = Math.PI * (3 - Math.sqrt(5));
+const FADE = 0.4; // seconds, from one clip to the next
 
 const loader = new ATHLoader();
-const state = { playing: true, speed: 1, loop: true, time: 0, forest: null, dirty: true, name: "" };
+// `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as the clip is marked, or what was chosen.
+const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, forest: null, dirty: true, name: "" };
 const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null };
 let plants = [], opened = [], last = 0;
 
 const words = { NOT_AN_ATH_FILE: "This is not an .ath file", UNSUPPORTED_VERSION: "This file is of another version of the format",
   HTTP: "The file cannot be fetched", NETWORK: "The file cannot be fetched", MISSING: "The file is cut off too early", TRUNCATED: "The file is cut off too early",
-  CHANGED: "The file has changed", WORKER: "The decoder cannot be started" };
+  CLIP: "The file has no such clip", CHANGED: "The file has changed", WORKER: "The decoder cannot be started" };
 
 begin(); // the file is on its way while the stage is set up, which takes longer
 loader.preload();
@@ -39,15 +41,23 @@ function embedded() {
   if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
   if (!file) return false;
   const bytes = Uint8Array.from(atob(file.textContent.trim()), (character) => character.charCodeAt(0));
-  open({ bytes: bytes.buffer }, file.dataset.name);
+  openFirst({ bytes: bytes.buffer }, file.dataset.name, file.dataset.clip);
   return true;
+}
+
+// With one of its clips.
+function openFirst(source, name, clip = null) {
+  loader.setClip(clip);
+  const done = open(source, name);
+  loader.setClip(null);
+  return done;
 }
 
 function begin() {
   if (embedded()) return;
   const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
   const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
-  if (url) open(url, nameOf(url)).then(() => second && opened.length && open(second, nameOf(second), true));
+  if (url) openFirst(url, nameOf(url), wanted.get("clip")).then(() => second && opened.length && open(second, nameOf(second), true));
   else refuse({ message: "Drop an .ath file here, or open one. It stays on this computer.", codeName: "none" });
   if (!url) $("message").querySelector("h2").textContent = "No file yet";
 }
@@ -86,9 +96,10 @@ async function open(source, name, beside = false) {
   if (!beside) {
     for (const each of opened) each.dispose();
     opened = [];
-    state.time = 0;
+    Object.assign(state, { time: 0, turns: 0, loop: null });
   } else {
     for (const each of opened.splice(1)) each.dispose();
+    playIn(ath.motion, opened[0].motion.clip.name);
   }
   opened.push(ath);
   const tell = ({ type, message }) => note(type === "damaged" ? `Shown without what is damaged: ${message}` : message);
@@ -109,10 +120,10 @@ async function open(source, name, beside = false) {
 const breath = () => new Promise((done) => { setTimeout(done); });
 
 function describe() {
-  const [ath] = opened, { info } = ath.motion;
+  const [ath] = opened, { info, clips } = ath.motion, frames = `${countText(info.frameCount)} frames`;
   $("name").textContent = opened.map((each) => each.fileName).join("  ·  ");
   document.title = `${ath.fileName} – athcodec`;
-  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${countText(info.frameCount)} frames`;
+  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${clips.length > 1 ? `${clips.length} clips of ${frames}` : frames}`;
 }
 
 // ---- what is on the stage ----
@@ -142,6 +153,8 @@ function arrange(first = null) {
   place();
   depthControls();
   setDepth(depth.value ?? "auto");
+  clipControls();
+  setLoop(state.loop);
   describe();
   $("compare-depth-row").hidden = compare.value !== "depths";
   labels();
@@ -277,12 +290,13 @@ function forestRadius() {
 
 function instances(count) {
   const { ath } = plants[0], { rest } = ath, up = ath.metadata.up_axis === "z" ? 2 : 1, spread = forestRadius();
-  const duration = ath.motion.duration || 1, foot = [rest[0], rest[1], rest[2]];
+  const duration = ath.motion.duration || 1, foot = [rest[0], rest[1], rest[2]], { clips } = ath.motion;
+  const clipOf = (i) => ($("forest-mix").checked ? i % clips.length : undefined);
   return Array.from({ length: count }, (_, i) => {
     const far = spread * Math.sqrt((i + 0.3) / count), angle = i * GOLDEN + 0.5 * Math.sin(i * 12.9898);
     const size = 0.75 + 0.5 * (Math.sin(i * 78.233) * 0.5 + 0.5), x = far * Math.cos(angle), y = far * Math.sin(angle);
     const at = up === 2 ? { x, y, z: foot[2] * (1 - size) } : { x, y: foot[1] * (1 - size), z: y };
-    return { ...at, size, angle: i * 2.4, seconds: (i * 0.7548776662 % 1) * duration };
+    return { ...at, size, clip: clipOf(i), angle: i * 2.4, seconds: (i * 0.7548776662 % 1) * duration };
   });
 }
 
@@ -313,10 +327,10 @@ function forestOn() {
   forest.levelOfDetail = $("forest-lod").checked;
   forest.addEventListener("depth", () => { state.dirty = true; });
   plant.root.add(forest);
+  setLoop(state.loop);
   plantForest();
   for (const child of plant.root.children) if (child !== forest) child.visible = false;
   plant.motion.setDepth(plant.motion.depthCount - 1); // near instances show all of it
-  bakeWhatIsReady();
 }
 
 function plantForest() {
@@ -325,17 +339,13 @@ function plantForest() {
   state.dirty = true;
 }
 
-function bakeWhatIsReady() {
-  if (!state.forest) return;
-  for (let level = 0; level <= plants[0].motion.readyDepth; level++) state.forest.bake(level);
-}
-
 function forestOff() {
   state.forest.removeFromParent();
   state.forest.dispose();
   state.forest = null;
   plants[0].setShow(show.value);
   setDepth(depth.value);
+  setLoop(state.loop);
   place();
 }
 
@@ -356,6 +366,7 @@ function forestSwitch(on) {
 $("forest").addEventListener("change", () => forestSwitch($("forest").checked));
 for (const id of ["forest-count", "forest-spread"]) $(id).addEventListener("input", () => { delete state.forestCount; forestNumbers(); plantForest(); });
 $("forest-count").addEventListener("change", frameView);
+$("forest-mix").addEventListener("change", plantForest);
 $("forest-lod").addEventListener("change", () => { state.forest.levelOfDetail = $("forest-lod").checked; state.dirty = true; });
 
 function forestNumbers() {
@@ -381,11 +392,44 @@ function forestBars() {
   });
 }
 
+// ---- clips ----
+
+function clipControls() {
+  const { clips, clip } = opened[0].motion;
+  $("clip").replaceChildren(...clips.map(({ index, name, loop }) => new Option(loop ? `${name} ↻` : name, index)));
+  $("clip").value = clip.index;
+  $("clip").hidden = $("forest-mix-row").hidden = clips.length < 2;
+}
+
+// A second file may have no clip of that name.
+function playIn(motion, name) {
+  if (motion.clips.some((clip) => clip.name === name)) motion.play(name, { fade: state.playing && !state.forest ? FADE : 0 });
+}
+
+function playClip(index) {
+  const ended = state.time >= limit(), [{ motion }] = plants;
+  for (const plant of plants) playIn(plant.motion, motion.clips[index].name);
+  $("clip").value = index;
+  Object.assign(state, { time: 0, turns: 0 });
+  setLoop(null);
+  if (ended) setPlaying(true);
+  if (state.forest) plantForest();
+  state.dirty = true;
+}
+
+function nextClip(by) {
+  const { clips, clip } = plants[0].motion;
+  playClip((clip.index + by + clips.length) % clips.length);
+}
+
+$("clip").addEventListener("change", () => playClip(Number($("clip").value)));
+
 // ---- time ----
 
+const loops = () => plants.some(({ motion }) => motion.loops);
+
 function setPlaying(playing) {
-  const { motion } = plants[0] ?? {};
-  if (playing && motion && !state.loop && state.time >= motion.duration) state.time = 0;
+  if (playing && !loops() && state.time >= limit()) state.time = 0;
   state.playing = playing;
   document.body.classList.toggle("paused", !playing);
   $("play").setAttribute("aria-label", playing ? "Pause" : "Play");
@@ -399,34 +443,38 @@ function seek(seconds) {
 
 // Where the clip ends: a loop has the way back to its first frame too.
 function limit() {
-  return Math.max(...plants.map(({ motion }) => (state.loop ? motion.duration : motion.info.duration)), 0);
+  return Math.max(...plants.map(({ motion }) => motion.duration), 0);
 }
 
 function step(frames) {
   setPlaying(false);
-  const { info } = plants[0].motion, rate = info.duration > 0 ? (info.frameCount - 1) / info.duration : 1;
-  seek(Math.min((Math.round(state.time * rate) + frames) / rate, info.duration));
+  const { duration, frameCount } = plants[0].motion.clip, rate = duration > 0 ? (frameCount - 1) / duration : 1;
+  seek(Math.min((Math.round(state.time * rate) + frames) / rate, duration));
 }
 
 function advance(seconds) {
   state.time += seconds * state.speed;
-  if (state.time < limit()) return;
-  if (state.loop && limit() > 0) {
+  const beyond = state.time - limit();
+  if (beyond < 0) return;
+  if (loops() && limit() > 0) {
     state.time %= limit();
+    state.turns += beyond + limit() - state.time;
   } else {
     state.time = limit();
     setPlaying(false);
   }
 }
 
+// null: as the clips are marked. A forest always loops.
 function setLoop(loop) {
   state.loop = loop;
-  $("loop").setAttribute("aria-pressed", String(loop));
-  for (const { motion } of plants) motion.wrap = loop ? "loop" : "clamp";
+  for (const { motion } of plants) motion.wrap = state.forest || loop ? "loop" : loop === null ? "marked" : "clamp";
+  $("loop").setAttribute("aria-pressed", String(loops()));
+  $("loop").disabled = Boolean(state.forest);
 }
 
 $("play").addEventListener("click", () => setPlaying(!state.playing));
-$("loop").addEventListener("click", () => setLoop(!state.loop));
+$("loop").addEventListener("click", () => setLoop(!loops()));
 $("speed").addEventListener("change", () => { state.speed = Number($("speed").value); });
 $("time").addEventListener("input", () => seek(Number($("time").value)));
 
@@ -439,14 +487,13 @@ function tick(now) {
   if (plants.length === 0) return;
   stage.controls.update();
   if (state.playing) advance(passed);
-  for (const plant of plants) {
-    plant.motion.wrap = state.loop ? "loop" : "clamp";
-    if (!state.forest) plant.motion.update(stage.camera, stage.pixels, plant.root).setTime(state.time);
-    else plant.motion.setTime(0);
+  for (const { motion, root } of plants) {
+    if (!state.forest) motion.update(stage.camera, stage.pixels, root).setTime(motion.start + state.time);
+    else motion.setTime(motion.start);
   }
   if (state.forest) {
-    bakeWhatIsReady();
-    if (state.playing || state.dirty) state.forest.update(stage.camera, stage.pixels, state.time);
+    state.forest.bakeReady();
+    if (state.playing || state.dirty) state.forest.update(stage.camera, stage.pixels, state.turns + state.time);
   }
   if (state.dirty || (state.playing && state.forest)) draw();
   count(now);
@@ -479,6 +526,7 @@ function tell() {
     ["This view", `${rateText(motion.bitRate(shown))}`],
     ["Depth", `${shown} of ${motion.depthCount - 1}`],
     ["Within", lengthText(error, unit)],
+    ...(motion.clip.loop ? [["Loop seam", lengthText(motion.seamError(shown), unit)]] : []),
     ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
     ["Frames", `${counters.fps.toFixed(0)} per second`],
     ["Vertices", countText(state.forest ? state.forest.vertices : plants.reduce((sum, plant) => sum + plant.vertices, 0))],
@@ -492,7 +540,7 @@ function tell() {
   $("time").max = limit();
   if (document.activeElement !== $("time") || state.playing) $("time").value = state.time;
   $("clock").value = `${state.time.toFixed(2)} s`;
-  paintReady($("ready"), [...ath.channel.state.ready], motion.depthCount);
+  paintReady($("ready"), [...motion.readyDepths], motion.depthCount);
   labels();
   if (state.forest) forestBars();
 }
@@ -561,8 +609,8 @@ function changeDepth(by) {
 
 const KEYS = {
   " ": () => setPlaying(!state.playing), ArrowLeft: (event) => step(event.shiftKey ? -10 : -1), ArrowRight: (event) => step(event.shiftKey ? 10 : 1),
-  Home: () => seek(0), End: () => { setPlaying(false); seek(plants[0].motion.info.duration); },
-  ",": () => changeSpeed(-1), ".": () => changeSpeed(1), l: () => setLoop(!state.loop),
+  Home: () => seek(0), End: () => { setPlaying(false); seek(plants[0].motion.clip.duration); },
+  ",": () => changeSpeed(-1), ".": () => changeSpeed(1), l: () => $("loop").click(), n: (event) => nextClip(event.shiftKey ? -1 : 1),
   "-": () => changeDepth(-1), "+": () => changeDepth(1), "=": () => changeDepth(1), a: () => setDepth("auto"),
   c: () => colour.next(), s: () => show.next(), d: () => compare.pick(compare.value === "off" ? "depths" : "off"),
   f: () => forestSwitch(!state.forest), r: () => { stage.moved = false; frameView(); }, p: picture, h: togglePanel, "?": () => $("keys").showModal(),
@@ -582,16 +630,19 @@ requestAnimationFrame(tick);
 
 /** For scripts and tests. */
 globalThis.athcodecViewer = {
-  counters, state, stage, open, seek, setPlaying, setDepth, forestSwitch, frameView,
+  counters, state, stage, open, seek, setPlaying, setDepth, playClip, forestSwitch, frameView,
   get plants() { return plants; },
   get motion() { return plants.at(-1)?.motion; },
   async shown(seconds, level) {
     setPlaying(false);
     const { motion } = plants.at(-1);
-    await motion.show(seconds, level);
+    await motion.show(motion.start + seconds, level);
     return { depth: motion.depth, frame: motion.frame };
   },
-  decoded: async (seconds, level) => [...await plants.at(-1).motion.positions(seconds, level)],
+  decoded: async (seconds, level) => {
+    const { motion } = plants.at(-1);
+    return [...await motion.positions(motion.start + seconds, level)];
+  },
   uploaded: () => [...plants.at(-1).motion.uploaded()],
   onGraphics(what = "positions") {
     const { ath, motion } = plants.at(-1), normals = what === "normals" ? ath.geometry.getAttribute("normal").array : null;

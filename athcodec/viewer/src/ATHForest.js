@@ -1,10 +1,11 @@
-// Many instances of one plant, each with a place, size, turn and time of its own, drawn at the depth that its distance
-// asks for: a few draw calls per frame. The motion of a depth lies in one texture for all instances of it.
+// Many instances of one plant, each with a place, size, turn, clip and time of its own, drawn at the depth that its
+// distance asks for: a few draw calls per frame and clip. The motion of a clip at a depth lies in one texture for all
+// instances of it.
 
 import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBufferGeometry, LineBasicMaterial, LineSegments,
   Matrix4, Mesh, MeshStandardMaterial, Sphere, Vector3, BufferAttribute, DoubleSide } from "three";
 
-import { dataTexture } from "./ATHMotion.js";
+import { dataTexture, roundOf } from "./ATHMotion.js";
 import { clustered, gather } from "./geometry.js";
 import { injectMotion, motionUniforms } from "./shader.js";
 
@@ -13,6 +14,7 @@ const TALLEST = 4096;        // rows of a texture that every device has
 const CELL = 1.5;            // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;           // from one geometry to the next
 const FEWER = 0.85;          // of the vertices before, for a geometry to be worth it
+const MOTIONS = -1;          // in place of a clip's number: the one that the motion plays
 
 const plainMaterial = (lines) => (lines ? new LineBasicMaterial({ color: 0x6b5b45 })
   : new MeshStandardMaterial({ color: 0x8a9a6b, roughness: 0.8, side: DoubleSide }));
@@ -24,13 +26,15 @@ export class ATHForest extends Group {
   counts = [];     // instances drawn, by depth
   vertices = 0;    // drawn, all instances
   culled = 0;
-  baked = [];      // depths that can be drawn
 
   #ath;
-  #bins = [];      // {level, tolerance, drawn, place, turn, size, uniforms, filled}, the finest first
+  #bins = new Map();    // of every clip: {level, tolerance, drawn, place, turn, size, uniforms, filled, rows, perRow}, the finest first
+  #shown = [];          // those that the motion's clip was drawn with last
   #baking = new Set();
+  #baked = new Map();   // of every clip: depths
+  #motions = new Map(); // of clips that only instances play: what has them fetched
   #places = new Float32Array(0);
-  #turns = new Float32Array(0);
+  #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
   #material;
   #geometry;
 
@@ -48,42 +52,65 @@ export class ATHForest extends Group {
     return this.#places.length / 4;
   }
 
-  /** instances: {x, y, z, size, angle, seconds} in the units and axes of the file. */
+  /** Depths of the motion's clip that can be drawn. */
+  get baked() {
+    return this.#baked.get(this.#ath.motion.clip.index) ?? [];
+  }
+
+  /** instances: {x, y, z, size, angle, seconds, clip} in the units and axes of the file. */
   setInstances(instances) {
-    const upIsZ = this.#ath.metadata.up_axis === "z" ? 1 : 0;
+    const { motion } = this.#ath;
+    for (const { clip } of instances) if (clip !== undefined && !this.#motions.has(clip))
+      this.#motions.set(clip, motion.clone().play(clip).setDepth(motion.depthCount - 1));
+    const numberOf = (clip) => this.#motions.get(clip)?.clip.index ?? MOTIONS;
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
-    this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds }) => [Math.cos(angle), Math.sin(angle), seconds, upIsZ]));
-    for (const bin of this.#bins) this.#makeRoom(bin);
+    this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) => [Math.cos(angle), Math.sin(angle), seconds, numberOf(clip)]));
+    for (const bin of this.#allBins()) this.#makeRoom(bin);
+  }
+
+  #allBins() {
+    return [...this.#bins.values()].flat();
+  }
+
+  /** Gets all depths ready to be drawn that are here, of all clips that instances play: once per frame. */
+  bakeReady() {
+    for (const motion of [this.#ath.motion, ...this.#motions.values()])
+      for (let level = 0; level <= motion.readyDepth; level++) this.#bake(level, motion.clip);
   }
 
   /** Gets a depth ready to be drawn; all bytes of it have to be here. */
-  async bake(level) {
-    if (this.#baking.has(level)) return;
-    this.#baking.add(level);
-    const { motion, channel } = this.#ath, known = await channel.parts(level), { frameCount } = motion.info;
-    const step = Math.max(1, Math.ceil(frameCount * known.texels / Math.min(MOST_TEXELS, 1024 * TALLEST)));
-    const baked = await channel.bake(level, step);
+  bake(level) {
+    return this.#bake(level, this.#ath.motion.clip);
+  }
+
+  async #bake(level, clip) {
+    const key = `${clip.index}/${level}`;
+    if (this.#baking.has(key)) return;
+    this.#baking.add(key);
+    const { channel, metadata } = this.#ath, known = await channel.parts(level);
+    const step = Math.max(1, Math.ceil(clip.frameCount * known.texels / Math.min(MOST_TEXELS, 1024 * TALLEST)));
+    const baked = await channel.bake(clip.index, level, step);
     if (!baked.data || !this.#ath) {
-      this.#baking.delete(level);
+      this.#baking.delete(key);
       return;
     }
     const uniforms = motionUniforms(), { nodeCount, exactCount } = known.parts;
     uniforms.athData.value = dataTexture(baked.data);
-    uniforms.athClip.value.set(baked.texels, baked.rows, motion.duration / baked.rows, 0);
+    uniforms.athForest.value.set(baked.texels, metadata.up_axis === "z" ? 1 : 0);
     uniforms.athStride.value = exactCount > 0 ? (known.texels - 3 * nodeCount) / exactCount : 1;
-    await this.#draw(level, known, uniforms);
-    this.baked.push(level);
+    await this.#draw(level, clip, known, { uniforms, rows: baked.rows, perRow: roundOf(clip) / baked.rows || 1 });
+    this.#baked.set(clip.index, [...this.#baked.get(clip.index) ?? [], level]);
     this.dispatchEvent({ type: "depth", level });
   }
 
   // Geometries of a depth: the finest for where its error is a pixel, coarser ones up to where the depth before takes over.
-  async #draw(level, known, uniforms) {
+  async #draw(level, clip, known, played) {
     const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.depthCount - 1;
-    const least = motion.error(level).max, most = level > 0 ? motion.error(level - 1).max : sphere.radius / 4;
+    const least = clip.errors[level].max, most = level > 0 ? clip.errors[level - 1].max : sphere.radius / 4;
     const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
     node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
-    const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), uniforms, true);
-    const place = (geometry, tolerance) => this.#addBin(level, geometry, tolerance, texel, uniforms, material);
+    const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), played.uniforms, true);
+    const place = (geometry, tolerance) => this.#addBin(clip, geometry, texel, material, { ...played, level, tolerance });
     let before = deepest ? this.#geometry : clustered(this.#geometry, rest, CELL * least, node);
     place(before, least);
     for (let tolerance = Math.max(COARSER * least, sphere.radius / 2000); tolerance < most; tolerance *= COARSER) {
@@ -96,20 +123,19 @@ export class ATHForest extends Group {
     }
   }
 
-  #addBin(level, base, tolerance, texel, uniforms, material) {
+  #addBin(clip, base, texel, material, played) {
     const geometry = new InstancedBufferGeometry(), { source } = base.userData, lines = !base.hasAttribute("normal");
     geometry.setIndex(base.index);
     for (const [name, attribute] of Object.entries(base.attributes))
       if (name !== "athPart") geometry.setAttribute(name, attribute);
     geometry.setAttribute("athPart", new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    drawn.userData.depth = level;
+    drawn.userData.depth = played.level;
     drawn.frustumCulled = false; // instances are, one by one
-    const bin = { level, tolerance, drawn, uniforms, size: source.length, filled: 0 };
+    const bin = { ...played, drawn, size: source.length, filled: 0 };
     this.#makeRoom(bin);
     this.add(drawn);
-    this.#bins.push(bin);
-    this.#bins.sort((a, b) => a.tolerance - b.tolerance);
+    this.#bins.set(clip.index, [...this.#bins.get(clip.index) ?? [], bin].sort((a, b) => a.tolerance - b.tolerance));
   }
 
   // A geometry keeps the number of instances that it was first drawn with: another number takes another one.
@@ -128,7 +154,7 @@ export class ATHForest extends Group {
 
   /** Chooses what to draw: once per frame. height: of the screen, in pixels. */
   update(camera, height, seconds) {
-    const bins = this.#bins, sphere = new Sphere(), view = new Frustum(), place = sphere.center, reach = this.#reach();
+    const bins = this.#allBins(), sphere = new Sphere(), view = new Frustum(), place = sphere.center, reach = this.#reach();
     this.updateWorldMatrix(true, false);
     const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(new Matrix4().copy(this.matrixWorld).invert());
     view.setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
@@ -136,6 +162,7 @@ export class ATHForest extends Group {
     const pixel = 2 * Math.tan(camera.fov * Math.PI / 360) / height; // at distance 1
     this.culled = 0;
     for (const bin of bins) bin.filled = 0;
+    this.#shown = this.#bins.get(this.#ath.motion.clip.index) ?? this.#shown;
     for (let i = 0; i < this.#places.length && bins.length > 0; i += 4) {
       const size = this.#places[i + 3];
       place.fromArray(this.#places, i);
@@ -145,16 +172,23 @@ export class ATHForest extends Group {
         continue;
       }
       const distance = Math.max(eye.distanceTo(place) - 0.5 * reach * size, 1e-6);
-      const bin = bins[this.levelOfDetail ? this.#choose(this.pixels * pixel * distance / size) : 0];
-      for (let k = 0; k < 4; k++) {
-        bin.place.array[4 * bin.filled + k] = this.#places[i + k];
-        bin.turn.array[4 * bin.filled + k] = this.#turns[i + k];
-      }
-      bin.filled++;
+      const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown;
+      if (own.length > 0) this.#put(i, own[this.levelOfDetail ? this.#choose(own, this.pixels * pixel * distance / size) : 0], seconds);
     }
     this.counts = new Array(this.#ath.motion.depthCount).fill(0);
     this.vertices = 0;
-    for (const bin of bins) this.#show(bin, seconds);
+    for (const bin of bins) this.#show(bin);
+  }
+
+  // An instance, whose numbers begin at `i`, into the next place of a bin.
+  #put(i, bin, seconds) {
+    const { place, turn, rows, perRow } = bin, at = 4 * bin.filled++;
+    const row = Math.fround(((seconds + this.#turns[i + 2]) / perRow) % rows), shown = row < 0 ? row + rows : row;
+    for (let k = 0; k < 4; k++) place.array[at + k] = this.#places[i + k];
+    turn.array[at] = this.#turns[i];
+    turn.array[at + 1] = this.#turns[i + 1];
+    turn.array[at + 2] = shown < rows ? shown : 0; // a fraction may have been rounded up
+    turn.array[at + 3] = (Math.floor(turn.array[at + 2]) + 1) % rows;
   }
 
   // How far from its place an instance of size 1 can be seen: the rest pose's sphere, whatever the turn, and room to move.
@@ -164,17 +198,16 @@ export class ATHForest extends Group {
   }
 
   // The coarsest that is good enough; the finest where none is.
-  #choose(tolerance) {
+  #choose(bins, tolerance) {
     let chosen = 0;
-    while (chosen + 1 < this.#bins.length && this.#bins[chosen + 1].tolerance <= tolerance) chosen++;
+    while (chosen + 1 < bins.length && bins[chosen + 1].tolerance <= tolerance) chosen++;
     return chosen;
   }
 
-  #show(bin, seconds) {
-    const { filled, drawn, uniforms } = bin;
+  #show(bin) {
+    const { filled, drawn } = bin;
     drawn.geometry.instanceCount = filled;
     drawn.visible = filled > 0;
-    uniforms.athClip.value.w = seconds;
     this.counts[bin.level] += filled;
     this.vertices += filled * bin.size;
     for (const attribute of [bin.place, bin.turn]) {
@@ -185,12 +218,13 @@ export class ATHForest extends Group {
   }
 
   dispose() {
-    for (const { uniforms, drawn } of this.#bins) {
+    for (const motion of this.#motions.values()) motion.dispose();
+    for (const { uniforms, drawn } of this.#allBins()) {
       uniforms.athData.value.dispose();
       drawn.geometry.dispose();
       drawn.material.dispose();
     }
-    this.#bins = [];
+    this.#bins.clear();
     this.#ath = null;
   }
 }

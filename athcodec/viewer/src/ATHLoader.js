@@ -75,9 +75,9 @@ class Channel {
     return this.#ask(`parts ${level}`, { type: "parts", level });
   }
 
-  bake(level, step) {
+  bake(clip, level, step) {
     const id = this.#nextBake++;
-    return this.#ask(`bake ${id}`, { type: "bake", id, level, step });
+    return this.#ask(`bake ${id}`, { type: "bake", id, clip, level, step });
   }
 
   #waiting = new Map();
@@ -117,8 +117,8 @@ class Channel {
     return out;
   }
 
-  view() {
-    return new ATHMotion(this, this.#nextView++);
+  view(clip = this.clips[this.first]) {
+    return new ATHMotion(this, this.#nextView++, clip);
   }
 
   dropView(id) {
@@ -253,6 +253,7 @@ export class ATHLoader extends Loader {
     this.workerPool = [];
     this.workerURL = null;
     this.mode = "matrices";
+    this.clip = null;
   }
 
   /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
@@ -270,6 +271,12 @@ export class ATHLoader extends Loader {
   /** "matrices", or "positions" for renderers other than WebGLRenderer: see ATHMotion.setMode. */
   setMode(mode) {
     this.mode = mode;
+    return this;
+  }
+
+  /** The name of the clip to begin with, of which alone more than the first bytes are fetched; null: the file's first. */
+  setClip(name) {
+    this.clip = name;
     return this;
   }
 
@@ -310,7 +317,7 @@ export class ATHLoader extends Loader {
     const worker = this.#worker();
     const channel = new Channel(worker, () => { worker.files--; });
     worker.files++;
-    channel.send({ type: "open", ...message }, transfer);
+    channel.send({ type: "open", clip: this.clip, ...message }, transfer);
     try {
       await channel.opened;
     } catch (error) {

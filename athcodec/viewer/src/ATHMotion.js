@@ -17,11 +17,18 @@ export function dataTexture(data) {
   return texture;
 }
 
-/** Events: "frame" (a new picture is shown), "depth" (another depth is), "progress" (bytes came), "ready" (what can
- * be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
+/** Seconds of a clip and of the way from its last frame back to the first. */
+export const roundOf = ({ duration, frameCount }) => (frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0);
+
+const SHAPES = 0x13; // chunks that serve all segments
+
+/** Events: "frame" (a new picture is shown), "depth" (another depth is), "clip" (another clip is), "progress" (bytes
+ * came), "ready" (what can be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
 export class ATHMotion extends EventDispatcher {
+  clip;               // that plays, one of `clips`
   time = 0;           // seconds, as asked for
-  wrap = "loop";      // "clamp", "pingpong"
+  start = 0;          // the time of the clip's first frame
+  wrap = "marked";    // "clamp", "loop", "pingpong"
   frame = 0;          // of the picture that is shown; -1: of none yet
   depth = -1;
   held = false;
@@ -44,13 +51,15 @@ export class ATHMotion extends EventDispatcher {
   #asked = null;          // what the worker was asked last, "" while it is at work
   #pending = false;
   #stale = false;
+  #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, fade, passed, begun}
   #answers = new Map();
   #next = 1;
 
-  constructor(channel, id) {
+  constructor(channel, id, clip) {
     super();
     this.#channel = channel;
     this.#id = id;
+    this.clip = clip;
     this.target = channel.info.levelCount - 1;
     channel.views.set(id, this);
   }
@@ -61,10 +70,24 @@ export class ATHMotion extends EventDispatcher {
     return this.#channel.info;
   }
 
-  /** Seconds of one round, the way from the last frame back to the first included. */
+  get clips() {
+    return this.#channel.clips;
+  }
+
+  /** Whether the clip's first frame follows its last. */
+  get loops() {
+    return this.wrap === "loop" || (this.wrap === "marked" && this.clip.loop);
+  }
+
+  /** Seconds until the clip repeats or, where it does not, ends. */
   get duration() {
-    const { duration, frameCount } = this.info;
-    return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
+    if (this.loops) return roundOf(this.clip);
+    return this.clip.duration * (this.wrap === "pingpong" ? 2 : 1);
+  }
+
+  /** Whether the clip before is still shown, alone or fading out. */
+  get switching() {
+    return this.#old !== null;
   }
 
   get depthCount() {
@@ -88,36 +111,50 @@ export class ATHMotion extends EventDispatcher {
     return this.#channel.state.requests;
   }
 
-  /** Bytes of the motion up to a depth, all segments. */
+  /** Bytes of the clip's motion up to a depth. */
   motionBytes(depth) {
-    return this.#channel.chunks.reduce((sum, chunk) => sum + (chunk.level <= depth ? chunk.length : 0), 0);
+    const { firstSegment, segmentCount } = this.clip;
+    const needed = ({ kind, segment }) => kind === SHAPES || (segment >= firstSegment && segment < firstSegment + segmentCount);
+    return this.#channel.chunks.reduce((sum, chunk) => sum + (chunk.level <= depth && needed(chunk) ? chunk.length : 0), 0);
   }
 
   /** Bits per second of motion at a depth. */
   bitRate(depth = Math.max(this.depth, 0)) {
-    return this.info.duration > 0 ? 8 * this.motionBytes(depth) / this.info.duration : 0;
+    return this.clip.duration > 0 ? 8 * this.motionBytes(depth) / this.clip.duration : 0;
   }
 
-  /** Largest and root-mean-square error of a depth: {max, rms}. */
+  /** Largest and root-mean-square error of a depth in the clip: {max, rms}. */
   error(depth) {
-    return this.#channel.errors[depth];
+    return this.clip.errors[depth];
   }
 
-  /** The parts of the time that can be shown at `depth`, in seconds: [{start, end}]. */
+  /** How far off the step from a loop's last frame to its first is at a depth, at most; 0 where the clip is none. */
+  seamError(depth) {
+    return this.clip.seams[depth];
+  }
+
+  /** The parts of the clip that can be shown at `depth`, in seconds from its first frame: [{start, end}]. */
   ready(depth) {
-    const { times, segments, state } = this.#channel, found = [], last = times.length - 1;
-    state.ready.forEach((level, segment) => {
+    const { times, segments } = this.#channel, { firstFrame, frameCount, firstSegment } = this.clip, found = [];
+    const last = firstFrame + frameCount - 1, at = (segment) => times[Math.min(segments[segment], last)] - times[firstFrame];
+    this.readyDepths.forEach((level, i) => {
       if (level < depth) return;
-      const start = times[segments[segment]] - times[0], end = times[Math.min(segments[segment + 1], last)] - times[0];
+      const start = at(firstSegment + i), end = at(firstSegment + i + 1);
       if (found.at(-1)?.end === start) found.at(-1).end = end;
       else found.push({ start, end });
     });
     return found;
   }
 
-  /** The deepest depth that every part of the time can be shown at; -1: none. */
+  /** The deepest depth that each segment of the clip can be shown at; -1: none. */
+  get readyDepths() {
+    const { firstSegment, segmentCount } = this.clip;
+    return this.#channel.state.ready.subarray(firstSegment, firstSegment + segmentCount);
+  }
+
+  /** The deepest depth that every part of the clip can be shown at; -1: none. */
   get readyDepth() {
-    return Math.min(...this.#channel.state.ready);
+    return Math.min(...this.readyDepths);
   }
 
   get complete() {
@@ -128,9 +165,32 @@ export class ATHMotion extends EventDispatcher {
 
   /** Shows the clip at `seconds`, as soon as the worker has it. */
   setTime(seconds) {
+    const passed = Math.max(0, seconds - this.time), old = this.#old;
     this.time = seconds;
+    if (old) {
+      old.seconds += passed;
+      if (old.begun) old.passed += passed;
+      this.#endFade();
+    }
     this.#ask();
     return this;
+  }
+
+  /** Plays another clip, its number or name. See index.d.ts. */
+  play(clip, { fade = 0, at = 0 } = {}) {
+    const next = this.clips.find(({ index, name }) => clip === index || clip === name);
+    if (!next) throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
+    const { clip: { index }, time, start, wrap } = this, old = this.#old;
+    const mostlyOld = old && (!old.begun || 2 * old.passed < old.fade);
+    if (this.depth >= 0)
+      this.#old = { ...(mostlyOld ? old : { clip: index, seconds: time - start, wrap }), fade, passed: 0, begun: false };
+    Object.assign(this, { clip: next, start: time - at });
+    this.#ask();
+    return this;
+  }
+
+  #endFade() {
+    if (this.#old.begun && this.#old.passed >= this.#old.fade) this.#old = null;
   }
 
   /** A depth from 0 on, or "auto": update() then chooses it by the error on the screen. */
@@ -174,26 +234,34 @@ export class ATHMotion extends EventDispatcher {
   /** The clip at `seconds` and `depth`, decoded there and then: resolves when it is shown. Rejects where bytes of it
    * are missing. */
   show(seconds, depth = this.target) {
-    return this.#exactly({ seconds, level: depth, heat: this.heat, positions: this.mode === "positions" });
+    return this.#exactly(seconds, { level: depth, heat: this.heat, positions: this.mode === "positions" });
   }
 
   /** All vertices at `seconds` and `depth` in source order, 3 numbers each, whatever is shown. */
   async positions(seconds, depth = this.target) {
-    const picture = await this.#exactly({ seconds, level: depth, positions: true, aside: true });
+    const picture = await this.#exactly(seconds, { level: depth, positions: true, aside: true });
     return picture.data;
   }
 
-  #exactly(message) {
+  #exactly(seconds, message) {
     const id = this.#next++;
     return new Promise((resolve, reject) => {
       this.#answers.set(id, { resolve, reject, aside: message.aside });
-      this.#channel.send({ type: "picture", view: this.#id, id, wrap: this.wrap, exactly: true, ...message });
+      this.#channel.send({ type: "picture", view: this.#id, id, exactly: true, ...this.#place(seconds), ...message });
     });
+  }
+
+  // Where a time is.
+  #place(seconds) {
+    return { clip: this.clip.index, seconds: seconds - this.start, wrap: this.wrap };
   }
 
   // One request at a time; the newest wishes go with the next.
   #ask() {
-    const wish = `${this.time} ${this.target} ${this.wrap} ${this.heat}`;
+    const { clip, seconds, wrap } = this.#place(this.time), old = this.#old;
+    const fading = old && { clip: old.clip, seconds: old.seconds, wrap: old.wrap, begun: old.begun,
+      share: old.fade > 0 ? 1 - old.passed / old.fade : 0 };
+    const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify(fading)}`;
     if (this.#pending) {
       this.#stale = wish !== this.#asked;
       return;
@@ -205,7 +273,7 @@ export class ATHMotion extends EventDispatcher {
     const buffer = this.#spare;
     this.#spare = null;
     this.#channel.send({
-      type: "picture", view: this.#id, id: 0, seconds: this.time, wrap: this.wrap, level: this.target, heat: this.heat,
+      type: "picture", view: this.#id, id: 0, clip, seconds, wrap, old: fading, level: this.target, heat: this.heat,
       positions: this.mode === "positions", buffer,
     }, buffer ? [buffer] : []);
   }
@@ -237,8 +305,9 @@ export class ATHMotion extends EventDispatcher {
     if (!this.#parts.has(depth)) this.#parts.set(depth, await this.#channel.parts(depth));
   }
 
-  #take({ shown, frame, data, heat, ms, held }) {
+  #take({ shown, frame, data, heat, ms, held, clip, exactly }) {
     const changed = shown !== this.depth;
+    if (this.#old && clip === this.clip.index) this.#begin(exactly);
     Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, depth: shown });
     if (this.mode === "positions") this.#write(data);
     else this.#upload(shown, data);
@@ -247,6 +316,15 @@ export class ATHMotion extends EventDispatcher {
       this.dispatchEvent({ type: "depth", depth: shown });
     }
     this.dispatchEvent({ type: "frame", frame, depth: shown });
+  }
+
+  // The clip that plays is seen for the first time.
+  #begin(atOnce) {
+    const { begun } = this.#old;
+    this.#old.begun = true;
+    if (atOnce) this.#old = null;
+    else this.#endFade();
+    if (!begun) this.dispatchEvent({ type: "clip", clip: this.clip });
   }
 
   #upload(depth, data) {
@@ -332,9 +410,9 @@ export class ATHMotion extends EventDispatcher {
     return this.#channel.nodeNumbers(this.#parts.get(depth));
   }
 
-  /** A second view of the same file, with a time and a depth of its own. */
+  /** A second view of the same file, with a clip, a time and a depth of its own. */
   clone() {
-    return this.#channel.view();
+    return this.#channel.view(this.clip);
   }
 
   dispose() {

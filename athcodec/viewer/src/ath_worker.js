@@ -7,10 +7,10 @@ import { HttpSource, MemorySource } from "./source.js";
 
 const sessions = new Map();
 
-function open({ file, url, options, bytes }) {
+function open({ file, url, options, bytes, clip }) {
   const post = (message, transfer = []) => self.postMessage({ ...message, file }, transfer);
   const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
-  const session = new Session(source, post);
+  const session = new Session(source, post, clip);
   sessions.set(file, session);
   ready.then(() => session.run(), (error) => post({ type: "failed", ...describe(error) }));
 }
@@ -19,7 +19,6 @@ self.onmessage = ({ data }) => {
   const session = sessions.get(data.file);
   if (data.type === "open") open(data);
   else if (data.type === "picture") session?.picture(data);
-  else if (data.type === "view") session?.view(data.view, data.level, data.frame);
   else if (data.type === "drop") session?.drop(data.view);
   else if (data.type === "parts") self.postMessage({ type: "parts", file: data.file, level: data.level,
     parts: session.parts(data.level), texels: session.texels(data.level) });

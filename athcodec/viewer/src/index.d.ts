@@ -11,8 +11,10 @@
  *       renderer.render(scene, camera);
  *     });
  *
- * Files are fetched by HTTP ranges, depth by depth and ahead of the time that is shown, as deep as is asked for; from a
- * server without ranges in one download, which plays while it grows. Workers decode (ath_worker.js, beside the module).
+ * A file holds one clip or several of one plant: `ath.motion.clips`, `ath.motion.play("storm", { fade: 0.5 })`.
+ *
+ * Files are fetched by HTTP ranges, depth by depth and ahead of the time that is shown, as deep as is asked for, and only
+ * the clips that play; from a server without ranges in one download, which plays while it grows. Workers decode (ath_worker.js, beside the module).
  * Depths, levels and errors are those of the file; positions are in its units, `metadata.unit`, and its axes,
  * `metadata.up_axis`; nothing is scaled or turned. Materials work with WebGLRenderer; for others see setMode().
  */
@@ -31,6 +33,9 @@ export class ATHLoader extends Loader<ATH> {
   /** How vertices move: "matrices" (default) in the vertex shader, by textures; "positions" in the worker, by position
    * attributes that every picture writes, for WebGPURenderer and materials without onBeforeCompile. */
   setMode(mode: "matrices" | "positions"): this;
+  /** The name of the clip to begin with (default, and null: the file's first). Loading fails where a file has none of
+   * that name. */
+  setClip(name: string | null): this;
   /** Starts a worker before there is a file for it. */
   preload(): this;
   /** onLoad: at the first picture. onProgress: {loaded, total} bytes, as long as bytes come. */
@@ -46,7 +51,7 @@ export class ATHLoader extends Loader<ATH> {
 
 /** What is wrong with a file or its way here. */
 export interface ATHFailure extends Error {
-  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER". */
+  /** Of FORMAT.md, "Errors", "MISSING" where the file ends too early, or "HTTP", "NETWORK", "CHANGED", "WORKER", "CLIP". */
   readonly codeName: string;
 }
 
@@ -88,11 +93,27 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   dispose(): void;
 }
 
+/** One of the motions of a plant that a file holds. */
+export interface ATHClip {
+  readonly index: number;
+  /** Empty where the only clip of a file has none. */
+  readonly name: string;
+  /** Seconds from the first frame to the last. */
+  readonly duration: number;
+  readonly frameCount: number;
+  /** The frames of a file are numbered over all its clips. */
+  readonly firstFrame: number;
+  /** Whether it is marked as a loop: its first frame follows its last. */
+  readonly loop: boolean;
+}
+
 export interface ATHMotionEvents {
   /** A new picture is in the textures. */
   frame: { frame: number; depth: number };
   /** Another depth is shown. */
   depth: { depth: number };
+  /** A clip that play() asked for is shown for the first time, or begins to fade in. */
+  clip: { clip: ATHClip };
   /** Bytes came. */
   progress: { loaded: number; total: number };
   /** What can be shown changed: see ready(). */
@@ -106,15 +127,30 @@ export interface ATHMotionEvents {
 export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Of the file: see AthInfo in ath_decoder.d.ts. */
   readonly info: { vertexCount: number; branchCount: number; frameCount: number; segmentCount: number; levelCount: number;
-    fileLength: number; duration: number; maxError: number; [name: string]: unknown };
-  /** Seconds of a round: with "loop" the last frame blends into the first. */
+    fileLength: number; maxError: number; [name: string]: unknown };
+  /** At least one. */
+  readonly clips: readonly ATHClip[];
+  /** The clip that plays. */
+  readonly clip: ATHClip;
+  /** Plays another clip, by its number or name: what of it is not here is fetched, and until its first segment is decoded
+   * the clip before goes on. It begins at the present time, `at` (default 0) seconds from its first frame. fade: for so
+   * many seconds of time that passes in setTime() the two are blended, vertex by vertex and matrix by matrix. Throws
+   * RangeError where there is no such clip. */
+  play(clip: string | number, options?: { fade?: number; at?: number }): this;
+  /** Whether the clip before is still shown, alone or fading out. */
+  readonly switching: boolean;
+  /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
   readonly depthCount: number;
 
-  /** Seconds, as asked for. */
+  /** Seconds, as asked for; those of the clip's first frame. */
   readonly time: number;
-  /** After the last frame: "loop" (default), "clamp" or "pingpong". */
-  wrap: "loop" | "clamp" | "pingpong";
+  readonly start: number;
+  /** After the last frame: "marked" (default: as "loop" where the clip is marked as one, else "clamp"), "loop", "clamp" or
+   * "pingpong". */
+  wrap: "marked" | "loop" | "clamp" | "pingpong";
+  /** Whether the clip repeats from its first frame, by that. */
+  readonly loops: boolean;
   setTime(seconds: number): this;
   /** A depth, or "auto": the coarsest whose largest error is at most `pixels` on the screen, by update(). What is not
    * here or not decoded yet is shown at the deepest depth that is. */
@@ -128,7 +164,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** All vertices in source order, 3 numbers each; what is shown stays. Rejects like show(). */
   positions(seconds: number, depth?: number): Promise<Float32Array>;
 
-  /** The depth and frame (with a fraction) that are shown; -1: none yet. */
+  /** The depth and frame of the file (with a fraction) that are shown; depth -1: none yet. */
   readonly depth: number;
   readonly frame: number;
   /** The depth that is wanted. */
@@ -142,19 +178,24 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   heat: boolean;
   readonly distances: Float32Array | null;
 
-  /** What of the time can be shown at a depth, in seconds. */
+  /** What of the clip can be shown at a depth, in seconds from its first frame. */
   ready(depth: number): { start: number; end: number }[];
-  /** The deepest depth that is here for all of the time; -1: none. */
+  /** The deepest depth that is here for each segment of the clip, and for all of it; -1: none. */
+  readonly readyDepths: Int8Array;
   readonly readyDepth: number;
+  /** Whether all of the clip is here. */
   readonly complete: boolean;
   /** The last of the events "stopped" and "damaged", of which one may have come before there was a listener. */
   readonly failure: { type: "stopped" | "damaged"; message: string; codeName: string; level: number | null } | null;
   readonly bytesFetched: number;
   readonly bytesTotal: number;
   readonly requests: number;
+  /** Of the clip: bytes up to a depth; bits per second; error, in the file's units; how far off the step from a loop's
+   * last frame to its first is, at most. */
   motionBytes(depth: number): number;
   bitRate(depth?: number): number;
   error(depth: number): { max: number; rms: number };
+  seamError(depth: number): number;
   /** Per vertex in source order, the branch whose node moves it at a depth; its own where it moves alone. */
   nodeNumbers(depth?: number): Promise<Int32Array>;
   refresh(): void;
@@ -166,8 +207,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Keeps a geometry in step: `userData.source` holds the file's vertex of each of its vertices. */
   attach<T extends BufferGeometry>(geometry: T): T;
   detach(geometry: BufferGeometry): void;
-  readonly uniforms: Record<"athData" | "athClip" | "athStride", IUniform>;
-  /** A second motion of the same file, with a time and a depth of its own. */
+  readonly uniforms: Record<"athData" | "athStride" | "athForest", IUniform>;
+  /** A second motion of the same file, with a clip, a time and a depth of its own. */
   clone(): ATHMotion;
   dispose(): void;
 }
@@ -180,16 +221,21 @@ export interface ATHInstance {
   angle: number;
   /** How far ahead in the clip it is. */
   seconds: number;
+  /** Number or name of the clip that it plays, over and over; default: the one that `ath.motion` plays. */
+  clip?: string | number;
 }
 
-/** Instances of one file, each drawn at the depth that its distance asks for. Event: "depth", when one can be drawn. */
+/** Instances of one file, each drawn at the depth that its distance asks for. One whose clip is not here yet plays the
+ * motion's. Event: "depth", when one can be drawn. */
 export class ATHForest extends Group {
   constructor(ath: ATH, options?: {
     geometry?: BufferGeometry;
     material?: (isLines: boolean, depth: number) => Material;
   });
   setInstances(instances: ATHInstance[]): void;
-  /** Gets a depth ready, all of whose bytes are here (motion.readyDepth). */
+  /** Gets ready what is here of all clips that instances play: once per frame, until it is done. */
+  bakeReady(): void;
+  /** Gets a depth of the motion's clip ready, all of whose bytes are here (motion.readyDepth). */
   bake(depth: number): Promise<void>;
   /** Chooses depths and what is in view: once per frame. */
   update(camera: Camera, height: number, seconds: number): void;
@@ -197,7 +243,7 @@ export class ATHForest extends Group {
   /** Error on the screen that is allowed, in pixels. */
   pixels: number;
   readonly count: number;
-  /** Depths that can be drawn. */
+  /** Depths of the motion's clip that can be drawn. */
   readonly baked: number[];
   /** Instances drawn, by depth; those out of view; vertices drawn. */
   readonly counts: number[];
@@ -208,7 +254,7 @@ export class ATHForest extends Group {
 
 /** The same as ATHMotion.bind(), by uniforms. */
 export function injectMotion<T extends Material>(material: T, uniforms: Record<string, IUniform>, forest?: boolean): T;
-export function motionUniforms(): Record<"athData" | "athClip" | "athStride", IUniform>;
+export function motionUniforms(): Record<"athData" | "athStride" | "athForest", IUniform>;
 /** GLSL for materials of one's own: vec3 athMoved(vec3 position, float athPart), vec3 athTurned(vec3 normal, float athPart). */
 export const MOTION_PARS: string;
 export function dataTexture(data: Float32Array): DataTexture;

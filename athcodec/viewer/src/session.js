@@ -1,5 +1,6 @@
-// One file in a worker: fetches what the views need, depth by depth and ahead of the playhead first; decodes it in
-// short steps between the pictures that are asked for; packs pictures for the GPU. The page is told by `post`.
+// One file in a worker: fetches what the views need of the clips that they play, depth by depth and ahead of the playhead
+// first; decodes it in short steps between the pictures that are asked for; packs pictures for the GPU. The page is told
+// by `post`.
 
 import { AthFile } from "../ath_decoder.mjs";
 import { normals, turns } from "./normals.js";
@@ -23,7 +24,7 @@ export class Session {
   #file = null;
   #front = new Uint8Array(0);
   #came = 0;              // bytes from the file's beginning on
-  #views = new Map();     // id: {level, frame}
+  #views = new Map();     // id: {level, frames}, the frame of a clip that fades out behind the other
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
@@ -41,10 +42,13 @@ export class Session {
   #rest = null;
   #restNormals = null;
   #faces = null;
+  #first = 0;             // the clip to begin with
 
-  constructor(source, post) {
+  /** clip: the name of the one to begin with, null: the file's first. */
+  constructor(source, post, clip = null) {
     this.source = source;
     this.post = post;
+    this.clip = clip;
   }
 
   // ---- opening ----
@@ -83,18 +87,37 @@ export class Session {
   }
 
   #tellOfFile() {
-    const file = this.#file, { info } = file, statics = readPrelude(file);
+    const file = this.#file, { info } = file, statics = readPrelude(file), clips = this.#clips();
     this.#faces = statics.faces;
+    this.#first = this.clip === null ? 0 : clips.findIndex(({ name }) => name === this.clip);
+    if (this.#first < 0) throw Object.assign(
+      new Error(`clip: got ${this.clip}, expected one of ${clips.map(({ name }) => name).join(", ")}`), { codeName: "CLIP" });
     this.#order = file.vertexSource();
     this.post({
       type: "opened", info: { ...info }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
-      vertexSource: this.#order, branchSource: file.branchSource(),
-      errors: Array.from({ length: info.levelCount }, (_, level) => file.levelError(level)),
+      vertexSource: this.#order, branchSource: file.branchSource(), clips, first: this.#first,
       chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
       segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),
     });
     this.#opened = true;
     this.#state(true);
+  }
+
+  // The clips with their numbers, and for every level the error and the one at the seam.
+  #clips() {
+    const file = this.#file, levels = Array.from({ length: file.info.levelCount }, (_, level) => level);
+    return file.clips.map((clip, index) => ({
+      ...clip, index, seams: levels.map((level) => file.seamError(index, level)),
+      errors: levels.map((level) => file.levelError(level, clip.firstSegment, clip.firstSegment + clip.segmentCount - 1)),
+    }));
+  }
+
+  #clipAt(frame) {
+    return this.#file.clips.findLast(({ firstFrame }) => firstFrame <= frame);
+  }
+
+  #segmentAt(frame) {
+    return this.#file.segmentOf(Math.floor(frame));
   }
 
   // Bytes that have come, in any order once the file is open.
@@ -175,18 +198,31 @@ export class Session {
 
   // Missing ranges in the order in which they are wanted.
   * #wanted() {
-    const file = this.#file, { segmentCount, frameCount, duration } = file.info;
-    const views = [...this.#views.values()];
-    const level = Math.max(0, ...views.map((view) => view.level));
-    const first = views.length ? file.segmentOf(Math.min(frameCount - 1, Math.floor(views[0].frame))) : 0;
-    const frames = frameCount / segmentCount;
-    const ahead = Math.min(segmentCount, 1 + Math.ceil(AHEAD_SECONDS * frameCount / Math.max(duration, 1e-9) / frames));
-    const order = Array.from({ length: segmentCount }, (_, i) => (first + i) % segmentCount);
-    const soon = order.slice(0, ahead), late = order.slice(ahead);
-    yield* this.#missing(soon, 0, Math.min(1, level));
-    if (this.#attributes === "missing") yield* attributeRanges(file);
-    yield* this.#missing(soon, 2, level);
-    yield* this.#missing(late, 0, level);
+    const wishes = this.#wishes();
+    for (const { soon, level } of wishes) yield* this.#missing(soon, 0, Math.min(1, level));
+    if (this.#attributes === "missing") yield* attributeRanges(this.#file);
+    for (const { soon, level } of wishes) yield* this.#missing(soon, 2, level);
+    for (const { late, level } of wishes) yield* this.#missing(late, 0, level);
+  }
+
+  // Of every clip that a view plays, the deepest level and the segments from the playhead on: {level, soon, late}. What
+  // fades out shows what is here.
+  #wishes() {
+    const wishes = new Map(), views = [...this.#views.values()];
+    if (views.length === 0) views.push({ level: 0, frames: [this.#file.clips[this.#first].firstFrame] });
+    for (const { level, frames: [frame] } of views) {
+      const clip = this.#clipAt(frame), wish = wishes.get(clip);
+      if (wish) wish.level = Math.max(wish.level, level);
+      else wishes.set(clip, { level, ...this.#fromHere(clip, frame) });
+    }
+    return [...wishes.values()];
+  }
+
+  #fromHere({ firstSegment, segmentCount, duration }, frame) {
+    const now = this.#segmentAt(frame) - firstSegment;
+    const order = Array.from({ length: segmentCount }, (_, i) => firstSegment + (now + i) % segmentCount);
+    const ahead = 1 + Math.ceil(AHEAD_SECONDS * segmentCount / Math.max(duration, 1e-9));
+    return { soon: order.slice(0, ahead), late: order.slice(ahead) };
   }
 
   * #missing(segments, from, to) {
@@ -258,9 +294,9 @@ export class Session {
 
   // ---- decoding ----
 
-  /** A view shows `frame` at `level` from now on. */
-  view(id, level, frame) {
-    this.#views.set(id, { level, frame });
+  /** A view shows `frames` at `level` from now on: one, or two that fade over. */
+  view(id, level, frames) {
+    this.#views.set(id, { level, frames });
     this.#wakeUp();
     if (this.#opened) this.#decode();
   }
@@ -278,11 +314,12 @@ export class Session {
 
   // The next segment and level to decode: what the views show, then what they show next.
   #job() {
-    const { frameCount, segmentCount } = this.#file.info;
+    const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => ({ level, frame })));
     for (const next of [0, 1]) {
-      for (const { level, frame } of this.#views.values()) {
-        const now = this.#file.segmentOf(Math.max(0, Math.min(frameCount - 1, Math.floor(frame))));
-        const segment = (now + next) % segmentCount, best = Math.min(level, this.#readyLevel(segment));
+      for (const { level, frame } of shown) {
+        const { firstSegment, segmentCount } = this.#clipAt(frame);
+        const segment = firstSegment + (this.#segmentAt(frame) - firstSegment + next) % segmentCount;
+        const best = Math.min(level, this.#readyLevel(segment));
         if (best >= 0 && !this.#prepared.has(`${segment}/${best}`)) return [segment, best];
       }
     }
@@ -336,19 +373,39 @@ export class Session {
     return segment;
   }
 
-  // Segments of one level that show `frame`: the deepest that is decoded, or, where nothing is, the coarsest that
-  // there is. `exactly`: this level and no other, decoded now.
-  #show(frame, level, exactly) {
-    const file = this.#file, { frameCount } = file.info;
-    const low = Math.min(frameCount - 1, Math.floor(frame));
-    const high = frame > low ? (low + 1) % frameCount : low;
-    const indices = [...new Set([file.segmentOf(low), file.segmentOf(high)])];
-    if (exactly) return { level, segments: indices.map((index) => this.#now(index, level)) };
+  // Numbers of the segments that show `frame`: its own, and that of the frame that it blends into.
+  #around(frame) {
+    const { firstFrame, frameCount } = this.#clipAt(frame), low = Math.floor(frame);
+    const high = frame > low ? firstFrame + (low + 1 - firstFrame) % frameCount : low;
+    return [...new Set([low, high].map((each) => this.#file.segmentOf(each)))];
+  }
+
+  // What shows `frame`, {frame, level, segments}: at the deepest level that is decoded or, where nothing is, at the
+  // coarsest.
+  #show(frame, level) {
+    const indices = this.#around(frame);
     for (let each = level; each >= 0; each--) {
       const segments = indices.map((index) => this.#segment(index, each));
-      if (segments[0]) return { level: each, segments };
+      if (segments[0]) return { frame, level: each, segments };
     }
-    return this.#readyLevel(indices[0]) < 0 ? null : { level: 0, segments: [this.#now(indices[0], 0)] };
+    return this.#coarser(frame, 0);
+  }
+
+  // At this level and no other, decoded now. Throws where that cannot be.
+  #exactly(frame, level) {
+    return { frame, level, segments: this.#around(frame).map((index) => this.#now(index, level)) };
+  }
+
+  // The same where it can be; null where it cannot.
+  #coarser(frame, level) {
+    const [index, next] = this.#around(frame).map((each) => (this.#readyLevel(each) < level ? -1 : each));
+    if (index < 0) return null;
+    try {
+      return { frame, level, segments: [this.#now(index, level), next >= 0 ? this.#segment(next, level) : null] };
+    } catch (error) {
+      this.#damaged(index, level, error);
+      return null;
+    }
   }
 
   #now(index, level) {
@@ -359,6 +416,22 @@ export class Session {
     return segment;
   }
 
+  // From one clip to another: the old one until the new one is decoded as deep as it is here; then both at one level,
+  // `old` in what is returned, of which `share` is shown.
+  #change(frame, old, level) {
+    if (!old.begun && !this.#isDecoded(frame, level)) return this.#show(old.frame, level) ?? this.#show(frame, level);
+    const shown = this.#show(frame, level), before = old.share > 0 ? this.#show(old.frame, level) : null;
+    if (!shown || !before) return shown ?? before;
+    const both = Math.min(shown.level, before.level);
+    const [a, b] = [shown, before].map((each) => (each.level === both ? each : this.#coarser(each.frame, both)));
+    return a && b ? { ...a, old: b, share: old.share } : shown;
+  }
+
+  #isDecoded(frame, level) {
+    const index = this.#segmentAt(frame);
+    return this.#prepared.has(`${index}/${Math.min(level, this.#readyLevel(index))}`);
+  }
+
   // ---- pictures ----
 
   parts(level) {
@@ -367,31 +440,41 @@ export class Session {
   }
 
   /** The picture of a view: see ATHMotion's #picture. */
-  picture({ view, id, seconds, wrap, level, exactly = false, heat = false, positions = false, buffer = null }) {
+  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, heat = false, positions = false, buffer = null }) {
     if (!this.#opened) return;
-    const start = performance.now(), frame = this.#file.frameAt(seconds, wrap);
-    if (!exactly) this.view(view, level, frame);
+    const start = performance.now(), frame = this.#file.frameAt(seconds, wrap, clip);
     let shown = null;
     try {
-      shown = this.#show(frame, level, exactly);
+      shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old });
     } catch (error) {
-      if (exactly) {
-        this.post({ type: "picture", view, id, shown: -1, frame, ...describe(error) });
-        return;
-      }
-      this.#damaged(this.#file.segmentOf(Math.floor(frame)), 0, error);
+      this.post({ type: "picture", view, id, shown: -1, frame, ...describe(error) });
+      return;
     }
     if (!shown) {
       this.post({ type: "picture", view, id, shown: -1, frame, buffer }, buffer ? [buffer] : []);
       return;
     }
-    const answer = { type: "picture", view, id, shown: shown.level, frame, exactly };
-    if (positions) answer.data = this.#file.positions(shown.segments, frame);
-    else answer.data = this.#pack(shown, frame, buffer);
+    const answer = { type: "picture", view, id, shown: shown.level, frame: shown.frame, exactly };
+    answer.clip = this.#file.clips.indexOf(this.#clipAt(shown.frame));
+    answer.data = this.#faded(shown, positions ? (each) => this.#file.positions(each.segments, each.frame)
+      : (each) => this.#pack(each, each === shown ? buffer : null));
     answer.held = this.#file.held;
-    if (heat) answer.heat = this.#distances(shown, frame);
+    if (heat) answer.heat = this.#distances(shown);
     answer.ms = performance.now() - start;
     this.post(answer, [answer.data.buffer, ...(answer.heat ? [answer.heat.buffer] : [])]);
+  }
+
+  #viewed({ view, frame, level, old }) {
+    if (old) old.frame = this.#file.frameAt(old.seconds, old.wrap, old.clip);
+    this.view(view, level, old ? [frame, old.frame] : [frame]);
+    return old ? this.#change(frame, old, level) : this.#show(frame, level);
+  }
+
+  // The numbers of a picture, and of the one that fades out added by its share.
+  #faded(shown, numbersOf) {
+    const before = shown.old ? numbersOf(shown.old) : null, numbers = numbersOf(shown);
+    for (let i = 0; before && i < numbers.length; i++) numbers[i] += shown.share * (before[i] - numbers[i]);
+    return numbers;
   }
 
   /** Texels of a level: three per node, then one per exact vertex, two where the mesh has faces: its position and
@@ -401,14 +484,14 @@ export class Session {
     return 3 * nodeCount + (this.#faces ? 2 : 1) * exactCount;
   }
 
-  #pack({ level, segments }, frame, buffer = null) {
-    const size = 4 * WIDTH * Math.ceil(this.texels(level) / WIDTH);
+  #pack(shown, buffer = null) {
+    const size = 4 * WIDTH * Math.ceil(this.texels(shown.level) / WIDTH);
     const data = buffer?.byteLength === 4 * size ? new Float32Array(buffer) : new Float32Array(size);
-    this.#fill(data, 0, level, segments, frame);
+    this.#fill(data, 0, shown);
     return data;
   }
 
-  #fill(data, at, level, segments, frame) {
+  #fill(data, at, { frame, level, segments }) {
     const { nodeCount, exactCount } = this.parts(level), exactAt = at + 12 * nodeCount;
     this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt) });
     if (exactCount === 0) return;
@@ -437,22 +520,21 @@ export class Session {
   }
 
   // Per vertex, how far the shown position is from that of the deepest level that is here.
-  #distances({ level, segments }, frame) {
+  #distances({ frame, level, segments }) {
     const { levelCount } = this.#file.info;
-    const deepest = this.#show(frame, levelCount - 1, false);
+    const deepest = this.#show(frame, levelCount - 1);
     const a = this.#file.positions(segments, frame), b = this.#file.positions(deepest.segments, frame);
     return Float32Array.from({ length: a.length / 3 }, (_, i) => level === deepest.level ? 0
       : Math.hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1], a[3 * i + 2] - b[3 * i + 2]));
   }
 
-  /** All frames of a level, every `step`-th of them, one behind the other: what a forest plays. */
-  async bake({ id, level, step }) {
-    const file = this.#file, { frameCount } = file.info, texels = this.texels(level);
+  /** All frames of a clip at a level, every `step`-th of them, one behind the other: what a forest plays. */
+  async bake({ id, clip, level, step }) {
+    const { firstFrame, frameCount } = this.#file.clips[clip], texels = this.texels(level);
     const rows = Math.ceil(frameCount / step), data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
     try {
       for (let row = 0; row < rows; row++) {
-        const { segments } = this.#show(row * step, level, true);
-        this.#fill(data, 4 * row * texels, level, segments, row * step);
+        this.#fill(data, 4 * row * texels, this.#exactly(firstFrame + row * step, level));
         if (row % 4 === 3) await turn();
         if (this.#closed) return;
       }

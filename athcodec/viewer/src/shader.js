@@ -1,17 +1,17 @@
 // Puts the motion into the vertex shaders of three.js' materials: a vertex finds, by its attribute `athPart`, the
 // matrix of its node in a data texture, or its own position where it has one. In a forest every instance has a
-// place, a size, a turn about the up axis and a time of its own, and the texture holds all frames.
+// place, a size, a turn about the up axis and a frame of its own, and the texture holds all frames of a clip.
 
-import { Vector4 } from "three";
+import { Vector2 } from "three";
 
 const PARS = /* glsl */`
 attribute float athPart;
 uniform highp sampler2D athData;
-uniform vec4 athClip; // texels per frame, frames, seconds per row, time
 uniform float athStride; // texels per exact vertex
 #ifdef ATH_FOREST
+uniform vec2 athForest; // texels per frame, 1: the up axis is z
 attribute vec4 athPlace; // x, y, z, size
-attribute vec4 athTurn; // cosine, sine, seconds ahead, 1: the up axis is z
+attribute vec4 athTurn; // cosine, sine, frame, the frame that its fraction leads to
 #endif
 
 vec4 athTexel(int at) {
@@ -19,29 +19,19 @@ vec4 athTexel(int at) {
 }
 
 #ifdef ATH_FOREST
-int athRow, athNext;
-float athBlend;
-void athBegin() {
-  float row = mod((athClip.w + athTurn.z) / athClip.z, athClip.y);
-  athRow = int(min(floor(row), athClip.y - 1.0));
-  athNext = (athRow + 1) % int(athClip.y);
-  athBlend = row - float(athRow);
-}
 vec4 athAt(int at) {
-  int size = int(athClip.x);
-  return mix(athTexel(athRow * size + at), athTexel(athNext * size + at), athBlend);
+  int size = int(athForest.x);
+  return mix(athTexel(int(athTurn.z) * size + at), athTexel(int(athTurn.w) * size + at), fract(athTurn.z));
 }
 vec3 athSpin(vec3 p) {
-  return athTurn.w > 0.5 ? vec3(athTurn.x * p.x - athTurn.y * p.y, athTurn.y * p.x + athTurn.x * p.y, p.z)
+  return athForest.y > 0.5 ? vec3(athTurn.x * p.x - athTurn.y * p.y, athTurn.y * p.x + athTurn.x * p.y, p.z)
     : vec3(athTurn.x * p.x + athTurn.y * p.z, p.y, athTurn.x * p.z - athTurn.y * p.x);
 }
 #else
-void athBegin() {}
 vec4 athAt(int at) { return athTexel(at); }
 #endif
 
 vec3 athMoved(vec3 p, float part) {
-  athBegin();
   int at = int(abs(part)) - 1;
   if (part < 0.0) {
     p = athAt(at).xyz;
@@ -56,7 +46,6 @@ vec3 athMoved(vec3 p, float part) {
 }
 
 vec3 athTurned(vec3 n, float part) {
-  athBegin();
   int at = int(abs(part)) - 1;
   if (part > 0.0) {
     vec3 a = athAt(at).xyz, b = athAt(at + 1).xyz, c = athAt(at + 2).xyz;
@@ -86,8 +75,8 @@ vec3 objectTangent = vec3(tangent.xyz);
 #endif
 `;
 
-/** Lets `material` draw geometries of a motion. `uniforms`: athData, athClip, athStride, shared by all materials of
- * one motion. Other changes in onBeforeCompile have to come before. */
+/** Lets `material` draw geometries of a motion. `uniforms`: athData, athStride, athForest, shared by all materials
+ * of one motion. Other changes in onBeforeCompile have to come before. */
 export function injectMotion(material, uniforms, forest = false) {
   const before = material.onBeforeCompile, key = `ath${forest ? "-forest" : ""} ${material.customProgramCacheKey()}`;
   material.onBeforeCompile = (shader, renderer) => {
@@ -106,5 +95,5 @@ export function injectMotion(material, uniforms, forest = false) {
 export const MOTION_PARS = PARS;
 
 export function motionUniforms() {
-  return { athData: { value: null }, athClip: { value: new Vector4(0, 1, 1, 0) }, athStride: { value: 1 } };
+  return { athData: { value: null }, athStride: { value: 1 }, athForest: { value: new Vector2() } };
 }
