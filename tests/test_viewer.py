@@ -24,6 +24,7 @@ from plants import clip_of, tube
 
 import athcodec
 from athcodec import cli, view
+from athcodec import container as ct
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
@@ -40,9 +41,9 @@ MOST_BYTES = 150_000
 
 
 @contextmanager
-def viewing(path: str):
+def viewing(path: str, *options: str):
     """The address that `athcodec view` prints for a file or URL."""
-    command = [sys.executable, "-m", "athcodec", "view", path, "--no-browser"]
+    command = [sys.executable, "-m", "athcodec", "view", path, "--no-browser", *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         yield process.stdout.readline().split()[0]
@@ -111,6 +112,19 @@ def test_an_exported_page_holds_everything(sample_ath, tmp_path, capsys):
     outside = re.sub(r"<script.*?</script>|<style.*?</style>", "", text, flags=re.DOTALL)
     assert not re.search(r'(?:src|href)="(?!data:)', outside)
     assert "connect-src 'none'" in outside
+
+
+def test_a_clip_to_begin_with_is_named_in_the_address_and_in_the_page(medley_ath, tmp_path, capsys):
+    with viewing(str(medley_ath), "--clip", "Böe") as address:
+        assert address.endswith("medley.ath&clip=B%C3%B6e")
+    page = tmp_path / "page.html"
+    assert cli.main(["view", str(medley_ath), "--clip", "Böe", "--export", str(page)]) == 0
+    assert 'data-clip="Böe"' in page.read_text("utf-8")
+    capsys.readouterr()
+    for more in ([], ["--export", str(page)]):
+        assert cli.main(["view", str(medley_ath), "--clip", "gale", *more]) == 1
+        error = capsys.readouterr().err.strip()
+        assert "'gale'" in error and "'calm', 'Böe'" in error and "\n" not in error
 
 
 def test_what_cannot_be_shown_is_one_line(sample_ath, tmp_path, monkeypatch, capsys):
@@ -188,7 +202,10 @@ import { ATHForest, ATHLoader } from "athcodec-three";
 const ath = await new ATHLoader().setWorkerLimit(2).loadAsync("tree.ath");
 new Scene().add(ath.object);
 ath.motion.setDepth("auto").setTime(2).addEventListener("depth", (event) => { const depth: number = event.depth; });
-new ATHForest(ath).update(new PerspectiveCamera(), 100, 1);
+const [first] = ath.motion.clips, name: string = first.loop ? first.name : ath.motion.play("storm", { fade: 0.5 }).clip.name;
+const forest = new ATHForest(ath);
+forest.setInstances([{ x: 0, y: 0, z: 0, size: 1, angle: 0, seconds: 0, clip: name }]);
+forest.update(new PerspectiveCamera(), 100, 1);
 const xyz: Float32Array = await ath.motion.positions(1, 0);
 """
 
@@ -249,6 +266,22 @@ def gusty_ath(gusty_tree, tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def windy_ath(gusty_tree, tmp_path_factory):
+    """Three clips of that tree: a calm that was blended into a loop, a gust, and a storm that is one."""
+    def part(start: int, stop: int, force: float):
+        rest = gusty_tree.rest
+        return clip_of(rest + force * (gusty_tree.block(start, stop) - rest), rest, gusty_tree.vertex_branch,
+                       gusty_tree.branch_parent, edges=gusty_tree.edges, attributes=gusty_tree.attributes,
+                       metadata=gusty_tree.metadata)
+
+    clips = {"calm": athcodec.looped(part(0, 40, 0.3), blend=8), "gust": part(30, 80, 1.0),
+             "storm": athcodec.looped(part(60, 120, 1.6), blend=20)}
+    path = tmp_path_factory.mktemp("windy") / "windy.ath"
+    athcodec.encode(athcodec.join(clips), path, rel_error=1e-4, effort="fast", segment_frames=16)
+    return path
+
+
 def positions_of(page, call: str) -> np.ndarray:
     return np.array(page.evaluate(call), float).reshape(-1, 3)
 
@@ -269,6 +302,184 @@ def test_every_depth_shows_the_positions_that_python_decodes(opened, sample_ath)
                 for way in ("uploaded", "onGraphics"):
                     shown = positions_of(page, f"athcodecViewer.{way}()")
                     assert np.abs(shown - wanted).max() < 1e-6 * size, (depth, frame, way)
+
+
+def play(page, clip) -> None:
+    """Another clip, and waits until nothing is left of the one before."""
+    page.evaluate(f"athcodecViewer.playClip({clip})")
+    page.wait_for_function("() => !athcodecViewer.motion.switching && athcodecViewer.motion.complete", timeout=60_000)
+
+
+@browser_test
+def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley_ath):
+    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+        page = opened(line.page("tree.ath"))
+        for index, clip in reversed(list(enumerate(first.clips))):
+            play(page, index)
+            decoder = first.play(clip.name)
+            for depth in (0, decoder.level_count - 1):
+                for frame in sorted({0, clip.frame_count // 2, clip.frame_count - 1}):
+                    wanted, seconds = decoder.positions(frame, depth), float(decoder.time[frame] - decoder.time[0])
+                    decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {depth})")
+                    assert np.abs(decoded - wanted).max() < 1e-6 * np.ptp(wanted)  # times are rounded
+                    page.evaluate(f"athcodecViewer.shown({seconds}, {depth})")
+                    shown = positions_of(page, "athcodecViewer.onGraphics()")
+                    assert np.abs(shown - wanted).max() < 2e-6 * np.ptp(wanted), (clip.name, depth, frame)
+
+
+@browser_test
+def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
+    data = windy_ath.read_bytes()
+    with Line({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
+        clips = {clip.name: clip for clip in decoder.clips}
+        common = {chunk.offset for chunk in decoder.container.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
+
+        def outside(*names: str) -> int:
+            """Bytes sent behind the first request that belong to none of these clips."""
+            played = {segment for name in names for segment in clips[name].segments}
+            asked = np.zeros(len(data), bool)
+            for _, first, size in line.log[1:]:
+                asked[first: first + size] = True
+            for chunk in decoder.container.chunks:
+                if chunk.offset in common or chunk.segment in played:
+                    asked[chunk.offset: chunk.offset + chunk.length] = False
+            return int(asked.sum())
+
+        page = opened(line.page("tree.ath", clip="storm"))
+        page.wait_for_function("() => athcodecViewer.plants[0].ath.attributes.radius")
+        assert page.evaluate("athcodecViewer.motion.clip.name") == "storm"
+        assert outside("storm") == 0 and line.sent("tree.ath") < 0.7 * len(data)
+        play(page, 0)
+        assert outside("storm", "calm") == 0
+        time.sleep(0.5)
+        assert line.sent("tree.ath") < len(data) - 10_000  # the gust has not been asked for
+
+
+@browser_test
+def test_the_clip_before_goes_on_until_the_next_is_here_and_fades_into_it(opened, windy_ath):
+    with Line({"tree.ath": windy_ath.read_bytes()}, rate=200_000) as line, athcodec.open(windy_ath) as decoder:
+        page = opened(line.page("tree.ath"))
+        page.evaluate("athcodecViewer.setPlaying(false)")
+        found = page.evaluate(FADE, decoder.level_count - 1)
+        gust = decoder.clips[1]
+        assert found["waiting"] and all(0 <= frame < gust.first_frame for frame in found["waiting"])
+        assert gust.first_frame <= found["frame"] < gust.first_frame + gust.frame_count
+        before, after = (np.array(found[name]).reshape(-1, 3) for name in ("before", "after"))
+        for share, name in ((0.25, "quarter"), (1, "end")):
+            mean = before + share * (after - before)
+            assert np.abs(np.array(found[name]).reshape(-1, 3) - mean).max() < 1e-5 * np.ptp(mean)
+
+
+# Time stands still for both clips but for what passes in a fade.
+FADE = """async (level) => {
+  const motion = athcodecViewer.motion.clone(), waiting = [];
+  const pictured = () => new Promise((done) => {
+    const once = () => { motion.removeEventListener("frame", once); done(); };
+    motion.addEventListener("frame", once);
+  });
+  const until = async (met) => { while (!met()) await new Promise((done) => setTimeout(done, 5)); };
+  const still = async () => { await pictured(); return [...motion.uploaded()]; };
+  const first = pictured();
+  motion.wrap = "clamp";
+  motion.setDepth(level).setTime(100);
+  await first;
+  await until(() => motion.depth === level);
+  const begun = new Promise((done) => motion.addEventListener("clip", done));
+  motion.addEventListener("frame", ({ frame }) => { if (motion.switching === "waiting") waiting.push(frame); });
+  motion.play("gust", { fade: 4, at: 100 });
+  await begun;
+  const { frame } = motion;
+  await until(() => motion.complete && motion.depth === level);
+  const found = { waiting, frame, before: [...motion.uploaded()] };
+  let next = still();
+  motion.setTime(101);
+  found.quarter = await next;
+  next = still();
+  motion.setTime(104);
+  found.end = await next;
+  found.after = await motion.positions(104, level).then((all) => [...all]);
+  return { ...found, over: !motion.switching };
+}"""
+
+
+@browser_test
+def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, medley_ath, medley_clips):
+    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+        page = opened(line.page("tree.ath"))
+        deepest = first.level_count - 1
+        for index, clip in enumerate(first.clips):
+            play(page, index)
+            decoder, last = first.play(clip.name), clip.frame_count - 1
+            ends = decoder.positions(0), decoder.positions(last)
+            round_ = page.evaluate("athcodecViewer.motion.duration")
+            assert page.get_attribute("#loop", "aria-pressed") == str(clip.loop).lower()
+            assert ("Loop seam" in page.inner_text("#facts")) == clip.loop or page.wait_for_timeout(300)
+            assert ("Loop seam" in page.inner_text("#facts")) == clip.loop
+            if not clip.loop:
+                assert round_ == pytest.approx(clip.duration)
+                held = positions_of(page, f"athcodecViewer.decoded({round_ + 1}, {deepest})")
+                assert np.abs(held - ends[1]).max() < 1e-6 * np.ptp(ends[1])
+                continue
+            assert round_ == pytest.approx(clip.duration * clip.frame_count / last)
+            between = (clip.duration + round_) / 2
+            for seconds, wanted in ((between, (ends[0] + ends[1]) / 2), (round_ + 1e-9, ends[0])):
+                shown = positions_of(page, f"athcodecViewer.decoded({seconds}, {deepest})")
+                assert np.abs(shown - wanted).max() < 1e-5 * np.ptp(wanted)
+            seam = page.evaluate(f"athcodecViewer.motion.seamError({deepest})")
+            source = medley_clips[clip.name].block(0, 1)[0] - medley_clips[clip.name].block(last, last + 1)[0]
+            off = np.linalg.norm((ends[0] - ends[1]) - source, axis=1).max()
+            assert off <= seam * (1 + 1e-5) and seam == pytest.approx(clip.seam_errors[deepest])
+            page.keyboard.press("l")
+            assert page.evaluate("athcodecViewer.motion.duration") == pytest.approx(clip.duration)
+
+
+@browser_test
+def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_ath, sample_ath):
+    with Line({"tree.ath": medley_ath.read_bytes(), "one.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+        assert page.locator("#clip option").all_inner_texts() == ["calm ↻", "Böe", "still", "round ↻"]
+
+        def playing() -> tuple[str, str]:
+            return page.evaluate("athcodecViewer.motion.clip.name"), page.locator("#clip option:checked").inner_text()
+
+        page.select_option("#clip", label="Böe")
+        assert playing() == ("Böe", "Böe")
+        page.locator("#canvas").focus()
+        page.keyboard.press("n")
+        assert playing() == ("still", "still")
+        page.keyboard.press("Shift+N")
+        page.keyboard.press("Shift+N")
+        assert playing() == ("calm", "calm ↻")
+        page.keyboard.press("End")
+        assert float(page.input_value("#time")) <= float(page.get_attribute("#time", "max"))
+        page = opened(line.page("tree.ath", clip="still"))
+        assert page.evaluate("athcodecViewer.motion.clip.name") == "still"
+        page = opened(line.page("tree.ath", clip="gale"), "document.getElementById('message').checkVisibility()")
+        assert "no such clip" in page.inner_text("#message h2") and "calm, Böe" in page.inner_text("#message p")
+        page = opened(line.page("one.ath"))
+        assert not page.locator("#clip").is_visible()
+
+
+@browser_test
+def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
+    with Line({"tree.ath": windy_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"))
+        page.evaluate("athcodecViewer.forestOf(30)")
+        drawn = """athcodecViewer.state.forest.children.filter(({ visible }) => visible)
+          .map(({ userData, geometry }) => [userData.clip, geometry.instanceCount])"""
+
+        def clips(wanted: int) -> None:
+            page.wait_for_function(f"() => new Set({drawn}.map(([clip]) => clip)).size === {wanted}", timeout=60_000)
+            forest = page.evaluate("[...athcodecViewer.state.forest.counts, athcodecViewer.state.forest.culled]")
+            assert sum(forest) == 30
+
+        clips(1)
+        page.check("#forest-mix")
+        clips(3)
+        page.uncheck("#forest-mix")
+        page.evaluate("athcodecViewer.playClip(2)")
+        page.wait_for_function(f"() => {drawn}.every(([clip]) => clip === 2)", timeout=60_000)
+        assert ink(page) > 0.005
 
 
 @browser_test
@@ -470,7 +681,8 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
         assert pressed("a", "athcodecViewer.motion.automatic") is True
         assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Node"
         assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Skeleton"
-        assert pressed("l", "athcodecViewer.state.loop") is False
+        assert pressed("l", "athcodecViewer.motion.wrap") == "loop"
+        assert pressed("l", "athcodecViewer.motion.wrap") == "clamp"
         assert pressed("d", "athcodecViewer.plants.length") == 2
         assert pressed("f", "Boolean(athcodecViewer.state.forest) && athcodecViewer.plants.length === 1") is True
         with page.expect_download() as download:

@@ -144,6 +144,7 @@ function arrange(first = null) {
     plant.beside = plants;
     plant.onPaint = () => { state.dirty = true; };
     plant.motion.addEventListener("frame", () => pictured(plant));
+    plant.motion.addEventListener("clip", fromTheStart);
     plant.motion.addEventListener("ready", () => { state.dirty = true; });
   }
   if (plants.length > 1) forestSwitch(false);
@@ -410,11 +411,15 @@ function playClip(index) {
   const ended = state.time >= limit(), [{ motion }] = plants;
   for (const plant of plants) playIn(plant.motion, motion.clips[index].name);
   $("clip").value = index;
-  Object.assign(state, { time: 0, turns: 0 });
+  fromTheStart();
   setLoop(null);
   if (ended) setPlaying(true);
   if (state.forest) plantForest();
   state.dirty = true;
+}
+
+function fromTheStart() {
+  Object.assign(state, { time: 0, turns: 0 });
 }
 
 function nextClip(by) {
@@ -459,7 +464,7 @@ function advance(seconds) {
   if (loops() && limit() > 0) {
     state.time %= limit();
     state.turns += beyond + limit() - state.time;
-  } else {
+  } else if (!plants.some(({ motion }) => motion.switching)) {
     state.time = limit();
     setPlaying(false);
   }
@@ -538,8 +543,9 @@ function tell() {
   $("scale-middle").textContent = lengthText(main.heatMost / 4, unit);
   $("scale-high").textContent = lengthText(main.heatMost, unit);
   $("time").max = limit();
-  if (document.activeElement !== $("time") || state.playing) $("time").value = state.time;
-  $("clock").value = `${state.time.toFixed(2)} s`;
+  const time = motion.switching === "waiting" ? 0 : Math.min(state.time, limit());
+  if (document.activeElement !== $("time") || state.playing) $("time").value = time;
+  $("clock").value = `${time.toFixed(2)} s`;
   paintReady($("ready"), [...motion.readyDepths], motion.depthCount);
   labels();
   if (state.forest) forestBars();

@@ -130,7 +130,7 @@ export class ATHForest extends Group {
       if (name !== "athPart") geometry.setAttribute(name, attribute);
     geometry.setAttribute("athPart", new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    drawn.userData.depth = played.level;
+    Object.assign(drawn.userData, { depth: played.level, clip: clip.index });
     drawn.frustumCulled = false; // instances are, one by one
     const bin = { ...played, drawn, size: source.length, filled: 0 };
     this.#makeRoom(bin);

@@ -51,7 +51,7 @@ export class ATHMotion extends EventDispatcher {
   #asked = null;          // what the worker was asked last, "" while it is at work
   #pending = false;
   #stale = false;
-  #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, fade, passed, begun}
+  #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, at, fade, passed, begun}
   #answers = new Map();
   #next = 1;
 
@@ -85,9 +85,9 @@ export class ATHMotion extends EventDispatcher {
     return this.clip.duration * (this.wrap === "pingpong" ? 2 : 1);
   }
 
-  /** Whether the clip before is still shown, alone or fading out. */
+  /** Whether the clip before is still shown: "waiting" for the one that plays, "fading" into it, else null. */
   get switching() {
-    return this.#old !== null;
+    return this.#old && (this.#old.begun ? "fading" : "waiting");
   }
 
   get depthCount() {
@@ -183,7 +183,7 @@ export class ATHMotion extends EventDispatcher {
     const { clip: { index }, time, start, wrap } = this, old = this.#old;
     const mostlyOld = old && (!old.begun || 2 * old.passed < old.fade);
     if (this.depth >= 0)
-      this.#old = { ...(mostlyOld ? old : { clip: index, seconds: time - start, wrap }), fade, passed: 0, begun: false };
+      this.#old = { ...(mostlyOld ? old : { clip: index, seconds: time - start, wrap }), at, fade, passed: 0, begun: false };
     Object.assign(this, { clip: next, start: time - at });
     this.#ask();
     return this;
@@ -251,14 +251,13 @@ export class ATHMotion extends EventDispatcher {
     });
   }
 
-  // Where a time is.
   #place(seconds) {
     return { clip: this.clip.index, seconds: seconds - this.start, wrap: this.wrap };
   }
 
   // One request at a time; the newest wishes go with the next.
   #ask() {
-    const { clip, seconds, wrap } = this.#place(this.time), old = this.#old;
+    const old = this.#old, { clip, seconds, wrap } = this.#place(this.switching === "waiting" ? this.start + old.at : this.time);
     const fading = old && { clip: old.clip, seconds: old.seconds, wrap: old.wrap, begun: old.begun,
       share: old.fade > 0 ? 1 - old.passed / old.fade : 0 };
     const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify(fading)}`;
@@ -307,7 +306,6 @@ export class ATHMotion extends EventDispatcher {
 
   #take({ shown, frame, data, heat, ms, held, clip, exactly }) {
     const changed = shown !== this.depth;
-    if (this.#old && clip === this.clip.index) this.#begin(exactly);
     Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, depth: shown });
     if (this.mode === "positions") this.#write(data);
     else this.#upload(shown, data);
@@ -315,16 +313,17 @@ export class ATHMotion extends EventDispatcher {
       for (const geometry of this.#geometries) this.#setParts(geometry);
       this.dispatchEvent({ type: "depth", depth: shown });
     }
+    if (this.switching === "waiting" && clip === this.clip.index) this.#begin(this.#old);
+    if (exactly) this.#old = null;
     this.dispatchEvent({ type: "frame", frame, depth: shown });
   }
 
   // The clip that plays is seen for the first time.
-  #begin(atOnce) {
-    const { begun } = this.#old;
-    this.#old.begun = true;
-    if (atOnce) this.#old = null;
-    else this.#endFade();
-    if (!begun) this.dispatchEvent({ type: "clip", clip: this.clip });
+  #begin(old) {
+    old.begun = true;
+    this.start = this.time - old.at;
+    this.#endFade();
+    this.dispatchEvent({ type: "clip", clip: this.clip });
   }
 
   #upload(depth, data) {

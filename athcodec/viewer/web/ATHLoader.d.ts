@@ -112,7 +112,7 @@ export interface ATHMotionEvents {
   frame: { frame: number; depth: number };
   /** Another depth is shown. */
   depth: { depth: number };
-  /** A clip that play() asked for is shown for the first time, or begins to fade in. */
+  /** A clip that play() asked for begins: it is shown, or fades in. */
   clip: { clip: ATHClip };
   /** Bytes came. */
   progress: { loaded: number; total: number };
@@ -133,12 +133,12 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** The clip that plays. */
   readonly clip: ATHClip;
   /** Plays another clip, by its number or name: what of it is not here is fetched, and until its first segment is decoded
-   * the clip before goes on. It begins at the present time, `at` (default 0) seconds from its first frame. fade: for so
-   * many seconds of time that passes in setTime() the two are blended, vertex by vertex and matrix by matrix. Throws
-   * RangeError where there is no such clip. */
+   * the clip before goes on. Then it begins, `at` (default 0) seconds from its first frame. fade: for so many seconds of
+   * time that passes in setTime() the two are blended, vertex by vertex and matrix by matrix. Throws RangeError where
+   * there is no such clip. */
   play(clip: string | number, options?: { fade?: number; at?: number }): this;
-  /** Whether the clip before is still shown, alone or fading out. */
-  readonly switching: boolean;
+  /** Whether the clip before is still shown: "waiting" for the one that plays, "fading" into it; else null. */
+  readonly switching: "waiting" | "fading" | null;
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
   readonly depthCount: number;
