@@ -123,7 +123,8 @@ function describe() {
   const [ath] = opened, { info, clips } = ath.motion, frames = `${countText(info.frameCount)} frames`;
   $("name").textContent = opened.map((each) => each.fileName).join("  ·  ");
   document.title = `${ath.fileName} – athcodec`;
-  $("summary").textContent = `${countText(info.vertexCount)} vertices, ${countText(info.branchCount)} branches, ${clips.length > 1 ? `${clips.length} clips of ${frames}` : frames}`;
+  $("summary").textContent = [`${countText(info.vertexCount)} vertices`, `${countText(info.branchCount)} branches`,
+    clips.length > 1 ? `${clips.length} clips of ${frames}` : frames].join(", ");
 }
 
 // ---- what is on the stage ----

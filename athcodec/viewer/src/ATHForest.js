@@ -28,7 +28,8 @@ export class ATHForest extends Group {
   culled = 0;
 
   #ath;
-  #bins = new Map();    // of every clip: {level, tolerance, drawn, place, turn, size, uniforms, filled, rows, perRow}, the finest first
+  #bins = new Map();    // of every clip, the finest first: {level, tolerance, drawn, place, turn, size, uniforms, filled,
+                        // rows, perRow}
   #shown = [];          // those that the motion's clip was drawn with last
   #baking = new Set();
   #baked = new Map();   // of every clip: depths
@@ -64,7 +65,8 @@ export class ATHForest extends Group {
       this.#motions.set(clip, motion.clone().play(clip).setDepth(motion.depthCount - 1));
     const numberOf = (clip) => this.#motions.get(clip)?.clip.index ?? MOTIONS;
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
-    this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) => [Math.cos(angle), Math.sin(angle), seconds, numberOf(clip)]));
+    this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) =>
+      [Math.cos(angle), Math.sin(angle), seconds, numberOf(clip)]));
     for (const bin of this.#allBins()) this.#makeRoom(bin);
   }
 
@@ -172,8 +174,8 @@ export class ATHForest extends Group {
         continue;
       }
       const distance = Math.max(eye.distanceTo(place) - 0.5 * reach * size, 1e-6);
-      const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown;
-      if (own.length > 0) this.#put(i, own[this.levelOfDetail ? this.#choose(own, this.pixels * pixel * distance / size) : 0], seconds);
+      const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
+      if (own.length > 0) this.#put(i, own[this.levelOfDetail ? this.#choose(own, tolerance) : 0], seconds);
     }
     this.counts = new Array(this.#ath.motion.depthCount).fill(0);
     this.vertices = 0;

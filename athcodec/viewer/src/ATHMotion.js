@@ -18,7 +18,9 @@ export function dataTexture(data) {
 }
 
 /** Seconds of a clip and of the way from its last frame back to the first. */
-export const roundOf = ({ duration, frameCount }) => (frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0);
+export function roundOf({ duration, frameCount }) {
+  return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
+}
 
 const SHAPES = 0x13; // chunks that serve all segments
 
@@ -114,8 +116,9 @@ export class ATHMotion extends EventDispatcher {
   /** Bytes of the clip's motion up to a depth. */
   motionBytes(depth) {
     const { firstSegment, segmentCount } = this.clip;
-    const needed = ({ kind, segment }) => kind === SHAPES || (segment >= firstSegment && segment < firstSegment + segmentCount);
-    return this.#channel.chunks.reduce((sum, chunk) => sum + (chunk.level <= depth && needed(chunk) ? chunk.length : 0), 0);
+    const needed = ({ level, kind, segment }) => level <= depth
+      && (kind === SHAPES || (segment >= firstSegment && segment < firstSegment + segmentCount));
+    return this.#channel.chunks.reduce((sum, chunk) => sum + (needed(chunk) ? chunk.length : 0), 0);
   }
 
   /** Bits per second of motion at a depth. */
@@ -136,7 +139,8 @@ export class ATHMotion extends EventDispatcher {
   /** The parts of the clip that can be shown at `depth`, in seconds from its first frame: [{start, end}]. */
   ready(depth) {
     const { times, segments } = this.#channel, { firstFrame, frameCount, firstSegment } = this.clip, found = [];
-    const last = firstFrame + frameCount - 1, at = (segment) => times[Math.min(segments[segment], last)] - times[firstFrame];
+    const last = firstFrame + frameCount - 1;
+    const at = (segment) => times[Math.min(segments[segment], last)] - times[firstFrame];
     this.readyDepths.forEach((level, i) => {
       if (level < depth) return;
       const start = at(firstSegment + i), end = at(firstSegment + i + 1);
@@ -180,13 +184,15 @@ export class ATHMotion extends EventDispatcher {
   play(clip, { fade = 0, at = 0 } = {}) {
     const next = this.clips.find(({ index, name }) => clip === index || clip === name);
     if (!next) throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
-    const { clip: { index }, time, start, wrap } = this, old = this.#old;
-    const mostlyOld = old && (!old.begun || 2 * old.passed < old.fade);
-    if (this.depth >= 0)
-      this.#old = { ...(mostlyOld ? old : { clip: index, seconds: time - start, wrap }), at, fade, passed: 0, begun: false };
-    Object.assign(this, { clip: next, start: time - at });
+    if (this.depth >= 0) this.#old = { ...this.#mostlyShown(), at, fade, passed: 0, begun: false };
+    Object.assign(this, { clip: next, start: this.time - at });
     this.#ask();
     return this;
+  }
+
+  #mostlyShown() {
+    const old = this.#old;
+    return old && (!old.begun || 2 * old.passed < old.fade) ? old : this.#place(this.time);
   }
 
   #endFade() {
@@ -257,7 +263,8 @@ export class ATHMotion extends EventDispatcher {
 
   // One request at a time; the newest wishes go with the next.
   #ask() {
-    const old = this.#old, { clip, seconds, wrap } = this.#place(this.switching === "waiting" ? this.start + old.at : this.time);
+    const old = this.#old, waits = this.switching === "waiting";
+    const { clip, seconds, wrap } = this.#place(waits ? this.start + old.at : this.time);
     const fading = old && { clip: old.clip, seconds: old.seconds, wrap: old.wrap, begun: old.begun,
       share: old.fade > 0 ? 1 - old.passed / old.fade : 0 };
     const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify(fading)}`;

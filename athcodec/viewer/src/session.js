@@ -90,8 +90,10 @@ export class Session {
     const file = this.#file, { info } = file, statics = readPrelude(file), clips = this.#clips();
     this.#faces = statics.faces;
     this.#first = this.clip === null ? 0 : clips.findIndex(({ name }) => name === this.clip);
-    if (this.#first < 0) throw Object.assign(
-      new Error(`clip: got ${this.clip}, expected one of ${clips.map(({ name }) => name).join(", ")}`), { codeName: "CLIP" });
+    if (this.#first < 0) {
+      const names = clips.map(({ name }) => name).join(", ");
+      throw Object.assign(new Error(`clip: got ${this.clip}, expected one of ${names}`), { codeName: "CLIP" });
+    }
     this.#order = file.vertexSource();
     this.post({
       type: "opened", info: { ...info }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
@@ -440,7 +442,8 @@ export class Session {
   }
 
   /** The picture of a view: see ATHMotion's #picture. */
-  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, heat = false, positions = false, buffer = null }) {
+  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, heat = false, positions = false,
+    buffer = null }) {
     if (!this.#opened) return;
     const start = performance.now(), frame = this.#file.frameAt(seconds, wrap, clip);
     let shown = null;
