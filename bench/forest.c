@@ -1,11 +1,12 @@
 /* Plays a forest for forest.py, which says what is measured and why. One thread, all files in memory, of which a decoder
- * is fed only what it asks for. Prints one JSON object. Hosted C11 over ath.h alone. Judges nothing.
+ * is fed only what it asks for. Prints one JSON object. C11 and POSIX over ath.h alone. Judges nothing.
  *
- *     forest units ROUNDS FILE.ath...       what one preparation, pose and choice of a level cost: medians over ROUNDS
+ *     forest units ROUNDS FILE.ath...       what one preparation, pose and choice of level costs: medians over ROUNDS
  *     forest play SCENE SECONDS RATE        all instances of a scene, at RATE pictures a second
  *
  * A scene is text: the number of phases; that of clips, and a path for each; that of instances, and for each its clip,
  * distance and phase. */
+#define _POSIX_C_SOURCE 200112L /* clock_gettime */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +18,7 @@
 enum { LEVELS = 32, SLOTS = 3, MOTION = 16, STATIC = 32, SHAPES = 19, UNIT_POSES = 64, CHOICES = 4096 };
 
 static const double FOV = 1.0471975511965976, SCREEN = 1080.0, PIXELS = 1.0; /* vertical; radians, pixels */
-static const double BETWEEN = 0.37; /* of the way to the next frame: what is shown is a blend */
+static const double GOLDEN = 0.6180339887498949;
 static const double HASTE = 1.25;   /* preparations go on so much faster than they have to */
 
 /* A clip, at each level in use with the segment that plays, the one before and the one behind it. It has the file to
@@ -58,10 +59,11 @@ typedef struct {
 
 /* ---- helpers ---- */
 
+/* Of this thread's processor: what else the machine has to do does not count. */
 static double now_ms(void)
 {
     struct timespec time;
-    timespec_get(&time, TIME_UTC);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
     return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
 }
 
@@ -202,52 +204,84 @@ static double prepare_ms(clip *clip, int32_t level, void *work, size_t work_byte
     return now_ms() - start;
 }
 
-/* Poses of the last segment, which is the one that is left. */
-static double pose_us(const clip *clip, int32_t level, float *out)
+static void print_medians(const char *before, const char *name, double *values, int rounds, int levels)
 {
-    int32_t last = clip->info.segment_count - 1, first = ath_segment_start(clip->file, last);
-    int32_t frames = clip->info.frame_count - first - 1;
-    double start = now_ms();
-    for (int i = 0; i < UNIT_POSES; i++)
-        write_pose(clip, level, frames > 0 ? first + i % frames + BETWEEN : first, out);
-    return (now_ms() - start) * 1e3 / UNIT_POSES;
-}
-
-static void print_medians(const char *name, double *values, int rounds, int levels)
-{
-    printf(", \"%s\": [", name);
+    printf("%s\"%s\": [", before, name);
     for (int level = 0; level < levels; level++)
         printf("%s%.15g", level ? ", " : "", quantile(values + level * rounds, rounds, 0.5));
     printf("]");
 }
 
-static void clip_units(const char *path, int rounds, const char *before)
+/* The first of all rounds does not count. */
+static void print_preparing(clip *clip, int rounds, void *work, size_t work_bytes)
 {
-    clip clip = {0};
-    open_clip(path, &clip);
-    int32_t levels = clip.info.level_count;
-    size_t work_bytes = ath_work_size(clip.file), floats = 12 * (size_t)clip.info.node_count
-                                                           + 3 * (size_t)clip.info.vertex_count;
-    void *work = memory_of(work_bytes);
-    float *out = (float *)memory_of(floats * sizeof *out);
-    double *prepared = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
-    double *posed = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
-    for (int32_t s = 0; s < clip.info.segment_count; s++)
-        for (int32_t level = 0; level < levels; level++) feed(&clip, s, level);
-    for (int32_t level = 0; level < levels; level++)
-        clip.slots[level][0] = (ath_segment *)memory_of(ath_segment_size(clip.file, level));
-    for (int round = -1; round < rounds; round++) /* the first one does not count */
-        for (int32_t level = 0; level < levels; level++) {
-            int at = level * rounds + (round < 0 ? 0 : round);
-            prepared[at] = prepare_ms(&clip, level, work, work_bytes);
-            posed[at] = pose_us(&clip, level, out);
-        }
+    int32_t levels = clip->info.level_count;
+    double *values = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
+    for (int round = -1; round < rounds; round++)
+        for (int32_t level = 0; level < levels; level++)
+            values[level * rounds + (round < 0 ? 0 : round)] = prepare_ms(clip, level, work, work_bytes);
+    print_medians("", "prepare_ms", values, rounds, levels);
+    free(values);
+}
+
+/* One pose of a level, of each clip in turn, so that it costs more where the segments of all do not fit into the
+ * processor's caches. Of the last segments, which are those that are left. */
+static double pose_us(clip *clips, int count, int32_t level, float **out)
+{
+    int poses = 0;
     double start = now_ms();
-    for (int i = 0; i < CHOICES; i++) ath_depth_for(clip.file, 0, clip.info.segment_count - 1, 10.0 + i, FOV, SCREEN, PIXELS);
-    put(before, "choice_us", (now_ms() - start) * 1e3 / CHOICES);
-    print_medians("prepare_ms", prepared, rounds, levels);
-    print_medians("pose_us", posed, rounds, levels);
-    printf("}");
+    for (int i = 0; i < UNIT_POSES; i++)
+        for (int c = 0; c < count; c++) {
+            const clip *clip = clips + c;
+            int32_t first = ath_segment_start(clip->file, clip->info.segment_count - 1);
+            double frames = clip->info.frame_count - first - 1, turns = GOLDEN * i;
+            if (level >= clip->info.level_count) continue;
+            write_pose(clip, level, first + frames * (turns - floor(turns)), out[c]);
+            poses++;
+        }
+    return (now_ms() - start) * 1e3 / poses;
+}
+
+static void print_poses(clip *clips, int count, int32_t levels, int rounds)
+{
+    float **out = (float **)memory_of((size_t)count * sizeof *out);
+    double *values = (double *)memory_of(sizeof(double) * (size_t)(rounds * levels));
+    for (int c = 0; c < count; c++) {
+        size_t floats = 12 * (size_t)clips[c].info.node_count + 3 * (size_t)clips[c].info.vertex_count;
+        out[c] = (float *)memory_of(floats * sizeof(float));
+    }
+    for (int round = -1; round < rounds; round++)
+        for (int32_t level = 0; level < levels; level++)
+            values[level * rounds + (round < 0 ? 0 : round)] = pose_us(clips, count, level, out);
+    print_medians(", ", "pose_us", values, rounds, levels);
+}
+
+static void units(char **paths, int count, int rounds)
+{
+    clip *clips = (clip *)memory_of((size_t)count * sizeof *clips);
+    int32_t levels = 0;
+    memset(clips, 0, (size_t)count * sizeof *clips);
+    printf("{\"clips\": [");
+    for (int c = 0; c < count; c++) {
+        clip *clip = clips + c;
+        open_clip(paths[c], clip);
+        size_t work_bytes = ath_work_size(clip->file);
+        void *work = memory_of(work_bytes);
+        for (int32_t level = 0; level < clip->info.level_count; level++) {
+            for (int32_t s = 0; s < clip->info.segment_count; s++) feed(clip, s, level);
+            clip->slots[level][0] = (ath_segment *)memory_of(ath_segment_size(clip->file, level));
+        }
+        if (clip->info.level_count > levels) levels = clip->info.level_count;
+        printf(c ? ",\n {" : "{");
+        print_preparing(clip, rounds, work, work_bytes);
+        printf("}");
+        free(work);
+    }
+    double start = now_ms();
+    for (int i = 0; i < CHOICES; i++) ath_depth_for(clips[i % count].file, 0, 0, 10.0 + i, FOV, SCREEN, PIXELS);
+    put("],\n ", "choice_us", (now_ms() - start) * 1e3 / CHOICES);
+    print_poses(clips, count, levels, rounds);
+    printf("}\n");
 }
 
 /* ---- the scene ---- */
@@ -274,7 +308,7 @@ static void read_scene(const char *path, forest *forest)
         expect(fgets(name, sizeof name, stream) != 0, path);
         name[strcspn(name, "\n")] = 0;
         open_clip(name, forest->clips + c);
-        double turns = 0.6180339887498949 * c;
+        double turns = GOLDEN * c;
         forest->clips[c].ahead = forest->clips[c].loop * (1.0 + turns - floor(turns));
     }
     expect(fscanf(stream, "%d", &forest->instance_count) == 1, path);
@@ -488,8 +522,7 @@ static void play(const char *scene, double seconds, double rate)
 int main(int argc, char **argv)
 {
     if (argc > 3 && strcmp(argv[1], "units") == 0) {
-        for (int i = 3; i < argc; i++) clip_units(argv[i], atoi(argv[2]), i == 3 ? "[{" : ",\n {");
-        printf("]\n");
+        units(argv + 3, argc - 3, atoi(argv[2]));
     } else if (argc == 5 && strcmp(argv[1], "play") == 0) {
         play(argv[2], atof(argv[3]), atof(argv[4]));
     } else {

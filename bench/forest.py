@@ -9,9 +9,10 @@ The player is that of an engine. Clips loop, and are streamed: of each clip and 
 prepared, the one before, and, a few steps a picture, the one behind; nothing else is kept, so that memory does not
 depend on the length of a clip (clips of up to three segments stay). Plants of a clip lag behind it by one of P phases,
 spread over a segment's length. Plants of the same clip, level and phase share a pose (node matrices and exact vertices,
-what a graphics processor needs), made once a picture; what a plant costs by itself is the choice of its level.
+what a graphics processor needs), made once a picture, clip by clip; what a plant costs by itself is the choice of its
+level.
 
-On paper, with what one preparation, pose and choice of a clip's level cost alone:
+On paper, with what one preparation, pose and choice of level cost, poses made of as many clips in turn:
 
     bytes a second = sum over clips of bytes / seconds of the clip, where bytes are those of
                          stems up to the deepest level in use, maps of the levels in use, corrections of the last
@@ -22,9 +23,10 @@ On paper, with what one preparation, pose and choice of a clip's level cost alon
 Bytes are of streaming: who keeps the files in memory reads each once. Prelude and shapes are read once, at the start.
 Maps of coarser levels, which subtrees that move as one need at finer ones too, are not on paper.
 
-The measured forest is played by forest.c, one thread, files in memory, for as long as a clip; bytes are what its
-decoders were fed. Clips are made of one clip, each its own way: turned, mirrored, its sway larger or smaller, from
-another frame on; it is played forwards and backwards, slowing down before it turns, so that it loops.
+The measured forest is played by forest.c, one thread, files in memory, for as long as a clip; milliseconds are of
+processor time, bytes what its decoders were fed. Clips are made of one clip, each its own way: turned, mirrored, its
+sway larger or smaller, from another frame on; it is played forwards and backwards, slowing down before it turns, so
+that it loops.
 """
 
 from __future__ import annotations
@@ -58,11 +60,11 @@ SLOTS = 3  # segments that forest.c has prepared of a clip and level
 
 NOTE = """
 Each clip: {frames} frames of {vertices:,} vertices, {seconds:g} s in {segments} segments, made of {source}, bound
-{bound:g}; {rate} pictures a second, one thread, means over {seconds:g} s; medians of {rounds} rounds. Phases: that
-instances of a clip may have, "own": each one its own. Levels: instances at level 0, 1, ... Poses: that are made in each
-picture. Paper: by the formula, from what one preparation, pose and choice cost in the same process with nothing
-beside it, so from the processor's caches, which the segments of many clips do not fit into; measured: played. p99: of the pictures, the 99th percentile. MB: files opened, bases, prepared segments, one
-work memory; not the compressed bytes, nor the poses.
+{bound:g}; {rate} pictures a second, one thread, processor time, means over {seconds:g} s; medians of {rounds} rounds.
+Phases: that instances of a clip may have, "own": each one its own. Levels: instances at level 0, 1, ... Poses: that are
+made in each picture. Paper: by the formula, from what one of each costs (below); measured: played. p99: of the
+pictures, the 99th percentile. MB: files opened, bases, prepared segments, one work memory; not the compressed bytes,
+nor the poses.
 """
 FORMULA = """
 kB/s = sum over clips of (stems up to the deepest level in use, maps of the levels in use, corrections of the last) /
@@ -76,13 +78,14 @@ Paper and measured, ms a picture: choosing levels, preparing segments, making po
 finished at once. Start: all that is prepared before the first picture.
 """
 UNITS_NOTE = """
-Means over clips. Prepare: all segments of a clip; pose: one, between two frames; bytes: of motion, to play this level.
+Means over clips. Prepare: all segments of a clip; pose: one between two frames, of the clips in turn: of many they come
+from memory, of few from the processor's caches; bytes: of motion, to play this level.
 """
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A clip of the forest: its file, and what parts of its work cost alone. It has a file to itself."""
+    """A clip of the forest: its file, which it has to itself, and what parts of its work cost."""
 
     path: Path
     choice_us: float
@@ -138,7 +141,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         folder = Path(name)
         program = compile_program(folder, "forest")
         files = _make_clips(args, folder)
-        units = _units(program, files, args.rounds)
+        units = {count: _units(program, files[:count], args.rounds) for count in args.clips}
         side = _side(files[0])
         for scene in _scenes(args, units, side):
             played = scene.play(program, folder, args.rounds)
@@ -146,7 +149,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             rows.append(scene.row(paper, played))
             parts.append(scene.parts(paper, played))
             broken += scene.differences(played)
-        unit_rows, facts = list(_unit_rows(units)), units[0].facts
+        unit_rows = [row for each in units.values() for row in _unit_rows(each)]
+        facts = units[args.clips[0]][0].facts
     note = NOTE.format(**facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE,
                        rounds=args.rounds)
     return {"tables": [table("Forests", rows, note, FORMULA.format(side=side, wedge=np.degrees(WEDGE))),
@@ -197,7 +201,8 @@ def _side(file: Path) -> float:
 
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
     measured = _output(program, "units", rounds, *files)
-    return [Unit(file, **each) for file, each in zip(files, measured, strict=True)]
+    return [Unit(file, measured["choice_us"], each["prepare_ms"], measured["pose_us"])
+            for file, each in zip(files, measured["clips"], strict=True)]
 
 
 def _output(program: Path, *words: object) -> Any:
@@ -207,9 +212,8 @@ def _output(program: Path, *words: object) -> Any:
 
 def _unit_rows(units: list[Unit]) -> Iterator[dict[str, Any]]:
     for level in range(min(len(unit.pose_us) for unit in units)):
-        yield {"level": level, "prepare ms": np.mean([unit.prepare_ms[level] for unit in units]),
-               "pose us": np.mean([unit.pose_us[level] for unit in units]),
-               "choice us": np.mean([unit.choice_us for unit in units]),
+        yield {"clips": len(units), "level": level, "prepare ms": np.mean([unit.prepare_ms[level] for unit in units]),
+               "pose us": units[0].pose_us[level], "choice us": units[0].choice_us,
                "bytes": round(np.mean([unit.bytes({level}) for unit in units])),
                "prelude": round(np.mean([unit.facts["prelude"] for unit in units]))}
 
@@ -305,14 +309,14 @@ def _ms(figures: dict[str, float]) -> float:
     return figures["choose_ms"] + figures["prepare_ms"] + figures["pose_ms"]
 
 
-def _scenes(args: argparse.Namespace, units: list[Unit], side: float) -> Iterator[Scene]:
+def _scenes(args: argparse.Namespace, units: dict[int, list[Unit]], side: float) -> Iterator[Scene]:
     """Every number of instances with every number of clips that it can have."""
     for instances in args.instances:
         for clips in args.clips:
             if clips > instances:
                 continue
             for phases in args.phases if instances > clips else args.phases[:1]:
-                yield Scene(units[:clips], _distances(instances, side), phases)
+                yield Scene(units[clips], _distances(instances, side), phases)
 
 
 def _distances(count: int, side: float) -> np.ndarray:
