@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -33,7 +34,7 @@ def run_bench(tmp_path, *words, code=0, **environment):
     file = tmp_path / "result.json"
     path = {"PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run([sys.executable, "-m", "bench", *words, "--json", str(file)], cwd=ROOT, text=True,
-                          capture_output=True, timeout=120, env=os.environ | path | environment)
+                          capture_output=True, timeout=300, env=os.environ | path | environment)
     assert done.returncode == code, done.stderr
     return done.stdout, json.loads(file.read_text())
 
@@ -263,9 +264,10 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path,
     one, three = (row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2)
     assert 2 < three / one < 4
     assert all(row["prepare"] > 0 for row in parts), "of five segments one goes and one comes"
-    assert [row["bytes"] for row in units] == sorted(row["bytes"] for row in units)
+    assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(units) if finer["level"] > row["level"])
 
 
+@pytest.mark.slow
 def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
     _, result = run_bench(tmp_path, "forest", "--of", bushy_file, "--instances", "20", "--clips", "2", "--phases", "3",
                           "--frames", "300", "--rounds", "1")
