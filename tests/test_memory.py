@@ -1,0 +1,58 @@
+"""Memory of exporting: that of a few segments, however many frames there are. Each format in a process of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.exporters import FORMATS
+
+VERTICES, FRAMES, TIMES = 12_000, 96, 5
+EXPORT = """
+import resource, sys
+import athcodec
+from athcodec.excerpt import Excerpt
+
+with athcodec.open(sys.argv[1]) as decoder:
+    athcodec.write(Excerpt(decoder), sys.argv[2], sys.argv[3], animation="morphs")
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+STREAMING = [kind for kind in FORMATS if kind.name in ("hdf5", "npz", "pc2", "mdd", "xdmf", "vtk", "sequence", "usd",
+                                                       "alembic", "gltf")]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The same motion once, and TIMES times over."""
+    rest = np.cumsum(np.random.default_rng(0).uniform(0, 0.01, (VERTICES, 3)), axis=0).astype(np.float32)
+    paths = []
+    for frames in (FRAMES, TIMES * FRAMES):
+        sway = np.sin(np.arange(frames) / 7)[:, None, None] * np.linspace(0, 1, VERTICES)[None, :, None] ** 2
+        clip = athcodec.MotionClip((rest + sway * [1.0, 0.0, 0.2]).astype(np.float32), np.arange(frames) / 30,
+                                   np.zeros(VERTICES, int), [-1], rest=rest)
+        path = tmp_path_factory.mktemp("long") / f"{frames}.ath"
+        athcodec.encode(clip, path, rel_error=1e-3, segment_frames=32, effort="fast")
+        paths.append(path)
+    return paths
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
+@pytest.mark.parametrize("kind", STREAMING, ids=lambda kind: kind.name)
+def test_exporting_more_frames_takes_no_more_memory(kind, files, tmp_path):
+    try:
+        kind.check()
+    except athcodec.MissingExtra as missing:
+        pytest.skip(str(missing))
+    few, many = (_peak(path, tmp_path / f"{path.stem}{kind.suffixes[0]}", kind.name) for path in files)
+    added = 12 * VERTICES * FRAMES * (TIMES - 1)  # bytes of the further frames
+    assert many - few < 0.5 * added
+
+
+def _peak(source, target, kind: str) -> int:
+    done = subprocess.run([sys.executable, "-c", EXPORT, str(source), str(target), kind], check=True,
+                          capture_output=True, text=True)
+    return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)
