@@ -713,13 +713,9 @@ def _progress() -> Iterator[Report | None]:
         task = bar.add_task("", total=1.0)
 
         def report(stage: str, fraction: float) -> None:
-            # The search for a target size runs the other stages again and again: its own count is shown.
-            if bar.tasks[task].description == "size" and stage != "size":
-                return
-            # Each stage counts from 0, at its own pace: the time left is that of the stage.
-            if stage != bar.tasks[task].description or fraction < bar.tasks[task].completed:
-                bar.reset(task, total=1.0, description=stage)
-            bar.update(task, completed=fraction)
+            if fraction < bar.tasks[task].completed:  # other work, such as measuring what was encoded
+                bar.reset(task, total=1.0)
+            bar.update(task, completed=fraction, description=stage)
 
         yield report
 

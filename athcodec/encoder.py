@@ -32,9 +32,11 @@ from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.search import EFFORTS, Progress, decide
+from athcodec.progress import Course, Progress
+from athcodec.progress import weights as stage_weights
+from athcodec.search import EFFORTS, decide
 from athcodec.shapes import Shapes
-from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, split_segments
 
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
@@ -103,13 +105,14 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     on the bound for each vertex, (N,) above 0, or the name of the attribute that holds them: vertex v is within
     weights[v] times the bound, the largest of which the file promises for all. attributes: "none" drops faces, edges
     and named arrays. jobs: threads (default: one per core, at most 4, fewer for large meshes); the file is the same
-    whatever their number, memory grows with it. A clip without branches gets those that discovery.py finds. Several
-    clips of one plant go into one file when they have been joined (joining.py). Raises ClipError, BoundError, ValueError,
-    OSError.
+    whatever their number, memory grows with it. progress: called with the stage ("survey", "search", "motion" ...) and
+    about what part of all the time is over; it never falls and ends with 1.0. A clip without branches gets those that
+    discovery.py finds. Several clips of one plant go into one file when they have been joined (joining.py). Raises
+    ClipError, BoundError, ValueError, OSError.
     """
-    report = progress or _silent
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
     check_target(path)  # before any work
+    report = _course(clip, progress, segment_frames, effort, target_size)
     job = _Job.begin(clip, report, jobs, rel_error=rel_error, segment_frames=segment_frames, tam=tam,
                      exact_rest=exact_rest, lossless=lossless, weights=weights, attributes=attributes, effort=effort)
     bound = job.bound(max_error, rel_error, target_size)
@@ -150,19 +153,20 @@ def draft(clip: MotionClip, *, max_error: float | None = None, rel_error: float 
           effort: str = "default", jobs: int | None = None, progress: Progress | None = None, **options) -> Draft:
     """The first step of `encode`, whose options it takes: branches, survey, and the search for settings."""
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
+    report = _course(clip, progress, segment_frames, effort, target_size, draft=True)
     with clip.watched():
-        job = _Job.begin(clip, progress or _silent, jobs, rel_error=rel_error, segment_frames=segment_frames,
+        job = _Job.begin(clip, report, jobs, rel_error=rel_error, segment_frames=segment_frames,
                          attributes=attributes, effort=effort, **options)
         return job.draft(job.decide(job.bound(max_error, rel_error, target_size)))
 
 
-def code_segments(clip: MotionClip, draft: Draft, segments: Iterable[int], *, jobs: int | None = None,
-                  progress: Progress | None = None) -> Iterator[CodedSegment]:
+def code_segments(clip: MotionClip, draft: Draft, segments: Iterable[int], *,
+                  jobs: int | None = None) -> Iterator[CodedSegment]:
     """The second step: some of the segments 0 to draft.segment_count - 1, in ascending order, one after the other.
 
     Raises ClipError where the clip is not the one that the draft was made of, as far as that shows.
     """
-    job = _Job.resume(clip, draft, progress or _silent, jobs)
+    job = _Job.resume(clip, draft, _silent, jobs)
     with clip.watched():
         yield from job.coded(job.decided(draft), list(segments))
 
@@ -172,13 +176,21 @@ def write(clip: MotionClip, draft: Draft, coded: Iterable[CodedSegment], path, *
     """The third step: the file that `encode` writes, of all segments, which may come in any order. Raises as
     `code_segments` does, and ValueError where segments are missing."""
     check_target(path)
-    job = _Job.resume(clip, draft, progress or _silent)
+    job = _Job.resume(clip, draft, Course(progress, {"motion": 1.0}))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         return job.write(path, out, spool, job.decided(draft), coded)
 
 
 def _silent(stage: str, fraction: float) -> None:
     pass
+
+
+def _course(clip: MotionClip, progress: Progress | None, segment_frames: int | None, effort: str,
+            target_size: int | None, draft: bool = False) -> Course:
+    segments = split_segments(clip.frame_count, clip.vertex_count, segment_frames or DEFAULT_SEGMENT,
+                              ct.Limits.memory_bytes)
+    return Course(progress, stage_weights(clip.vertex_count, segments, effort, branches=not clip.has_branches,
+                                    sizes=target_size is not None, motion=not draft))
 
 
 def _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs) -> None:
@@ -210,7 +222,7 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _best_branches(clip: MotionClip, fraction: float) -> Found:
+def _best_branches(clip: MotionClip, fraction: float, report: Progress) -> Found:
     """Of the branches that may be right those that make the smallest file of a few frames."""
     found = candidates(clip)
     if len(found) == 1:
@@ -219,14 +231,16 @@ def _best_branches(clip: MotionClip, fraction: float) -> Found:
     stop = min(clip.frame_count, start + TRIAL_FRAMES)
     some = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.rest.astype(clip.rest_dtype))
 
-    def size(each: Found) -> float:
+    def size(each: Found, part: float) -> float:
+        report("branches", part)
         return _trial_size(with_branches(some, each), fraction, clip.frame_count / some.frame_count)
 
-    least, best = min(((size(each), each) for each in found), key=lambda tried: tried[0])
+    least, best = min(((size(each, (i + 1) / (len(found) + 2)), each) for i, each in enumerate(found)),
+                      key=lambda tried: tried[0])
     if best.stem_index is None or best.method != "motion":
         return best
     unordered = dataclasses.replace(best, stem_index=None)  # the source's order costs nothing to say
-    return unordered if size(unordered) < least else best
+    return unordered if size(unordered, (len(found) + 1) / (len(found) + 2)) < least else best
 
 
 def _trial_size(clip: MotionClip, fraction: float, longer: float) -> float:
@@ -319,7 +333,7 @@ class _Job:
     keep_static: bool
     effort: str
     lossless: bool
-    report: Progress = _silent
+    report: Progress = _silent  # by stages, see progress.py
     jobs: int | None = None
     found: Found | None = None
     weights: str | np.ndarray | None = None
@@ -334,7 +348,7 @@ class _Job:
         found = None
         if not clip.has_branches:
             report("branches", 0.0)
-            found = _best_branches(clip, rel_error or DEFAULT_REL_ERROR)
+            found = _best_branches(clip, rel_error or DEFAULT_REL_ERROR, report)
         clip, factors = _completed(clip, found, weights)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
@@ -553,7 +567,7 @@ def _bound_for_size(job: _Job, target: int) -> float:
 def _file_size(job: _Job, bound: float) -> float:
     with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         try:
-            result = job.encode(bound, ct.ChunkStore(spool))
+            result = dataclasses.replace(job, report=_silent).encode(bound, ct.ChunkStore(spool))
         except BoundError:
             return math.inf
     return result.store.size(result.header)

@@ -101,13 +101,17 @@ def part_of(source: Source, ath: Ath) -> Part | None:
 
     The longer the clip, the larger the part: what is spent on it remains the same share of the work.
     """
-    count = source.clip.vertex_count
-    if count <= LARGE:
+    wanted = part_vertices(source.clip.vertex_count, len(source.segments))
+    if wanted is None:
         return None
-    wanted = min(max(int(count * len(source.segments) * SEGMENT_PART), LEAST_PART), LARGE)
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
     part = Part(source, ath, branches)
-    return part if len(part.vertices) < count // 2 else None
+    return part if len(part.vertices) < source.clip.vertex_count // 2 else None
+
+
+def part_vertices(vertices: int, segments: int) -> int | None:
+    """About how many a part has; None: there is to be no part."""
+    return None if vertices <= LARGE else min(max(int(vertices * segments * SEGMENT_PART), LEAST_PART), LARGE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:

@@ -7,7 +7,7 @@ Bases, rotations, time bases and steps are searched one after the other, on a pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -31,15 +31,16 @@ from athcodec.coding import (
 )
 from athcodec.errors import BoundError
 from athcodec.part import Part, Share, part_of
+from athcodec.progress import TRIALS, Progress
 from athcodec.shapes import Components, Shapes, components, estimated_bits, learn
 from athcodec.transform import Plan, SegmentMotion, position_error
 
-EFFORTS = ("fast", "default", "best")
+EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
 LEARNING_SEGMENTS = 4  # of a clip, that shapes are learned from
 SHAPES_KEPT = 6  # between trials
+WORTH = {"_with_learned": 2, "_with_shapes": 6, "_with_node_steps": 4}  # trials, of what a step does besides
 
-Progress = Callable[[str, float], None]
 
 
 def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
@@ -80,6 +81,7 @@ class Search:
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
         self._shapes: dict[tuple, Shape] = {}
+        self._besides = 0
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -113,11 +115,16 @@ class Search:
         elif self.effort == "best":
             steps += [self._with_rotations, self._with_learned, self._with_finer_steps]
         settings = self.start
-        for done, step in enumerate([*steps, self._with_node_steps]):
-            self.report("search", done / (len(steps) + 1))
+        for step in [*steps, self._with_node_steps]:
             settings = step(settings)
+            self._tell(WORTH.get(step.__name__, 0))
         self.report("search", 1.0)
         return settings
+
+    def _tell(self, worth: int = 0) -> None:
+        """Tells how far it has come, after work that was worth so many trials besides those that were made."""
+        self._besides += worth
+        self.report("search", min((len(self._known) + self._besides) / TRIALS[self.effort], 0.99))
 
     def best_of_part(self, part: Part) -> Settings:
         """What is best for a part of the plant, for all of it; its pieces are asked one by one for their shapes."""
@@ -216,7 +223,11 @@ class Search:
         some = {self._shape_key(settings): settings for settings in candidates}  # by shape, each to be made once
         with ThreadPoolExecutor(threads(self.jobs, self.source)) as pool:
             list(pool.map(self.shape, some.values()))
-            return list(pool.map(self.cost, candidates))
+            costs = []
+            for cost in pool.map(self.cost, candidates):
+                costs.append(cost)
+                self._tell()
+            return costs
 
     def shape(self, settings: Settings) -> Shape:
         """As in earlier trials, where one had it."""

@@ -14,7 +14,7 @@ from athcodec import MotionClip
 from athcodec import clip as clip_module
 from athcodec.container import Limits
 from athcodec.errors import BoundError, ClipError
-from athcodec.transform import decoding_bytes, split_segments
+from athcodec.transform import SegmentMotion, decoding_bytes, split_segments
 from plants import chain_plant, clip_of, plant
 
 
@@ -225,16 +225,33 @@ def test_a_name_without_a_folder_is_a_file_here(small, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
-def test_progress_rises_through_the_stages(effort, small, tmp_path):
+def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tmp_path):
     calls: list[tuple[str, float]] = []
     athcodec.encode(small, tmp_path / "s.ath", segment_frames=16, effort=effort,
                     progress=lambda stage, fraction: calls.append((stage, fraction)))
-    stages = list(dict.fromkeys(stage for stage, _ in calls))
-    assert stages == ["survey", "search", "motion", "done"]
-    for stage in stages:
-        fractions = [fraction for name, fraction in calls if name == stage]
-        assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] == 1.0
-    assert [fraction for stage, fraction in calls if stage == "motion"] == pytest.approx([1 / 3, 2 / 3, 1])
+    assert list(dict.fromkeys(stage for stage, _ in calls)) == ["survey", "search", "motion", "done"]
+    fractions = [fraction for _, fraction in calls]
+    assert fractions == sorted(fractions) and 0 < fractions[0] < 0.3 and fractions[-1] == 1.0
+    assert len({fraction for stage, fraction in calls if stage == "motion"}) == 3  # one for each segment
+
+
+@pytest.mark.parametrize("effort", ["fast", "default", "best"])
+@pytest.mark.parametrize("frames", [64, 640])
+def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path, monkeypatch):
+    """Work: positions that are analysed, which is most of what a search and coding do."""
+    done, told = [0], []
+    analyse = SegmentMotion.analyse
+
+    def counted(self, source, dead_zone):
+        done[0] += source.size
+        return analyse(self, source, dead_zone)
+
+    monkeypatch.setattr(SegmentMotion, "analyse", counted)
+    athcodec.encode(endless_clip(frames, at_once=frames), tmp_path / "e.ath", segment_frames=32, effort=effort, jobs=1,
+                    progress=lambda stage, fraction: told.append((fraction, done[0])))
+    for part in (0.25, 0.5, 0.75):
+        work = max([0, *(work for fraction, work in told if fraction <= part)]) / done[0]
+        assert work == pytest.approx(part, abs=0.25)
 
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])

@@ -1,0 +1,50 @@
+"""How far the encoding of a clip has come, as one fraction from 0 to 1 that is about the part of the time.
+
+Stages count from 0 to 1 each; what each is worth follows from the numbers that they will have to work on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from athcodec.part import part_vertices
+
+Progress = Callable[[str, float], None]
+
+# Microseconds of one thread for a vertex in a frame, as `python -m bench large` has them; only their ratios matter.
+SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
+TRIALS = {"fast": 7, "default": 31, "best": 46}  # that a search is worth, for the effort
+BRANCHES = 0.5  # of all the rest, to find branches for a clip without
+SIZES = 6  # files that are made to meet a target size
+
+
+class Course:
+    """Takes each stage's own fraction, and tells the whole one, which never falls."""
+
+    def __init__(self, progress: Progress | None, weights: dict[str, float]):
+        self._progress, self._reached = progress, 0.0
+        total, before = sum(weights.values()) or 1.0, 0.0
+        self._spans = {}
+        for stage, weight in weights.items():
+            self._spans[stage] = before / total, weight / total
+            before += weight
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        start, length = self._spans.get(stage, (1.0, 0.0))
+        self._reached = max(self._reached, min(start + length * fraction, 1.0))
+        if self._progress is not None:
+            self._progress(stage, self._reached)
+
+
+def weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, branches: bool, sizes: bool,
+            motion: bool) -> dict[str, float]:
+    """What the stages are worth. branches: they have to be found first; sizes: a target is to be met; motion: it is
+    coded too, after the search."""
+    longest = max(stop - start for start, stop in segments)
+    some = vertices if (part := part_vertices(vertices, len(segments))) is None else part
+    work = {"survey": SURVEY * vertices * segments[-1][1], "search": TRIAL * TRIALS[effort] * some * longest,
+            "motion": MOTION * vertices * segments[-1][1]}
+    before = {"branches": BRANCHES * sum(work.values())} if branches else {}
+    tries = {"size": SIZES * (work["search"] + work["motion"])} if sizes else {}
+    after = work if motion else {"survey": work["survey"], "search": work["search"]}
+    return before | {"survey": after.pop("survey")} | tries | after
