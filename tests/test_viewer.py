@@ -685,8 +685,8 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
         assert pressed("a", "athcodecViewer.motion.automatic") is True
         assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Node"
         assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Skeleton"
+        assert pressed("l", "athcodecViewer.motion.wrap") == "clamp", "a file without loops was repeated"
         assert pressed("l", "athcodecViewer.motion.wrap") == "loop"
-        assert pressed("l", "athcodecViewer.motion.wrap") == "clamp"
         assert pressed("d", "athcodecViewer.plants.length") == 2
         assert pressed("f", "Boolean(athcodecViewer.state.forest) && athcodecViewer.plants.length === 1") is True
         with page.expect_download() as download:

@@ -15,7 +15,7 @@ const GOLDEN = Math.PI * (3 - Math.sqrt(5));
 const FADE = 0.4; // seconds, from one clip to the next
 
 const loader = new ATHLoader();
-// `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as the clip is marked, or what was chosen.
+// `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as is usual for the file, or what was chosen.
 const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, forest: null, dirty: true, name: "" };
 const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null };
 let plants = [], opened = [], last = 0;
@@ -471,10 +471,10 @@ function advance(seconds) {
   }
 }
 
-// null: as the clips are marked. A forest always loops.
+// null: as is usual for the file. A forest always loops.
 function setLoop(loop) {
   state.loop = loop;
-  for (const { motion } of plants) motion.wrap = state.forest || loop ? "loop" : loop === null ? "marked" : "clamp";
+  for (const { motion } of plants) motion.wrap = state.forest || loop ? "loop" : loop === null ? motion.usualWrap : "clamp";
   $("loop").setAttribute("aria-pressed", String(loops()));
   $("loop").disabled = Boolean(state.forest);
 }

@@ -30,7 +30,7 @@ export class ATHMotion extends EventDispatcher {
   clip;               // that plays, one of `clips`
   time = 0;           // seconds, as asked for
   start = 0;          // the time of the clip's first frame
-  wrap = "marked";    // "clamp", "loop", "pingpong"
+  wrap;               // "marked", "clamp", "loop", "pingpong"
   frame = 0;          // of the picture that is shown; -1: of none yet
   depth = -1;
   held = false;
@@ -63,6 +63,7 @@ export class ATHMotion extends EventDispatcher {
     this.#id = id;
     this.clip = clip;
     this.target = channel.info.levelCount - 1;
+    this.wrap = this.usualWrap;
     channel.views.set(id, this);
   }
 
@@ -74,6 +75,11 @@ export class ATHMotion extends EventDispatcher {
 
   get clips() {
     return this.#channel.clips;
+  }
+
+  /** A file that marks no clip as a loop says nothing of how they are played. */
+  get usualWrap() {
+    return this.clips.some(({ loop }) => loop) ? "marked" : "loop";
   }
 
   /** Whether the clip's first frame follows its last. */

@@ -146,9 +146,10 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Seconds, as asked for; those of the clip's first frame. */
   readonly time: number;
   readonly start: number;
-  /** After the last frame: "marked" (default: as "loop" where the clip is marked as one, else "clamp"), "loop", "clamp" or
-   * "pingpong". */
+  /** After the last frame: "marked" (as "loop" where the clip is marked as one, else "clamp"), "loop", "clamp" or
+   * "pingpong". By default usualWrap: "marked" where the file marks a clip as a loop, else "loop". */
   wrap: "marked" | "loop" | "clamp" | "pingpong";
+  readonly usualWrap: "marked" | "loop";
   /** Whether the clip repeats from its first frame, by that. */
   readonly loops: boolean;
   setTime(seconds: number): this;
