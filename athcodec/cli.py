@@ -37,7 +37,7 @@ from athcodec.ath import Thresholds
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS, Seam
-from athcodec.errors import AthError, ClipError, ClipUnavailable, LevelUnavailable, RemoteError
+from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
 from athcodec.hierarchy import branch_orders
@@ -203,17 +203,13 @@ def _hierarchy(args: argparse.Namespace) -> int:
 def _decode(args: argparse.Namespace) -> int:
     _check_output(args.output, args.input)
     with _open(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
-        if args.clip is None and len(decoder.clips) > 1:
-            names = ", ".join(clip.name for clip in decoder.clips)
-            raise ClipUnavailable(f"got several clips, {names}; expected one of them with --clip")
-        depth = decoder.deepest if args.depth is None else args.depth
-        frames = _frames(args.frames, decoder.frame_count)
+        excerpt = _excerpt(decoder, args)
         with _progress() as report:
-            athcodec.write(Excerpt(decoder, depth, frames), args.output, args.format, progress=report, gzip=args.gzip,
-                           animation=args.animation)
+            athcodec.write(excerpt, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
-            _say("warning", f"{args.input}: decoded to level {depth}; {_what_is_missing(decoder)}")
-        print(f"{args.output}: {len(frames):,} frames, {decoder.vertex_count:,} vertices, level {depth}")
+            _say("warning", f"{args.input}: decoded to level {excerpt.depth}; {_what_is_missing(decoder)}")
+        print(f"{args.output}: {excerpt.frame_count:,} frames, {excerpt.vertex_count:,} vertices, "
+              f"level {excerpt.depth}")
     return 0
 
 
@@ -353,6 +349,16 @@ def _clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionCli
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
     return joined
+
+
+def _excerpt(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
+    """What of a file is decoded: frames of a clip, or all clips."""
+    if args.clip is not None or len(decoder.clips) == 1:
+        return Excerpt(decoder, args.depth, _frames(args.frames, decoder.frame_count))
+    if args.frames != (None, None):
+        names = ", ".join(clip.name for clip in decoder.clips)
+        raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
+    return Excerpt(decoder, args.depth, all_clips=True)
 
 
 def _with_sources(decoder: Decoder, args: argparse.Namespace) -> list[tuple[Decoder, str]]:
@@ -912,7 +918,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
     verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
-    verb.add_argument("--clip", metavar="NAME", help="the clip to decode, where the file has several")
+    verb.add_argument("--clip", metavar="NAME", help="the clip to decode; without it glTF holds all of a file that "
+                      "has several, as animations of their names")
     _stats_argument(verb)
     verb.add_argument(
         "--depth", metavar="LEVEL", type=_argument(_whole),

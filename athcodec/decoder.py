@@ -40,6 +40,7 @@ from athcodec.errors import (
 )
 from athcodec.files import is_url
 from athcodec.hierarchy import Hierarchy, derived_edges
+from athcodec.joining import metadata_of
 from athcodec.transform import balanced_segments
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
@@ -172,7 +173,7 @@ class Decoder:
         with this one. Raises ClipUnavailable."""
         other = copy.copy(self)
         other._owned, other._clip, other._ready = False, self._clip_named(name), {}
-        for own in ("time", "segments", "_segment_starts", "metadata"):
+        for own in ("time", "segments", "_segment_starts"):
             other.__dict__.pop(own, None)
         return other
 
@@ -469,13 +470,15 @@ class Decoder:
         return self._indices(ct.EDGES, "EDGES")
 
     @cached_property
+    def joined_metadata(self) -> dict:
+        """Unit, up axis and whatever else the sources of all clips said of themselves, as `join` puts it together."""
+        chunk = self.container.find(ct.METADATA)
+        return ct.parse_metadata(self._payload(chunk), self.limits) if chunk else {}
+
+    @property
     def metadata(self) -> dict:
         """Unit, up axis and whatever else the source said of itself, this clip's own in place of those for all."""
-        chunk = self.container.find(ct.METADATA)
-        metadata = ct.parse_metadata(self._payload(chunk), self.limits) if chunk else {}
-        own = metadata.pop("clips", None) if len(self.clips) > 1 else None
-        own = own.get(self._clip.name) if isinstance(own, dict) else None
-        return metadata | own if isinstance(own, dict) else metadata
+        return metadata_of(self.joined_metadata, self._clip.name) if len(self.clips) > 1 else self.joined_metadata
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Some frames of an .ath file at one depth, in the shape of a clip: what exporters write.
+"""Some frames of an .ath file at one depth, or all its clips, in the shape of a clip: what exporters write.
 
 It decodes nothing itself (decoder.py) and knows no file format (exporters/).
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import polygons
+from athcodec.clip import Span, polygons, span_frames
 from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
 
@@ -20,23 +20,33 @@ class Excerpt:
     """Frames `frames` of `decoder` at level `depth` (None: the deepest complete one), vertices in the source's order.
 
     It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the excerpt; time and
-    metadata["start_frame"] are those that it has in the whole clip. Raises LevelUnavailable where depth or frames do
-    not exist.
+    metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
+    one after the other, as a MotionClip of several spans has them. Raises LevelUnavailable where depth or frames do not
+    exist.
     """
 
-    def __init__(self, decoder: Decoder, depth: int | None = None, frames: range | None = None):
+    def __init__(self, decoder: Decoder, depth: int | None = None, frames: range | None = None, *,
+                 all_clips: bool = False):
         self.decoder = decoder
         self.depth = decoder.deepest if depth is None else depth
-        self.frames = range(decoder.frame_count) if frames is None else frames
         if not 0 <= self.depth < decoder.level_count:
             raise LevelUnavailable(f"depth: got {depth}; expected 0 to {decoder.level_count - 1}")
-        if not (0 <= self.frames.start < self.frames.stop <= decoder.frame_count and self.frames.step == 1):
-            raise LevelUnavailable(f"frames: got {self.frames.start}:{self.frames.stop}, expected A:B with A < B <= "
-                                   f"{decoder.frame_count}")
+        played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
+        self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """The clips; frames of a loop that are not all it has are no loop."""
+        return tuple(Span(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
+                     for decoder, frames in self._runs)
+
+    @property
+    def span_frames(self) -> list[tuple[int, int]]:
+        return span_frames(self.spans)
 
     @property
     def frame_count(self) -> int:
-        return len(self.frames)
+        return sum(len(frames) for _, frames in self._runs)
 
     @property
     def vertex_count(self) -> int:
@@ -52,12 +62,12 @@ class Excerpt:
 
     @property
     def max_error(self) -> float:
-        """The largest distance of any vertex in any frame of the whole file at this depth from the source."""
-        return self.decoder.depths[self.depth].max_error
+        """The largest distance of any vertex in any frame of its clips at this depth from the source."""
+        return max(decoder.depths[self.depth].max_error for decoder, _ in self._runs)
 
     @property
     def time(self) -> np.ndarray:
-        return self.decoder.time[self.frames.start : self.frames.stop]
+        return np.concatenate([decoder.time[frames.start : frames.stop] for decoder, frames in self._runs])
 
     @property
     def fps(self) -> float:
@@ -68,7 +78,7 @@ class Excerpt:
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
-        return dict(self.decoder.metadata)
+        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.joined_metadata)
 
     @property
     def rest(self) -> np.ndarray:
@@ -104,13 +114,30 @@ class Excerpt:
 
     def block(self, start: int, stop: int) -> np.ndarray:
         """Frames start to stop - 1 of the excerpt, (stop - start, N, 3)."""
-        return self.decoder.positions(slice(self.frames.start + start, self.frames.start + stop), self.depth)
+        found = []
+        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+            own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
+            if own:
+                found.append(decoder.positions(slice(own.start, own.stop), self.depth))
+        return found[0] if len(found) == 1 else np.concatenate(found)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over all frames, one segment in memory at a time."""
-        for start, block in self.decoder.blocks(self.depth, frames=slice(self.frames.start, self.frames.stop)):
-            yield start - self.frames.start, block
+        for (decoder, frames), (first, _) in zip(self._runs, self.span_frames):
+            for start, block in decoder.blocks(self.depth, frames=slice(frames.start, frames.stop)):
+                yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
         """What moves as one in frame `frame` of the excerpt; see Decoder.affines."""
-        return self.decoder.affines(self.frames.start + frame, self.depth)
+        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+            if first <= frame < last:
+                return decoder.affines(frames[frame - first], self.depth)
+        raise IndexError(f"frame {frame}: expected 0 to {self.frame_count - 1}")
+
+
+def _checked(frames: range | None, frame_count: int) -> range:
+    """All frames where none are given."""
+    frames = range(frame_count) if frames is None else frames
+    if not (0 <= frames.start < frames.stop <= frame_count and frames.step == 1):
+        raise LevelUnavailable(f"frames: got {frames.start}:{frames.stop}, expected A:B with A < B <= {frame_count}")
+    return frames

@@ -1,8 +1,8 @@
 """Several clips of one plant as one, for one file; and clips that repeat without a jump.
 
 A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such clips
-one after the other; the encoder sees one long clip whose spans it codes apart. `looped` makes a clip that can be played
-over and over. Both read frames only when they are asked for.
+one after the other; the encoder sees one long clip whose spans it codes apart. `split` is its inverse. `looped` makes a
+clip that can be played over and over. All read frames only when they are asked for.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip, Span, span_frames
+from athcodec.clip import MotionClip, Span, check_spans, span_frames
 from athcodec.errors import ClipError
 
 BLEND = "loop_blend"  # metadata: frames that were blended
+OWN = "clips"  # metadata: by name, what one of several clips has of its own
+NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip and know no names or loops
 
 
 def join(clips: Mapping[str, MotionClip]) -> MotionClip:
@@ -43,6 +45,23 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
         stem_index=first.stem_index, spans=spans, resource=closing, unchanged=_all_unchanged(parts), skin=first.skin)
 
 
+def split(clip: MotionClip) -> dict[str, MotionClip]:
+    """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
+    if len(clip.spans) < 2:
+        return {_only_span("", clip).name: clip}
+    return {span.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
+                                 spans=(span,), metadata=metadata_of(clip.metadata, span.name))
+            for span, (start, stop) in zip(clip.spans, clip.span_frames)}
+
+
+def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Of one of several clips: what all have in common and what it has of its own, from those of all as one."""
+    every = metadata.get(OWN)
+    own = every.get(name) if isinstance(every, dict) else None
+    common = {key: value for key, value in metadata.items() if key != OWN}
+    return common | own if isinstance(own, dict) else common
+
+
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     """The clip as a loop: behind its last frame comes its first, after the mean time of a frame.
 
@@ -59,6 +78,23 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
         return _replaced(clip, spans=spans)
     return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], spans=spans,
                      metadata=clip.metadata | {BLEND: blend})
+
+
+def with_notes(motion: Any) -> dict[str, Any]:
+    """Metadata of a clip or an Excerpt, as far as it has any, with its name and that it is a loop."""
+    span = next(iter(getattr(motion, "spans", ())), Span("", 0))
+    metadata = getattr(motion, "metadata", None) or {}
+    return metadata | ({NAME: span.name} if span.name else {}) | ({LOOP: True} if span.loop else {})
+
+
+def take_notes(clip: MotionClip) -> None:
+    """Takes name and loop out of the metadata of a clip, and gives them to it. Raises ClipError."""
+    name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
+    name, loop = name if isinstance(name, str) else "", loop is True
+    if name or loop:
+        clip.metadata = {key: value for key, value in clip.metadata.items() if key not in (NAME, LOOP)}
+        clip.spans = (Span(name, clip.frame_count, loop),)
+        check_spans(clip.spans, clip.frame_count)
 
 
 def _replaced(clip: MotionClip, **changes: Any) -> MotionClip:
@@ -100,13 +136,13 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
-    """What all have in common, and under "clips" what each has of its own."""
+    """What all have in common, and under OWN what each has of its own."""
     every = [clip.metadata for clip in clips.values()]
     common = {key: value for key, value in every[0].items() if all(key in each and each[key] == value for each in every)}
     own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
            for name, clip in clips.items()}
     own = {name: metadata for name, metadata in own.items() if metadata}
-    return common | {"clips": own} if own else common
+    return common | {OWN: own} if own else common
 
 
 def _all_unchanged(clips: Sequence[MotionClip]) -> Any:
@@ -131,6 +167,21 @@ class _Joined:
         runs = [np.asarray(part[max(start, first) - first: min(stop, last) - first], self.dtype)
                 for part, (first, last) in zip(self._parts, self._frames) if first < stop and start < last]
         return runs[0] if len(runs) == 1 else np.concatenate(runs or [np.empty((0, *self.shape[1:]), self.dtype)])
+
+
+class _Run:
+    """(stop - start, N, 3): some of the frames."""
+
+    def __init__(self, positions: Any, start: int, stop: int):
+        self._positions, self._start = positions, start
+        self.dtype, self.shape = positions.dtype, (stop - start, *positions.shape[1:])
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, frames: slice) -> np.ndarray:
+        start, stop, _ = frames.indices(self.shape[0])
+        return self._positions[self._start + start: self._start + max(start, stop)]
 
 
 class _Blended:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+from athcodec.errors import ClipError
 from athcodec.files import check_target
 from athcodec.sources import Format, format_by_suffix, format_named
 
@@ -41,7 +42,8 @@ FORMATS = (
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz"),
     Format("usd", "USD: time-sampled points", (".usd", ".usdc", ".usda", ".usdz"), "athcodec.exporters.usd", "usd",
            ("pxr",)),
-    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf"),
+    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf",
+           holds_several=True),
     Format("alembic", "Alembic: samples of points", (".abc",), "athcodec.exporters.alembic", "alembic",
            ("alembic3d",)),
     Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
@@ -64,15 +66,25 @@ def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, 
     options   see WriteOptions
     progress  called with "export" and the fraction that is done
 
-    Raises ClipError where the format cannot hold the clip or is not known, MissingExtra where a package is missing,
-    OSError where nothing can be written there, ValueError for options that do not exist.
+    Raises ClipError where the format cannot hold the clip, or several, or is not known, MissingExtra where a package is
+    missing, OSError where nothing can be written there, ValueError for options that do not exist.
     """
     wanted = WriteOptions(**options)
     kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
     kind.check()
+    _check_clips(motion, kind)
     check_target(path)
     report = progress or (lambda stage, fraction: None)
     importlib.import_module(kind.module).write_clip(motion, path, wanted, lambda done: report("export", done))
+
+
+def _check_clips(motion: Any, kind: Format) -> None:
+    spans = getattr(motion, "spans", ())
+    if len(spans) > 1 and not kind.holds_several:
+        names = ", ".join(span.name for span in spans)
+        suffixes = " ".join(suffix for each in FORMATS if each.holds_several for suffix in each.suffixes)
+        raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
+                        f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
 
 
 def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:

@@ -6,6 +6,10 @@ further off than the level itself is (of a clip: parts.OF_CLIP of its size) is c
 "morphs": a morph target per frame, exact but for float32, large. "auto": whichever is smaller, of a clip that is short;
 else joints. Some engines, three.js among them, move triangles only: lines and points stand still there.
 
+Each of several clips is an animation of its name over the same joints or targets, and moves all that any of them
+moves: players may go from one to the other. glTF knows no loops: theirs end with the first frame again, and have
+{"loop": true} in extras.
+
 The error against what was to be written is in asset.extras.athcodec.max_error, in the unit of the vertices, and is
 what write_clip returns. A node above all turns and scales to glTF's metres with y up, so that vertices keep their
 numbers. Keys of animations are held in memory, morph targets are written frame by frame.
@@ -29,11 +33,13 @@ from athcodec.exporters.gltf_build import (
     VERTICES,
     Glb,
     Shape,
+    Take,
     add_mesh,
     branch_extras,
     clock,
     root_transform,
     shapes,
+    takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
 from athcodec.files import new_file
@@ -113,11 +119,11 @@ def _check_morphs(motion: Any) -> None:
                         "or fewer frames")
 
 
-def _key_times(glb: Glb, motion: Any) -> int:
-    times = (np.asarray(motion.time) - motion.time[0]).astype(np.float32)
-    if (np.diff(times) <= 0).any():
-        raise ClipError("time: got frames closer to each other than float32 seconds tell, expected longer steps")
-    return glb.array(times, bounds=True)
+def _add_animation(glb: Glb, take: Take, samplers: list[dict], channels: list[dict]) -> None:
+    if channels:
+        animation = {"name": take.name, "samplers": samplers, "channels": channels}
+        extras = {"extras": take.extras} if take.extras else {}
+        glb.json.setdefault("animations", []).append(animation | extras)
 
 
 class _Joined:
@@ -145,26 +151,47 @@ class _Joined:
         return iter(())
 
     def _animate(self, glb: Glb, nodes: list[int]) -> None:
-        """Channels of what moves; one key where something stands still elsewhere than at rest."""
-        joints, times, first = self._joints, _key_times(glb, self._motion), None
-        samplers, channels = [], []
-        for path, values, rest in zip(("translation", "rotation", "scale"), joints.poses, joints.rest):
-            is_still = (values == values[:1]).all(axis=(0, 2))
-            is_rest = is_still & (values[0] == rest).all(axis=1)
-            for which, frames in ((~is_still, len(values)), (is_still & ~is_rest, 1)):
-                moving = np.flatnonzero(which)
-                if not len(moving):
-                    continue
-                if frames == 1 and first is None:
-                    first = glb.array(np.zeros(1, np.float32), bounds=True)
-                data = np.ascontiguousarray(values[:frames, moving].swapaxes(0, 1))
-                view, size = glb.stored(data), data[0].nbytes
-                for place, joint in enumerate(moving):
-                    output = glb.accessor(view, data.dtype, frames, data.shape[2], byteOffset=place * size)
-                    samplers.append({"input": times if frames == len(values) else first, "output": output})
-                    channels.append({"sampler": len(samplers) - 1, "target": {"node": nodes[joint], "path": path}})
-        if channels:
-            glb.json["animations"] = [{"name": "motion", "samplers": samplers, "channels": channels}]
+        """Channels of what is anywhere else than at rest, in all clips; one key where it stands still in one."""
+        joints, found = self._joints, takes(self._motion)
+        used = [(values != rest).any(axis=(0, 2)) for values, rest in zip(joints.poses, joints.rest)]
+        if len(found) > 1 and not np.any(used):
+            used[0][0] = True  # an animation has a channel at least
+        for take in found:
+            poses = [_keys(take, values) for values in joints.poses]
+            moves = [of & (values != values[:1]).any(axis=(0, 2)) for of, values in zip(used, poses)]
+            if len(found) > 1 and not np.any(moves):
+                path = next(path for path, of in enumerate(used) if of.any())
+                moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
+            _add_animation(glb, take, *_channels(glb, nodes, take, poses, used, moves))
+
+
+def _keys(take: Take, values: np.ndarray) -> np.ndarray:
+    """The clip's of all frames, (n, J, width); a loop returns to its first rotation the shorter way."""
+    keys = take.of(values)
+    if take.is_loop and values.shape[2] == 4:
+        keys[-1] *= np.where((keys[-1] * keys[-2]).sum(axis=1, keepdims=True) < 0, np.float32(-1), np.float32(1))
+    return keys
+
+
+def _channels(glb: Glb, nodes: list[int], take: Take, poses: list[np.ndarray], used: list[np.ndarray],
+              moves: list[np.ndarray]) -> tuple[list[dict], list[dict]]:
+    """Samplers and channels of those joints (J,) that are used, by path; what moves has all keys, the others one."""
+    inputs: dict[int, int] = {}  # accessors of times, by their number
+    samplers, channels = [], []
+    for path, values, mine, moving in zip(("translation", "rotation", "scale"), poses, used, moves):
+        for which, count in ((moving, len(values)), (mine & ~moving, 1)):
+            chosen = np.flatnonzero(which)
+            if not len(chosen):
+                continue
+            if count not in inputs:
+                inputs[count] = glb.array(take.times[:count], bounds=True)
+            data = np.ascontiguousarray(values[:count, chosen].swapaxes(0, 1))
+            view, size = glb.stored(data), data[0].nbytes
+            for place, joint in enumerate(chosen):
+                output = glb.accessor(view, data.dtype, count, data.shape[2], byteOffset=place * size)
+                samplers.append({"input": inputs[count], "output": output})
+                channels.append({"sampler": len(samplers) - 1, "target": {"node": nodes[joint], "path": path}})
+    return samplers, channels
 
 
 def _unit(quaternion: np.ndarray) -> list[float]:
@@ -180,19 +207,18 @@ class _Morphed:
         self.max_error = 0.0
 
     def add(self, glb: Glb, root: int, found: list[Shape], report: Callable[[float], None]) -> Iterator[bytes]:
-        frames = self._motion.frame_count
-        weights = glb.array(np.eye(frames, dtype=np.float32).reshape(-1, 1))
-        times = _key_times(glb, self._motion)
         meshes = [add_mesh(glb, shape, np.asarray(self._motion.rest)) for shape in found]
-        count = sum(len(shape.source) for shape in found)
-        view = glb.view(12 * count * frames, target=VERTICES, byteStride=12)
         channels = []
         for mesh, shape in zip(meshes, found):
             node = glb.node(root, name=shape.name, mesh=mesh)
             channels.append({"sampler": 0, "target": {"node": node, "path": "weights"}})
+        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in found)
+        weights = np.eye(frames, dtype=np.float32)
+        for take in takes(self._motion):
+            times, values = glb.array(take.times, bounds=True), glb.array(take.of(weights).reshape(-1, 1))
+            _add_animation(glb, take, [{"input": times, "output": values}], channels)
+        view = glb.view(12 * count * frames, target=VERTICES, byteStride=12)
         bounds = self._add_targets(glb, found, meshes, view, count)
-        glb.json["animations"] = [{"name": "motion", "samplers": [{"input": times, "output": weights}],
-                                   "channels": channels}]
         self.max_error = UNKNOWN_BOUND
         return self._targets(glb, found, bounds, report)
 

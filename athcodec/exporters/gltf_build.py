@@ -18,7 +18,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from athcodec import __version__
+from athcodec.clip import Span
 from athcodec.errors import ClipError
+from athcodec.joining import metadata_of
 from athcodec.units import METRES, unit_symbol
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
@@ -176,13 +178,59 @@ def root_transform(metadata: Mapping[str, Any]) -> dict[str, Any]:
     return ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})
 
 
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A clip as an animation: frames `start` to `stop` - 1 of the motion; `times` are its keys' float32 seconds from 0.
+    Those of a loop end with its first frame again: what repeats them goes on as it does."""
+
+    name: str
+    start: int
+    stop: int
+    is_loop: bool
+    times: np.ndarray
+    extras: dict[str, Any]
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """What the keys are, of values (T, ...) per frame of the motion."""
+        own = values[self.start : self.stop]
+        return np.concatenate([own, own[:1]]) if self.is_loop else own
+
+
+def takes(motion: Any) -> list[Take]:
+    """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
+    apart."""
+    spans = motion.spans or (Span("", motion.frame_count),)
+    return [_take(motion, span, start, stop) for span, (start, stop) in zip(spans, motion.span_frames)]
+
+
+def _take(motion: Any, span: Span, start: int, stop: int) -> Take:
+    times = np.asarray(motion.time[start:stop], np.float64)
+    is_loop = span.loop and len(times) > 1
+    extras = {"loop": True} if span.loop else {}
+    if len(motion.spans) > 1:
+        own_fps = 1 / np.median(np.diff(times)) if len(times) > 1 else motion.fps
+        extras |= _clock(metadata_of(motion.metadata, span.name), times, own_fps)
+    times = times - times[0]
+    if is_loop:
+        times = np.append(times, times[-1] + times[-1] / (len(times) - 1))
+    times = times.astype(np.float32)
+    if (np.diff(times) <= 0).any():
+        raise ClipError("time: got frames closer to each other than float32 seconds tell, expected longer steps")
+    return Take(span.name or "motion", start, stop, is_loop, times, extras)
+
+
 def clock(motion: Any) -> dict[str, Any]:
-    """Frame rate, and number of the first frame in the tool that made the clip; unit and axis of the vertices."""
-    fps = float(motion.metadata.get("fps") or motion.fps)
-    first = motion.metadata.get("start_frame", 0)
-    first = (first if isinstance(first, (int, float)) else 0) + round(float(motion.time[0]) * fps, 6)
+    """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
     said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
-    return {"fps": fps, "start_frame": int(first) if float(first).is_integer() else first} | said
+    return said if len(motion.spans) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
+
+
+def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
+    """Frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
+    fps = float(metadata.get("fps") or fps)
+    first = metadata.get("start_frame", 0)
+    first = (first if isinstance(first, (int, float)) else 0) + round(float(time[0]) * fps, 6)
+    return {"fps": fps, "start_frame": int(first) if float(first).is_integer() else first}
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:

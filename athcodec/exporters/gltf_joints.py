@@ -49,7 +49,8 @@ def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float],
         return None
     parts, poses = moving.parts, [moving.places, *moving.values]
     still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
-    _hold(poses, still, parts.reach, SLACK * allowed)
+    for start, stop in motion.span_frames:
+        _hold([each[start:stop] for each in poses], still, parts.reach, SLACK * allowed)
     bind = np.zeros((len(parts), 4, 4))
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
     bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)

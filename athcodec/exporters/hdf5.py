@@ -22,6 +22,7 @@ from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.files import Part
 from athcodec.hierarchy import branch_orders
+from athcodec.joining import with_notes
 
 CHUNK_BYTES = 1 << 20
 
@@ -168,9 +169,9 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
     `clip` is a MotionClip, an Excerpt, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata and rest_dtype are written where it has them.
+    like them; stem_index, edges, faces, attributes, metadata, spans and rest_dtype are written where it has them.
     """
-    optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes", "metadata")
+    optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
     rest = np.asarray(clip.rest)
     writer = Hdf5Writer(
         path,
@@ -178,6 +179,7 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
         rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
         dtype=clip.dtype,
         gzip=options.gzip,
+        metadata=with_notes(clip),
         **{name: getattr(clip, name, None) for name in optional},
     )
     with writer:

@@ -19,6 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.files import new_file
 from athcodec.hierarchy import branch_orders
+from athcodec.joining import with_notes
 from athcodec.sources.npz import METADATA
 
 
@@ -60,6 +61,7 @@ def _arrays(motion: Any) -> dict[str, np.ndarray]:
     for name in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
         arrays[name] = getattr(motion, name)
     arrays |= motion.attributes
-    if motion.metadata:
-        arrays[METADATA] = np.array(json.dumps(motion.metadata))
+    metadata = with_notes(motion)
+    if metadata:
+        arrays[METADATA] = np.array(json.dumps(metadata))
     return {name: np.asarray(values) for name, values in arrays.items() if values is not None}

@@ -37,6 +37,8 @@ class ReadOptions:
     mesh   the file that has the faces of a point cache, a hierarchy's MTG ...
     field  name of the displacement that is added to the points of a finite-element result
     only   patterns (fnmatch) of the names of the prims, objects or meshes to read; () reads all
+    takes  patterns of the names of a file's animations, each of which is a clip of its own in what is read (joining.py
+           has `split`); () reads the one motion that players begin with
     skip   names of static arrays to leave out
     root   the vertex, or one per connected part, at which branches derived from edges begin
     """
@@ -46,6 +48,7 @@ class ReadOptions:
     mesh: str | PathLike[str] | None = None
     field: str | None = None
     only: Sequence[str] = ()
+    takes: Sequence[str] = ()
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
 
@@ -58,7 +61,8 @@ class ReadOptions:
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: `needs` are the importable modules that `extra` installs, `magic` what its files begin with."""
+    """A file format: `needs` are the importable modules that `extra` installs, `magic` what its files begin with;
+    `holds_several` clips of one plant, as far as they are written."""
 
     name: str
     title: str
@@ -67,6 +71,7 @@ class Format:
     extra: str = ""
     needs: tuple[str, ...] = ()
     magic: tuple[bytes, ...] = ()
+    holds_several: bool = False
 
     @property
     def is_installed(self) -> bool:

@@ -4,8 +4,9 @@ Vertices are those of the meshes in the order of the nodes in the scene; a mesh 
 Frames are evaluated a block at a time; keys of animations and base meshes are held in memory, morph targets are read
 when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
-names of nodes and meshes, and "animation:NAME" for another animation. Not read: Draco, instancing on the GPU,
-materials, cameras; normals of a mesh that moves.
+names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One whose
+extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco, instancing
+on the GPU, materials, cameras; normals of a mesh that moves.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, MotionClip, Skin
+from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, MotionClip, Skin, Span
 from athcodec.errors import ClipError
+from athcodec.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.frames import Frames
 from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, integer
@@ -33,14 +35,16 @@ MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
 ANIMATION = "animation:"
+SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the glTF file `path`; close it, or use it in a `with` statement.
 
     The rest pose, where options.rest is "auto", is the scene without animation. metadata has "animations", the names of
-    those that are played. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its
-    compression needs a package, OSError where a file cannot be opened.
+    those that are played, and "other_animations", those that are not; with options.takes the names are those of the
+    clip's spans. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
+    needs a package, OSError where a file cannot be opened.
     """
     try:
         file = GltfFile(path)
@@ -87,35 +91,62 @@ class Part:
 
 
 def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
-    scene, parts = _chosen(file, options.only)
+    scenes = _scenes(file, options)
+    scene = next(iter(scenes.values()))
+    parts = _chosen(scene, [each for each in options.only if not each.startswith(ANIMATION)])
     for part in parts:
         _load(part, scene)
-    vertex_count = parts[-1].first + parts[-1].count
-    motion = _Motion(scene, parts)
-    fps, times, clock = _sampling(scene, options.fps)
-    attributes, branches = _attributes(file, parts, options.skip, motion, keep_normals=len(times) == 1)
+    motions = {name: _Motion(each, parts) for name, each in scenes.items()}
+    motion = next(iter(motions.values()))
+    timings = {name: _sampling(each, options.fps) for name, each in motions.items()}
+    still = all(len(timing.times) == 1 for timing in timings.values())
+    attributes, branches = _attributes(file, parts, options.skip, motion, keep_normals=still)
     faces, edges = _connections(file, parts)
     before = file.stamp()
     rest = motion.read(None)[0] if options.rest == "auto" else None
-    return MotionClip(
-        positions=Frames(lambda start, stop: motion.read(times[start:stop]), len(times), vertex_count),
-        time=np.arange(len(times)) / fps,
-        rest=rest if rest is not None and np.isfinite(rest).all() else None,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, parts),
-        metadata={"unit": "m", "up_axis": "y"} | clock | _names(scene, parts),
-        unchanged=lambda: file.stamp() == before, **branches,
-    )
+    clips = {}
+    for name, timing in timings.items():
+        clips[name] = MotionClip(
+            positions=_positions(motions[name], timing.times),
+            time=np.arange(len(timing.times)) / timing.fps,
+            rest=rest if rest is not None and np.isfinite(rest).all() else None,
+            rest_pose="mean" if options.rest == "mean" else "first",
+            edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, parts),
+            spans=(Span("", len(timing.times), True),) if timing.is_loop else (),
+            metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(parts)
+            | ({} if options.takes else _played(scene)),
+            unchanged=lambda: file.stamp() == before, **branches,
+        )
+        rest = clips[name].rest.astype(clips[name].rest_dtype)  # of several, the same for all
+    return join(clips) if options.takes else clips[""]
+
+
+def _positions(motion: _Motion, times: np.ndarray) -> Frames:
+    return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count)
 
 
 # ---- what there is ----
 
 
-def _chosen(file: GltfFile, only: Sequence[str]) -> tuple[Scene, list[Part]]:
-    """The scene with the animations that are asked for, and its parts in the order of the nodes."""
-    names = [pattern[len(ANIMATION):] for pattern in only if pattern.startswith(ANIMATION)]
-    patterns = [pattern for pattern in only if not pattern.startswith(ANIMATION)]
-    scene = Scene(file, _animations(file, names) if names else None)
+def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
+    """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
+    patterns = [each[len(ANIMATION):] for each in options.only if each.startswith(ANIMATION)]
+    if not options.takes:
+        return {"": Scene(file, _animations(file, patterns, f"only: got {ANIMATION}") if patterns else None)}
+    if patterns:
+        raise ClipError(f"takes: got only {ANIMATION}{patterns[0]} too, expected one of both")
+    scenes: dict[str, Scene] = {}
+    for index in _animations(file, options.takes, "takes: got "):
+        name = _animation_name(file, index)
+        while name in scenes:
+            name = f"{name}.{index}"
+        scenes[name] = Scene(file, [index])
+    return scenes
+
+
+def _chosen(scene: Scene, patterns: Sequence[str]) -> list[Part]:
+    """The parts whose nodes or meshes have such names, in the order of the nodes."""
+    file = scene.file
     parts, seen = [], []
     for node in scene.order:
         index = scene.nodes[node].get("mesh")
@@ -135,14 +166,14 @@ def _chosen(file: GltfFile, only: Sequence[str]) -> tuple[Scene, list[Part]]:
         first += part.count
     if first > MOST_VERTICES:
         raise ClipError(f"meshes: got {first} vertices, expected at most {MOST_VERTICES}")
-    return scene, parts
+    return parts
 
 
-def _animations(file: GltfFile, patterns: Sequence[str]) -> list[int]:
+def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> list[int]:
     names = [_animation_name(file, i) for i in range(len(file.items("animations")))]
     found = [i for i, name in enumerate(names) if any(fnmatch.fnmatchcase(name, each) for each in patterns)]
     if not found:
-        raise ClipError(f"only: got {ANIMATION}{patterns[0]}, expected one of {brief(names)}")
+        raise ClipError(f"{what}{patterns[0]}, expected one of {brief(names)}")
     return found
 
 
@@ -263,7 +294,7 @@ class _Motion:
     """Positions of all parts at any times."""
 
     def __init__(self, scene: Scene, parts: list[Part]):
-        self._scene, self._parts = scene, parts
+        self.scene, self._parts = scene, parts
         self.count = parts[-1].first + parts[-1].count
         moving = {joint for part in parts for joint in part.joints} | {p.node for p in parts if p.skin is None}
         self.nodes = scene.ancestors(moving)
@@ -276,7 +307,7 @@ class _Motion:
         with np.errstate(all="ignore"):
             for start in range(0, len(out), step):
                 now = None if times is None else times[start : start + step]
-                matrices = self._scene.matrices(self.nodes, now)
+                matrices = self.scene.matrices(self.nodes, now)
                 for part in self._parts:
                     rows = slice(part.first, part.first + part.count)
                     out[start : start + step, rows] = self._positions(part, matrices, now)
@@ -293,12 +324,12 @@ class _Motion:
         """(k or 1, n, 3): only targets that count in a frame are read."""
         if not part.targets:
             return part.base[None].astype(np.float64)
-        weights = self._scene.weights(part.node, times, part.weights)
+        weights = self.scene.weights(part.node, times, part.weights)
         local = np.repeat(part.base[None].astype(np.float64), len(weights), axis=0)
         for column in np.flatnonzero((weights != 0).any(axis=0)):
             if part.targets[column] is not None:
                 rows = np.flatnonzero(weights[:, column])
-                moved = _triples(self._scene.file, part.targets[column], part.count, "morph target")
+                moved = _triples(self.scene.file, part.targets[column], part.count, "morph target")
                 local[rows] += weights[rows, column, None, None] * moved
         return local
 
@@ -315,7 +346,7 @@ class _Motion:
 
     def normal_matrix(self, part: Part) -> np.ndarray:
         """(3, 3) that turns normals of an unskinned part into the world."""
-        matrix = self._scene.matrices(self.nodes, None)[part.node][0, :3, :3]
+        matrix = self.scene.matrices(self.nodes, None)[part.node][0, :3, :3]
         return np.linalg.pinv(matrix).T if np.isfinite(matrix).all() else np.eye(3)
 
 
@@ -326,22 +357,51 @@ def _product(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (matrices.reshape(-1, 4) @ points[0]).reshape(len(matrices), 3, -1)
 
 
-def _sampling(scene: Scene, wanted: float | None) -> tuple[float, np.ndarray, dict[str, Any]]:
-    """Frames per second, the times (T,) to evaluate, and metadata of both."""
-    keys = scene.keys
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """Frames per second, the times (T,) to evaluate, and metadata of both; whether the first follows the last."""
+
+    fps: float
+    times: np.ndarray
+    clock: dict[str, Any]
+    is_loop: bool = False
+
+
+def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
+    scene, keys = motion.scene, motion.scene.keys
     if not len(keys):
-        return DEFAULT_FPS, np.zeros(1), {}
-    extras = scene.file.json["asset"].get("extras")
-    said = extras if isinstance(extras, dict) else {}
+        return Sampling(DEFAULT_FPS, np.zeros(1), {})
+    said = _said(scene)
     fps = wanted or _said_rate(said, keys) or key_rate(keys) or DEFAULT_FPS
     count = float(keys[-1] - keys[0]) * fps
     if not count < MOST_FRAMES:
         raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")
-    times = keys[0] + np.arange(int(count + 0.02) + 1) / fps
+    is_loop = said.get("loop") is True
+    frames = int(count + 0.02) + 1
+    if is_loop and frames > 1 and _returns(motion, keys):
+        frames = round(count)
+        if abs(count - frames) > 0.02:  # the time of all frames is that of the loop
+            fps *= frames / count
+    times = keys[0] + np.arange(frames) / fps
     first = float(keys[0] * fps) + (said["start_frame"] if _is_number(said.get("start_frame")) else 0)
     whole = round(first)
     clock = {"fps": float(fps), "start_frame": whole if abs(first - whole) < 1e-3 else first}
-    return float(fps), _on_keys(times, keys, fps), clock
+    return Sampling(float(fps), _on_keys(times, keys, fps), clock, is_loop)
+
+
+def _said(scene: Scene) -> dict[str, Any]:
+    """What extras say: those of the file, and before them those of the animation."""
+    items = [scene.file.json["asset"]]
+    if len(scene.played) == 1:
+        items.append(scene.file.item("animations", scene.played[0]))
+    return {key: value for item in items if isinstance(item.get("extras"), dict)
+            for key, value in item["extras"].items()}
+
+
+def _returns(motion: _Motion, keys: np.ndarray) -> bool:
+    """Whether the last key has the pose of the first."""
+    first, last = motion.read(keys[[0, -1]]).astype(np.float64)
+    return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 
 
 def _said_rate(said: dict, keys: np.ndarray) -> float | None:
@@ -365,10 +425,15 @@ def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
 # ---- what does not move ----
 
 
-def _names(scene: Scene, parts: list[Part]) -> dict[str, Any]:
-    names = {"part_names": [part.name for part in parts], "part_kinds": [part.kind for part in parts]}
-    played = [_animation_name(scene.file, index) for index in scene.played]
-    return names | ({"animations": played} if played else {})
+def _names(parts: list[Part]) -> dict[str, Any]:
+    return {"part_names": [part.name for part in parts], "part_kinds": [part.kind for part in parts]}
+
+
+def _played(scene: Scene) -> dict[str, Any]:
+    names = [_animation_name(scene.file, i) for i in range(len(scene.file.items("animations")))]
+    others = [name for i, name in enumerate(names) if i not in scene.played]
+    played = {"animations": [names[i] for i in scene.played]} if scene.played else {}
+    return played | ({"other_animations": others} if others else {})
 
 
 def _connections(file: GltfFile, parts: list[Part]) -> tuple[np.ndarray | None, np.ndarray | None]:

@@ -12,8 +12,9 @@
 | edges, faces  | (E, 2), (F, k) integers    | none                                                  |
 
 Every other dataset, also one inside a group, is a named static array and survives unchanged (strings of
-variable length become UTF-8 of fixed length). Attributes of the file become metadata; attributes of datasets
-and groups are not read, links are not followed.
+variable length become UTF-8 of fixed length). Attributes of the file become metadata, but for clip_name and loop
+(true), which say the name of the clip and that it is a loop; attributes of datasets and groups are not read, links are
+not followed.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES, MotionClip, frame_rate
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.joining import take_notes
 from athcodec.sources import ReadOptions
 
 CHUNK_CACHE_BYTES = 64 << 20
@@ -101,6 +103,7 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
         **_branches(file, positions, metadata, options.root),
     )
     _drop_derivable_order(clip)
+    take_notes(clip)
     return clip
 
 
