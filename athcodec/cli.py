@@ -159,9 +159,9 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
     """The settings of a clip that options of the command line give."""
     from athcodec.batch.settings import BOUNDS, READING
 
-    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights")
+    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    given |= {name: True for name in ("exact_rest", "lossless") if getattr(args, name)}
+    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
     given |= {name: getattr(args, name) for name, usual in (("attributes", "all"), ("effort", "default"))
               if getattr(args, name) != usual}
     if given.get("rest") == "auto":
@@ -222,12 +222,12 @@ def _info(args: argparse.Namespace) -> int:
 def _verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
-        with _open(args.file, args.stats, strict=True, clip=args.clip) as decoder:
+        with _open(args.file, args.stats, strict=True, clip=args.clip) as decoder, ExitStack() as opened:
             decoder.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
-            for played, source in _with_sources(decoder, args):
+            for played, source, clip in _with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}
-                measured["depths"] = _measure_against(played, source, args)
+                measured["depths"] = _measure_against(played, source, clip)
                 result["clips"].append(measured)
                 _refuse_broken_promises(result, measured)
         result["ok"] = True
@@ -329,26 +329,43 @@ def _export_demo(encoded: Path, page: Path) -> None:
 
 
 def _clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip:
-    """The clip in a file, or all of several as one."""
-    names = args.names or ([Path(path).stem for path in paths] if len(paths) > 1 else [""])
-    if len(names) != len(paths):
-        raise ClipError(f"--names: got {len(names)}, expected {len(paths)}, one for each input")
-    loops = names if args.loop == ["all"] else args.loop or []
-    for name in (*loops, *({name: name for name in names if names.count(name) > 1})):
-        if names.count(name) != 1:
-            raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
-    if args.loop_blend and not loops:
-        raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
-    clips: dict[str, MotionClip] = {}
+    """The clip in a file, or all of several files and of their takes, as one."""
     with ExitStack() as opened:
-        for name, path in zip(names, paths):
-            clip = opened.enter_context(_read(args, path))
+        parts = []
+        for path in paths:
+            whole = opened.enter_context(_read(args, path))
+            _say_takes(whole, path, args)
+            parts += [(name, Path(path).stem, part) for name, part in athcodec.split(whole).items()]
+        names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
+        loops = _checked_names(names, len(parts), args)
+        clips: dict[str, MotionClip] = {}
+        for name, (_, _, clip) in zip(names, parts):
             if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
                 clip = dataclasses.replace(clip, rest=next(iter(clips.values())).rest)
             clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
     return joined
+
+
+def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
+    """Those of the loops. ClipError where they do not fit the clips."""
+    if len(names) != clip_count:
+        raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
+    loops = names if args.loop == ["all"] else args.loop or []
+    for name in (*loops, *({name: name for name in names if names.count(name) > 1})):
+        if names.count(name) != 1:
+            raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
+    if args.loop_blend and not loops:
+        raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
+    return loops
+
+
+def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
+    played, others = (clip.metadata.get(name) for name in ("animations", "other_animations"))
+    if others and not args.only:
+        _say("takes", f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
+                      "--takes all makes a clip of each")
 
 
 def _excerpt(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
@@ -361,23 +378,27 @@ def _excerpt(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
     return Excerpt(decoder, args.depth, all_clips=True)
 
 
-def _with_sources(decoder: Decoder, args: argparse.Namespace) -> list[tuple[Decoder, str]]:
-    """The clips to verify, and what to compare each with."""
+def _with_sources(decoder: Decoder, args: argparse.Namespace,
+                  opened: ExitStack) -> list[tuple[Decoder, str, MotionClip]]:
+    """The clips to verify, and what to compare each with: a clip of a file."""
     if not args.against:
         return []
     if args.clip is not None or len(decoder.clips) == 1:
         played = [decoder]
     else:
         played = [decoder.play(clip.name) for clip in decoder.clips]
-    if len(args.against) != len(played):
-        raise ClipError(f"--against: got {len(args.against)} sources, expected {len(played)}, one for each clip")
-    return list(zip(played, args.against))
+    sources = [(path, clip) for path in args.against
+               for clip in athcodec.split(opened.enter_context(_read(args, path))).values()]
+    if len(sources) != len(played):
+        raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
+    return [(each, path, clip) for each, (path, clip) in zip(played, sources)]
 
 
 def _read(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
     return athcodec.read(path, args.source_format, rest=getattr(args, "rest", "auto"), fps=args.fps, mesh=args.mesh,
-                         field=args.field, only=args.only or (), unit=args.unit, up_axis=args.up_axis)
+                         field=args.field, only=args.only or (), takes=args.takes or (), unit=args.unit,
+                         up_axis=args.up_axis)
 
 
 @contextmanager
@@ -442,10 +463,10 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
     return range(start, stop)
 
 
-def _measure_against(decoder: Decoder, source: str, args: argparse.Namespace) -> list[dict[str, Any]]:
+def _measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dict[str, Any]]:
     """One entry per level: what it promises, and how far off the source it is."""
-    with _read(args, source) as clip, _naming(source), clip.watched(), _progress() as report:
-        if isinstance(blend := decoder.metadata.get(BLEND), int):
+    with _naming(source), clip.watched(), _progress() as report:
+        if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
             clip = athcodec.looped(clip, blend)
         got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
         if got != expected:
@@ -805,7 +826,8 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front of it or "
                       "behind")
     verb.add_argument("--names", metavar="NAME,...", type=_argument(_names),
-                      help="of the clips (default: of several, their files' names without suffix)")
+                      help="of the clips (default: their own, such as those of takes; else, of several, their files' "
+                      "names without suffix)")
     verb.add_argument("--loop", metavar="NAME,...", type=_argument(_names),
                       help="clips that are loops, their first frame following their last; all: every one")
     verb.add_argument("--loop-blend", metavar="FRAMES", type=_argument(_whole), default=0,
@@ -844,6 +866,10 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--redo", action="store_true", help="encode everything again")
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
+    verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
+    verb.add_argument("--loop-blend", metavar="FRAMES", type=_argument(_whole), help="make loops of clips that do not "
+                      "end where they began: take so many frames off their end and blend them into those at their "
+                      "beginning")
     _source_arguments(verb)
     _coding_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -910,6 +936,9 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
     source.add_argument("--only", metavar="PATTERN", action="append",
                         help="read the prims, objects or meshes of these names only; may be repeated")
+    source.add_argument("--takes", metavar="NAME,...", type=_argument(_names),
+                        help="read these animations of a glTF file, each as a clip of its own; all: every one "
+                        "(default: the one that players begin with)")
     source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
     source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
 
@@ -964,7 +993,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
     verb.add_argument("--against", metavar="SOURCE", action="append",
-                      help="the source: measure the error of every depth; once for each clip, in the file's order")
+                      help="the source: measure the error of every depth; of several clips all, in the file's order")
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 
 import athcodec
+from athcodec.cli import main
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.excerpt import Excerpt
@@ -290,6 +291,59 @@ def test_animations_of_different_nodes_run_together_and_takes_do_not(tmp_path):
     for only, message in ((["leaf*"], "expected names such as"), (["animation:run"], "expected one of .*walk")):
         with pytest.raises(ClipError, match=message):
             read(path, only=only)
+
+
+def with_takes(path):
+    """A cube whose animations are called walk, walk, nothing and turn, the last with a loop in its extras."""
+    made = moving_cube([(0, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]], "LINEAR")], name="a")
+    made.gltf.animations[0].name = "walk"
+    made.animation([(0, "translation", [0, 2], [[0, 0, 0], [0, 2, 0]], "LINEAR")], "walk")
+    made.animation([(0, "scale", [0, 1], np.ones((2, 3)), "LINEAR")])
+    turns = [about([0, 1, 0], angle)[0] for angle in np.linspace(0, 2 * np.pi, 5)]
+    made.animation([(0, "rotation", np.arange(5) / 2, turns, "LINEAR")], "turn")
+    made.gltf.animations[3].extras = {"loop": True}
+    return made.save(path)
+
+
+def test_takes_are_clips_of_their_own(tmp_path):
+    path = with_takes(tmp_path / "a.glb")
+    with read(path, fps=2, takes="all") as clip:
+        assert [(span.name, span.frame_count, span.loop) for span in clip.spans] == [
+            ("walk", 3, False), ("walk.1", 5, False), ("animation 2", 3, False), ("turn", 4, True)]
+        found = {name: each.block(0, each.frame_count) for name, each in athcodec.split(clip).items()}
+        assert np.array_equal(clip.block(0, 15), np.concatenate(list(found.values())))
+        assert np.allclose(found["walk"][2], CUBE + [1, 0, 0]) and np.allclose(found["walk.1"][4], CUBE + [0, 2, 0])
+        assert np.allclose(found["turn"][1], CUBE @ about([0, 1, 0], np.pi / 2)[1].T, atol=1e-6)
+    for takes in (["turn"], ["tu*"], "turn"):
+        with read(path, fps=2, takes=takes) as clip:
+            assert np.array_equal(clip.block(0, 4), found["turn"]) and clip.spans[0].name == "turn"
+    with read(path, fps=2) as clip:
+        assert np.array_equal(clip.block(0, 3), found["walk"]) and clip.spans == ()
+        assert clip.metadata["other_animations"] == ["walk.1", "animation 2", "turn"]
+    with pytest.raises(ClipError, match="takes: got run, expected one of .*turn"):
+        read(path, takes=["run"])
+    with pytest.raises(ClipError, match="takes: got only animation:turn too"):
+        read(path, takes=["walk"], only=["animation:turn"])
+
+
+@pytest.mark.parametrize("rest", ["auto", "first", "mean"])
+def test_takes_have_one_rest_pose(tmp_path, rest):
+    with read(with_takes(tmp_path / "a.glb"), takes="all", rest=rest) as clip:
+        expected = {"auto": CUBE, "first": clip.block(0, 1)[0], "mean": CUBE + [0.5, 0, 0]}[rest]
+        assert np.allclose(clip.rest, expected, atol=1e-6)
+
+
+def test_a_loop_ends_before_its_first_frame_comes_again(tmp_path):
+    """At the keys' rate, at another whose frames do not fit, and where the end is no repetition."""
+    path = with_takes(tmp_path / "a.glb")
+    for fps, frames, rate in ((2, 4, 2), (8, 16, 8), (0.8, 2, 1)):
+        with read(path, fps=fps, takes="turn") as clip:
+            assert (clip.frame_count, clip.fps, clip.spans[0].loop) == (frames, rate, True)
+    gltf = pygltflib.GLTF2().load(str(path))
+    gltf.animations[0].extras = {"loop": True}
+    gltf.save(str(path))
+    with read(path, fps=2) as clip:
+        assert (clip.frame_count, clip.spans[0].loop) == (3, True)
 
 
 @pytest.mark.parametrize("name", ["a.glb", "bin.gltf", "data.gltf"])
@@ -600,3 +654,95 @@ def test_one_frame_and_one_vertex_are_a_clip_too(tmp_path):
     for animation in ("joints", "morphs", "auto"):
         write(clip, tmp_path / "a.glb", animation=animation)
         assert np.array_equal(frames_of(tmp_path / "a.glb")[0], clip.block(0, 1))
+
+
+# ---- several clips ----
+
+
+@pytest.fixture(scope="module")
+def seasons():
+    """Clips of one plant by name: 24 frames as a loop, 15 of other frames at another rate, a pose that is held, and
+    one of a single frame."""
+    whole = with_faces(plant(seed=6, branches=9, frames=60), from_tool="x")
+
+    def part(start, stop, fps, number=0):
+        held = whole.block(start, start + 1).repeat(5, axis=0) if stop == start else whole.block(start, stop)
+        return dataclasses.replace(whole, positions=held, time=np.arange(len(held)) / fps,
+                                   rest=whole.rest.astype(np.float32),
+                                   metadata=whole.metadata | {"fps": fps, "start_frame": number})
+
+    return {"calm": athcodec.looped(part(0, 30, 30), 6), "gale": part(30, 45, 24, 100), "held": part(50, 50, 10),
+            "one": part(55, 56, 30)}
+
+
+@pytest.fixture(scope="module")
+def seasons_ath(seasons, tmp_path_factory):
+    path = tmp_path_factory.mktemp("seasons") / "seasons.ath"
+    athcodec.encode(athcodec.join(seasons), path, rel_error=1e-4, segment_frames=16)
+    return path
+
+
+def same_clips(path, wanted, error):
+    """Whether a GLB has the clips by name, each as far off as `error`."""
+    with read(path, takes="all") as clip:
+        found = athcodec.split(clip)
+        assert list(found) == list(wanted)
+        for name, each in wanted.items():
+            assert found[name].spans[0].loop == (name == "calm")
+            assert far(found[name].block(0, found[name].frame_count), each.block(0, each.frame_count)) <= error
+            assert found[name].time == pytest.approx(each.time, abs=1e-6)
+            for key in ("fps", "start_frame"):
+                assert found[name].metadata[key] == pytest.approx(each.metadata[key])
+
+
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_clips_keep_names_loops_and_motion_from_glb_through_ath_to_glb(seasons, seasons_ath, tmp_path, animation):
+    write(athcodec.join(seasons), tmp_path / "joined.glb", animation=animation)
+    same_clips(tmp_path / "joined.glb", seasons, facts_of(tmp_path / "joined.glb")["athcodec"]["max_error"] + 1e-5)
+    assert main(["encode", str(tmp_path / "joined.glb"), str(tmp_path / "a.ath"), "--takes", "all"]) == 0
+    assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "again.glb"), "--animation", animation]) == 0
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        error = decoder.max_error_bound + 1e-5
+    error += sum(facts_of(tmp_path / name)["athcodec"]["max_error"] for name in ("joined.glb", "again.glb"))
+    same_clips(tmp_path / "again.glb", seasons, error)
+    assert main(["verify", str(tmp_path / "a.ath"), "--takes", "all", "--against", str(tmp_path / "joined.glb")]) == 0
+
+
+def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path):
+    with athcodec.open(seasons_ath) as decoder:
+        write(Excerpt(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    moved = [{(channel.target.node, channel.target.path) for channel in each.channels} for each in gltf.animations]
+    assert len(gltf.skins) == 1 and len(moved) == 4 and all(each == moved[0] for each in moved)
+    with read(tmp_path / "a.glb") as clip:
+        assert clip.metadata["animations"] == ["calm"] and clip.frame_count == 24
+
+
+def test_clips_that_all_stand_still_are_animations_too(seasons, tmp_path):
+    held = seasons["held"]
+    still = dataclasses.replace(held, positions=held.rest.astype(np.float32)[None].repeat(5, axis=0),
+                                rest=held.rest.astype(np.float32))
+    write(athcodec.join({"a": still, "b": still}), tmp_path / "a.glb", animation="joints")
+    with read(tmp_path / "a.glb", takes="all") as clip:
+        assert [(span.name, span.frame_count) for span in clip.spans] == [("a", 5), ("b", 5)]
+
+
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_one_clip_of_several_is_an_animation_of_its_name(seasons_ath, tmp_path, animation):
+    assert main(["decode", str(seasons_ath), str(tmp_path / "a.glb"), "--clip", "gale", "--animation", animation]) == 0
+    assert [each.name for each in pygltflib.GLTF2().load(str(tmp_path / "a.glb")).animations] == ["gale"]
+    assert facts_of(tmp_path / "a.glb")["start_frame"] == 100
+    assert main(["decode", str(seasons_ath), str(tmp_path / "b.glb"), "--frames", "0:3"]) == 1
+    assert not (tmp_path / "b.glb").exists()
+
+
+def test_the_takes_that_are_not_read_are_named(tmp_path, capsys):
+    path, out = str(with_takes(tmp_path / "a.glb")), str(tmp_path / "a.ath")
+    assert main(["encode", path, out]) == 0
+    assert "this is walk; there are walk.1, animation 2, turn too, and --takes all" in capsys.readouterr().err
+    assert main(["encode", path, out, "--takes", "turn,gallop"]) == 1
+    assert "got gallop, expected one of ['walk', 'walk.1'" in capsys.readouterr().err
+    assert main(["encode", path, out, "--takes", "all", "--names", "a,b,c,d", "--loop", "a", "--fps", "10"]) == 0
+    assert "takes" not in capsys.readouterr().err.splitlines()[-1]
+    with athcodec.open(out) as decoder:
+        assert {clip.name: clip.loop for clip in decoder.clips} == {"a": True, "b": False, "c": False, "d": True}

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pygltflib
 import pytest
-from test_gltf import Maker, far, leafy, leafy_ath  # noqa: F401, the fixtures too
+from test_gltf import Maker, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
 from test_vat import exr
 
 import athcodec
@@ -67,11 +67,11 @@ def panda(request, tmp_path_factory):
 
 @pytest.fixture
 def played(node, tmp_path):
-    """(T, N, 3) where three.js has the vertices of a GLB at some times."""
+    """(T, N, 3) where three.js has the vertices of a GLB at some times, in all or one of its animations."""
 
-    def play(path, times):
+    def play(path, times, *animation):
         (tmp_path / "times.json").write_text(json.dumps([float(t) for t in times]))
-        facts = json.loads(node("play.mjs", path, tmp_path / "times.json", tmp_path / "out.bin"))
+        facts = json.loads(node("play.mjs", path, tmp_path / "times.json", tmp_path / "out.bin", *animation))
         return np.fromfile(tmp_path / "out.bin", "<f4").reshape(len(times), facts["vertices"], 3)
 
     return play
@@ -126,6 +126,27 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(ani
             stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(path, excerpt.time - excerpt.time[0])
             assert far(shown, excerpt.block(0, 26)) <= stated + 1e-5
+
+
+@pytest.mark.parametrize("animation", ["joints", "morphs"])
+def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(animation, seasons, seasons_ath,  # noqa: F811
+                                                                          node, played, tmp_path):
+    path = tmp_path / "a.glb"
+    with athcodec.open(seasons_ath) as decoder:
+        write(Excerpt(decoder, all_clips=True), path, animation=animation)
+        assert_valid(node, path)
+        (tmp_path / "none.json").write_text("[]")
+        listed = json.loads(node("play.mjs", path, tmp_path / "none.json", tmp_path / "none.bin"))["animations"]
+        assert listed == list(seasons)
+        stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
+        for name in seasons:
+            one = decoder.play(name)
+            assert far(played(path, one.time - one.time[0], name), one.positions()) <= stated + 1e-5
+        calm = decoder.play("calm")
+        ends = played(path, [0, len(calm.time) / calm.fps, (len(calm.time) - 0.5) / calm.fps], "calm")
+        assert far(ends[1], ends[0]) < 1e-6, "what is repeated goes on without a jump"
+        between = (calm.positions(0) + calm.positions(-1)) / 2
+        assert far(ends[2], between) < 0.1 * far(calm.positions(0), calm.positions(-1)) + stated
 
 
 def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, played, tmp_path):

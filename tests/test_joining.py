@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 import athcodec
+from athcodec import exporters
 from athcodec.cli import main
 from athcodec.clip import MotionClip, Span
 from athcodec.encoder import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
+from athcodec.excerpt import Excerpt
 
 
 def distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -193,6 +195,67 @@ def test_times_run_on_within_a_clip_only(medley_clips):
         changed(joined, time=time)
 
 
+def test_split_gives_back_what_was_joined(medley_clips):
+    joined = athcodec.join(medley_clips)
+    for name, clip in athcodec.split(joined).items():
+        source = medley_clips[name]
+        assert np.array_equal(clip.block(0, clip.frame_count), source.block(0, source.frame_count))
+        assert np.array_equal(clip.time, source.time) and clip.metadata == source.metadata
+        assert clip.spans[0].name == name and clip.spans[0].loop == any(span.loop for span in source.spans)
+    again = athcodec.join(athcodec.split(joined))
+    assert again.spans == joined.spans and again.metadata == joined.metadata
+    assert np.array_equal(again.block(15, 70), joined.block(15, 70))
+    assert athcodec.split(medley_clips["still"]) == {"": medley_clips["still"]}
+
+
+def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
+    with athcodec.open(medley_ath) as decoder:
+        excerpt = Excerpt(decoder, 1, all_clips=True)
+        frames = np.concatenate([decoder.play(name).positions(depth=1) for name in medley_clips])
+        assert excerpt.spans == athcodec.join(medley_clips).spans
+        assert np.array_equal(np.concatenate([block for _, block in excerpt.blocks()]), frames)
+        assert [start for start, _ in excerpt.blocks()][:3] == [0, 10, 20]
+        for start, stop in ((0, 90), (19, 21), (57, 58), (3, 5)):
+            assert np.array_equal(excerpt.block(start, stop), frames[start:stop])
+        assert np.array_equal(excerpt.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
+        assert excerpt.max_error == max(decoder.play(name).depths[1].max_error for name in medley_clips)
+        assert not Excerpt(decoder, 1, range(3)).spans[0].loop, "some frames of a loop are none"
+
+
+@pytest.mark.parametrize("kind", [each for each in exporters.FORMATS if not each.holds_several],
+                         ids=lambda kind: kind.name)
+def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
+    if not kind.is_installed:
+        pytest.skip(f"needs {kind.needs}")
+    path = tmp_path / f"a{kind.suffixes[0]}"
+    with athcodec.open(medley_ath) as decoder:
+        for several in (athcodec.join(medley_clips), Excerpt(decoder, all_clips=True)):
+            with pytest.raises(ClipError, match="several clips, calm, Böe, still, round; expected one .*--clip.*glb"):
+                athcodec.write(several, path)
+        assert list(tmp_path.iterdir()) == []
+        athcodec.write(medley_clips["calm"], path)
+        athcodec.write(Excerpt(decoder), path.with_stem("b"))
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".npz"])
+def test_name_and_loop_of_a_clip_go_through_a_file_of_the_schema(suffix, medley_ath, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    for name, loop in (("calm", True), ("Böe", False)):
+        with athcodec.open(medley_ath, clip=name) as decoder:
+            athcodec.write(Excerpt(decoder), path)
+            with athcodec.read(path) as clip:
+                assert clip.spans == (Span(name, decoder.frame_count, loop),) and clip.metadata == decoder.metadata
+    assert main(["encode", str(path), str(tmp_path / "a.ath")]) == 0
+    with athcodec.open(tmp_path / "a.ath", clip="Böe") as decoder:
+        assert "clip_name" not in decoder.metadata
+
+
+def test_a_loop_that_was_blended_is_not_blended_again(medley_ath, tmp_path):
+    source, path = str(tmp_path / "round.h5"), str(tmp_path / "round.ath")
+    assert main(["decode", str(medley_ath), source, "--clip", "round"]) == 0
+    assert main(["encode", source, path]) == 0 and main(["verify", path, "--against", source]) == 0
+
+
 # ---- the command line ----
 
 
@@ -235,7 +298,7 @@ def test_the_output_may_stand_behind_the_inputs_or_between_options(sources, tmp_
 
 
 @pytest.mark.parametrize("words, message", [
-    (["--names", "a"], "--names: got 1, expected 2, one for each input"),
+    (["--names", "a"], "--names: got 1, expected 2, one for each clip"),
     (["--names", "a,a"], "clip 'a': got 2 of this name, expected one"),
     (["--loop", "gale"], "clip 'gale': got 0 of this name, expected one"),
     (["--loop-blend", "3"], "--loop-blend: got no clips to make loops of"),

@@ -31,7 +31,8 @@ from athcodec.transform import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one
-READING = ("source_format", "rest", "fps", "mesh", "field", "only", "unit", "up_axis")
+READING = ("source_format", "rest", "fps", "mesh", "field", "only", "takes", "unit", "up_axis")
+SHAPING = ("hierarchy", "loop", "loop_blend")  # what is made of a clip before it is coded
 
 Settings = dict[str, Any]
 
@@ -81,6 +82,12 @@ def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str
     return merged
 
 
+def loop_frames(settings: Settings) -> int | None:
+    """How many frames of a clip are blended to make a loop of it; None where it is to be none."""
+    blend = settings.get("loop_blend", 0)
+    return blend if settings.get("loop", blend > 0) else None
+
+
 def reading_options(settings: Settings) -> dict[str, Any]:
     """Keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
@@ -91,7 +98,7 @@ def reading_options(settings: Settings) -> dict[str, Any]:
 
 def coding_options(settings: Settings, unit: Any) -> dict[str, Any]:
     """Keywords of athcodec.encode, for a clip whose metadata says `unit`. Raises BoundError."""
-    options = {name: value for name, value in settings.items() if name not in READING and name != "hierarchy"}
+    options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if "max_error" in options:
         options["max_error"] = _length(options["max_error"], unit)
     if "target_size" in options:
@@ -194,5 +201,6 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "segment_frames": _whole(MIN_SEGMENT, MAX_SEGMENT), "tam": _tam, "hierarchy": _path, "exact_rest": _BOOL,
     "lossless": _BOOL, "weights": _TEXT, "attributes": _one_of("all", "none"), "effort": _one_of(*EFFORTS),
     "source_format": _format, "rest": _one_of("auto", "first", "mean"), "fps": _rate, "mesh": _path, "field": _TEXT,
-    "only": _patterns, "unit": _TEXT, "up_axis": _one_of("x", "y", "z"),
+    "only": _patterns, "takes": _patterns, "unit": _TEXT, "up_axis": _one_of("x", "y", "z"),
+    "loop": _BOOL, "loop_blend": _whole(0, 1 << 31),
 }

@@ -20,7 +20,7 @@ import athcodec
 from athcodec import container as ct
 from athcodec import discovery, encoder
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
-from athcodec.batch.settings import coding_options, reading_options
+from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoder import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
@@ -114,14 +114,15 @@ def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: 
 
 @contextmanager
 def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
-    """The clip on the branches that its settings ask for. Raises ClipError where it is another than `source` was, at
-    the beginning or at the end."""
+    """The clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it is another than
+    `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)
     if is_url(item.input) and (not os.path.exists(path) or sha256(path) != source["sha256"]):
         raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
     with athcodec.read(path, **reading_options(item.settings)) as clip:
-        yield _with_branches(clip, item.settings.get("hierarchy"))
+        blend = loop_frames(item.settings)
+        yield _with_branches(clip if blend is None else athcodec.looped(clip, blend), item.settings.get("hierarchy"))
     _check_source(item, source)
 
 

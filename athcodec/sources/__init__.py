@@ -37,8 +37,8 @@ class ReadOptions:
     mesh   the file that has the faces of a point cache, a hierarchy's MTG ...
     field  name of the displacement that is added to the points of a finite-element result
     only   patterns (fnmatch) of the names of the prims, objects or meshes to read; () reads all
-    takes  patterns of the names of a file's animations, each of which is a clip of its own in what is read (joining.py
-           has `split`); () reads the one motion that players begin with
+    takes  names or patterns of a file's animations, each of which is a clip of its own in what is read (joining.py has
+           `split`), "all" of them; () reads the one motion that players begin with
     skip   names of static arrays to leave out
     root   the vertex, or one per connected part, at which branches derived from edges begin
     """
@@ -48,7 +48,7 @@ class ReadOptions:
     mesh: str | PathLike[str] | None = None
     field: str | None = None
     only: Sequence[str] = ()
-    takes: Sequence[str] = ()
+    takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
 

@@ -132,16 +132,13 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
     """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
     patterns = [each[len(ANIMATION):] for each in options.only if each.startswith(ANIMATION)]
     if not options.takes:
-        return {"": Scene(file, _animations(file, patterns, f"only: got {ANIMATION}") if patterns else None)}
+        chosen = list(_animations(file, patterns, f"only: got {ANIMATION}").values()) if patterns else None
+        return {"": Scene(file, chosen)}
     if patterns:
         raise ClipError(f"takes: got only {ANIMATION}{patterns[0]} too, expected one of both")
-    scenes: dict[str, Scene] = {}
-    for index in _animations(file, options.takes, "takes: got "):
-        name = _animation_name(file, index)
-        while name in scenes:
-            name = f"{name}.{index}"
-        scenes[name] = Scene(file, [index])
-    return scenes
+    takes = [options.takes] if isinstance(options.takes, str) else list(options.takes)
+    chosen = _animations(file, ["*"] if takes == ["all"] else takes, "takes: got ")
+    return {name: Scene(file, [index]) for name, index in chosen.items()}
 
 
 def _chosen(scene: Scene, patterns: Sequence[str]) -> list[Part]:
@@ -169,17 +166,27 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[Part]:
     return parts
 
 
-def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> list[int]:
-    names = [_animation_name(file, i) for i in range(len(file.items("animations")))]
-    found = [i for i, name in enumerate(names) if any(fnmatch.fnmatchcase(name, each) for each in patterns)]
-    if not found:
-        raise ClipError(f"{what}{patterns[0]}, expected one of {brief(names)}")
-    return found
+def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
+    """Those that any of the patterns names, in the file's order."""
+    numbers, wanted = _animation_numbers(file), set()
+    for pattern in patterns:
+        found = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
+        if not found:
+            raise ClipError(f"{what}{pattern}, expected one of {brief(list(numbers))}")
+        wanted |= found
+    return {name: index for name, index in numbers.items() if name in wanted}
 
 
-def _animation_name(file: GltfFile, index: int) -> str:
-    name = file.item("animations", index).get("name")
-    return name if isinstance(name, str) and name else f"animation {index}"
+def _animation_numbers(file: GltfFile) -> dict[str, int]:
+    """All by name; where two have the same, the later one's number is added to it."""
+    numbers: dict[str, int] = {}
+    for index, animation in enumerate(file.items("animations")):
+        name = animation.get("name")
+        name = name if isinstance(name, str) and name else f"animation {index}"
+        while name in numbers:
+            name = f"{name}.{index}"
+        numbers[name] = index
+    return numbers
 
 
 def _parts(scene: Scene, node: int, mesh: dict, name: str) -> list[Part]:
@@ -430,10 +437,9 @@ def _names(parts: list[Part]) -> dict[str, Any]:
 
 
 def _played(scene: Scene) -> dict[str, Any]:
-    names = [_animation_name(scene.file, i) for i in range(len(scene.file.items("animations")))]
-    others = [name for i, name in enumerate(names) if i not in scene.played]
-    played = {"animations": [names[i] for i in scene.played]} if scene.played else {}
-    return played | ({"other_animations": others} if others else {})
+    names = list(_animation_numbers(scene.file))
+    played, others = [names[i] for i in scene.played], [name for i, name in enumerate(names) if i not in scene.played]
+    return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
 
 
 def _connections(file: GltfFile, parts: list[Part]) -> tuple[np.ndarray | None, np.ndarray | None]:
