@@ -99,6 +99,31 @@ def test_a_long_clip_is_the_same_under_settings_of_all_kinds(settings, tmp_path,
     assert record["bytes"] == Path(items[0].output).stat().st_size
 
 
+def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
+    out, settings = tmp_path / "out", tmp_path / "s.toml"
+    settings.write_text('["a.h5"]\nloop = false\n["sub/*"]\nloop = true\nloop_blend = 0\n')
+    words = ["batch", str(clips), "--out", str(out), "--settings", str(settings), "--scheduler", cluster, *WORDS]
+    assert cli.main([*words, "--split", "3", "--loop-blend", "5"]) == 0
+    found = {}
+    for name in ("a", "b", "sub/c", "long"):
+        with athcodec.open(out / f"{name}.ath", strict=True) as decoder:
+            found[name] = decoder.clip.loop, decoder.frame_count
+    assert found == {"a": (False, 20), "b": (True, 35), "sub/c": (True, 20), "long": (True, 195)}
+    with athcodec.read(clips / "long.h5") as clip:
+        alone = athcodec.encode(athcodec.looped(clip, 5), tmp_path / "alone.ath", **FAST).path
+    assert (out / "long.ath").read_bytes() == alone.read_bytes()
+    assert cli.main([*words, "--loop-blend", "5"]) == 0 and len(done_once(out)) == 4, "nothing is done again"
+    assert cli.main([*words, "--loop"]) == 0
+    with athcodec.open(out / "b.ath") as decoder:
+        assert (decoder.clip.loop, decoder.frame_count) == (True, 40)
+
+
+def test_a_blend_that_a_clip_is_too_short_for_is_told(clips, tmp_path, cluster, capsys):
+    words = ["batch", str(clips / "a.h5"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
+    assert cli.main([*words, "--loop-blend", "7"]) == 1
+    assert "loop: got 7 frames to blend, expected 0 to 6" in capsys.readouterr().err
+
+
 def test_a_line_of_the_manifest_says_what_was_made_of_what(clips, tmp_path, cluster):
     out = tmp_path / "out"
     items = batch.find([clips / "a.h5"], out, settings=FAST)
@@ -273,7 +298,8 @@ def test_later_patterns_win_and_their_bound_takes_the_place_of_another(tmp_path)
     ('["*"]\neffort = "much"', "expected one of fast"), ('["*"]\nlossless = 1', "expected true or false"),
     ('["*"]\nsegment_frames = 8', "expected a whole number, 16 to"), ('["*"]\ntam = [1, 2]', "expected four values"),
     ('["*"]\nsource_format = "zip"', "source_format: got 'zip'"), ('["*"', "got no TOML"),
-    ('["*"]\nrel_error = 1e-3\nmax_error = 1', "expected one of them")])
+    ('["*"]\nrel_error = 1e-3\nmax_error = 1', "expected one of them"), ('["*"]\nloop = "yes"', "expected true or"),
+    ('["*"]\nloop_blend = -1', "expected a whole number, 0 to"), ('["*"]\ntakes = [1]', "expected a pattern or a")])
 def test_settings_that_do_not_exist_or_make_no_sense_are_refused_by_name(text, message, tmp_path, capsys, clips):
     (tmp_path / "s.toml").write_text(text)
     words = ["batch", str(clips), "--out", str(tmp_path / "out"), "--settings", str(tmp_path / "s.toml")]

@@ -61,6 +61,57 @@ def test_speed_offset_and_loop(extended_blender, sample_ath):
             assert np.allclose(positions, decoder.positions(frame), rtol=0, atol=1e-6)
 
 
+CLIPS = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps = 30
+bpy.ops.import_scene.ath(filepath=args["ath"], set_scene=False)
+first = bpy.context.active_object
+bpy.ops.import_scene.ath(filepath=args["ath"], set_scene=False, clip=args["clip"])
+second = bpy.context.active_object
+assert (first.ath.clip, second.ath.clip) == ("calm", args["clip"]), (first.ath.clip, second.ath.clip)
+first.ath.frame_offset = second.ath.frame_offset = 1
+def positions(obj):
+    points = np.empty(3 * len(obj.data.vertices), np.float32)
+    obj.data.vertices.foreach_get("co", points)
+    return points.reshape(-1, 3)
+shown = []
+for frame in args["frames"]:
+    scene.frame_set(int(frame), subframe=frame - int(frame))
+    shown.append([positions(first), positions(second)])
+from bl_ext.user_default.athcodec import player
+names = player.clip_names(first)
+first.ath.clip = "round"
+changed = positions(first)
+first.ath.clip = "no such"
+problem = player.problem_of(first)
+bpy.ops.wm.save_as_mainfile(filepath=args["blend"])
+fresh()
+bpy.ops.wm.open_mainfile(filepath=args["blend"])
+save(shown=np.array(shown), names=names, changed=changed, problem=problem,
+     kept=sorted(each.ath.clip for each in bpy.data.objects))
+"""
+
+
+@pytest.mark.programs
+def test_objects_play_clips_of_one_file_by_name_and_loops_go_on(extended_blender, medley_ath, tmp_path):
+    frames = [1, 6, 20, 20.5, 21, 26]
+    found = extended_blender.run(CLIPS, ath=medley_ath, clip="Böe", frames=frames, blend=tmp_path / "a.blend")
+    with athcodec.open(medley_ath) as decoder:
+        calm, gust, loop = decoder.play("calm"), decoder.play("Böe"), decoder.play("round")
+        seam = (calm.positions(19) + calm.positions(0)) / 2
+        for (one, other), frame, expected in zip(found["shown"], frames, [
+                calm.positions(0), calm.positions(5), calm.positions(19), seam, calm.positions(0), calm.positions(5)]):
+            assert np.allclose(one, expected, atol=1e-5)
+            place = np.interp((frame - 1) / 30, gust.time - gust.time[0], np.arange(37))
+            low, high = gust.positions(int(place)), gust.positions(min(int(place) + 1, 36))
+            assert np.allclose(other, low + (place - int(place)) * (high - low), atol=1e-4)
+        assert np.allclose(found["changed"], loop.positions(25), atol=1e-5)
+    assert found["names"].tolist() == ["calm", "Böe", "still", "round"]
+    assert "no such" in str(found["problem"]) and "calm" in str(found["problem"])
+    assert found["kept"].tolist() == ["Böe", "no such"]
+
+
 @pytest.mark.programs
 def test_it_plays_in_a_saved_blend_that_has_moved(extended_blender, sample_ath, tmp_path):
     here, there = tmp_path / "here", tmp_path / "there"

@@ -22,6 +22,8 @@ class OBJECT_PT_ath(bpy.types.Panel):
         layout.prop(obj.ath, "filepath")
         if not obj.ath.filepath:
             return
+        if obj.ath.clip or len(player.clip_names(obj)) > 1:
+            layout.prop(obj.ath, "clip")
         for name in ("depth", "frame_offset", "speed", "loop"):
             layout.prop(obj.ath, name)
         problem = player.problem_of(obj)
@@ -34,7 +36,7 @@ class OBJECT_PT_ath(bpy.types.Panel):
     @staticmethod
     def _facts(obj) -> list[str]:
         try:
-            decoder = player.decoder_of(player.path_of(obj))
+            decoder = player.decoder_for(obj)
         except Exception as error:  # shown, not raised while drawing
             return [" ".join(str(error).split())]
         shown = decoder.depths[player.depth_of(obj, decoder)]

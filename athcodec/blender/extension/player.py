@@ -12,14 +12,15 @@ from bpy.app.handlers import persistent
 
 from .settings import DEEPEST
 
-_decoders: dict = {}  # path: (its size and time, the decoder)
+_decoders: dict = {}  # path: (its size and time, the decoder, decoders of its clips by name)
 _problems: dict = {}  # name of an object: what keeps it from playing
 _moved: dict = {}  # name of an object: its path before the .blend was saved
 _busy = False
 
 
-def decoder_of(path: str):
-    """The decoder of a file, opened again where the file has changed. Raises OSError, athcodec's errors."""
+def decoder_of(path: str, clip: str = ""):
+    """The decoder of a clip of a file ("": of its first), opened again where the file has changed. Raises OSError,
+    athcodec's errors."""
     import athcodec
 
     found = os.stat(path)
@@ -28,8 +29,24 @@ def decoder_of(path: str):
     if known is None or known[0] != stamp:
         if known is not None:
             _decoders.pop(path)[1].close()
-        _decoders[path] = stamp, athcodec.open(path)
-    return _decoders[path][1]
+        _decoders[path] = stamp, athcodec.open(path), {}
+    _, decoder, played = _decoders[path]
+    if clip and clip not in played:
+        played[clip] = decoder.play(clip)
+    return played[clip] if clip else decoder
+
+
+def decoder_for(obj):
+    """The decoder of what an object plays. Raises OSError, athcodec's errors."""
+    return decoder_of(path_of(obj), obj.ath.clip)
+
+
+def clip_names(obj) -> list[str]:
+    """Of the file that an object plays; none where it cannot be read."""
+    try:
+        return [clip.name for clip in decoder_of(path_of(obj)).clips if clip.name]
+    except Exception:  # asked while a menu is drawn; the panel says what is wrong
+        return []
 
 
 def close_all() -> None:
@@ -55,18 +72,22 @@ def place_in(decoder, settings, scene) -> float:
     rate = scene.render.fps / scene.render.fps_base
     seconds = (scene.frame_current_final - settings.frame_offset) / rate * settings.speed
     time = decoder.time - decoder.time[0]
-    if settings.loop and len(time) > 1:
+    if decoder.clip.loop and len(time) > 1:
+        time = np.append(time, time[-1] + time[-1] / (len(time) - 1))  # the first frame again, after the mean step
+        seconds %= time[-1]
+    elif settings.loop and len(time) > 1:
         seconds %= time[-1] + (time[-1] - time[-2])  # the last frame lasts as long as the one before
     place = float(np.interp(seconds, time, np.arange(len(time))))
     return round(place) if abs(place - round(place)) < 1e-4 else place
 
 
 def positions_at(decoder, place: float, depth: int) -> np.ndarray:
-    """(N, 3) float32; between two frames on the line from one to the other."""
+    """(N, 3) float32; between two frames on the line from one to the other, behind the last of a loop to the first."""
     frame = int(place)
-    positions = decoder.positions(frame, depth, np.float32)
+    positions = decoder.positions(frame % decoder.frame_count, depth, np.float32)
     if place > frame:
-        positions += np.float32(place - frame) * (decoder.positions(frame + 1, depth, np.float32) - positions)
+        after = decoder.positions((frame + 1) % decoder.frame_count, depth, np.float32)
+        positions += np.float32(place - frame) * (after - positions)
     return positions
 
 
@@ -85,7 +106,7 @@ def show(obj, scene) -> None:
 
 
 def _show(obj, scene) -> None:
-    decoder = decoder_of(path_of(obj))
+    decoder = decoder_for(obj)
     mesh = obj.data
     if len(mesh.vertices) != decoder.vertex_count:
         raise ValueError(f"the mesh has {len(mesh.vertices)} vertices, the file {decoder.vertex_count}")
