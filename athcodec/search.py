@@ -46,10 +46,8 @@ WORTH = {"_with_learned": 2, "_with_shapes": 6, "_with_node_steps": 4}  # trials
 def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
            jobs: int | None = None) -> tuple[Settings, Shape, Shapes | None]:
     """Settings, and what follows from them: hierarchy and rest pose as coded, learned shapes."""
-    sample = source.positions(len(source.segments) // 2)
-    search = Search(source, ath, first_settings(source, ath, bound, sample), sample, effort, report, jobs)
-    part = part_of(source, ath)
-    settings = search.best() if part is None else search.best_of_part(part)
+    search = Search.of(source, ath, bound, effort, report, jobs)
+    settings = search.found()
     shape = search.shape(settings)
     return settings, shape, search.shapes(shape.plan, settings)
 
@@ -83,6 +81,13 @@ class Search:
         self._shapes: dict[tuple, Shape] = {}
         self._besides = 0
 
+    @classmethod
+    def of(cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
+           jobs: int | None = None) -> Search:
+        """For a clip that is no part."""
+        sample = source.positions(len(source.segments) // 2)
+        return cls(source, ath, first_settings(source, ath, bound, sample), sample, effort, report, jobs)
+
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
 
@@ -104,6 +109,11 @@ class Search:
         hierarchy, branches = self.source.hierarchy, self.ath.node_branch
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
+
+    def found(self) -> Settings:
+        """The best settings, as far as a part shows them where the plant is large."""
+        part = part_of(self.source, self.ath)
+        return self.best() if part is None else self.best_of_part(part)
 
     def best(self) -> Settings:
         steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_shapes,

@@ -25,7 +25,7 @@ from athcodec.coding import Settings, Shape, Source, code_stems
 from athcodec.entropy import encode_shapes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
-from athcodec.search import Search, first_settings
+from athcodec.search import Search
 from athcodec.transform import DEFAULT_SEGMENT
 from bench.clips import Encoded, encoded
 
@@ -184,10 +184,8 @@ class _Again:
         self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
         self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
         self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
-        sample = self._positions[len(self._positions) // 2]
-        start = first_settings(self._source, self._ath, bound, sample)
-        self._search = Search(self._source, self._ath, start, sample, "default", lambda stage, done: None)
-        self.settings = self._search.best()
+        self._search = Search.of(self._source, self._ath, bound, "default", lambda stage, done: None)
+        self.settings = self._search.found()
 
     def of_one_level(self) -> list[Settings]:
         """Settings that a single stream could have: what the levels have now, the same for all of them."""
