@@ -1,4 +1,4 @@
-"""`python -m athcodec`: the same as the command `athcodec`, see cli.py."""
+"""`python -m athcodec`: the same as the command `athcodec`, see cli/."""
 
 from __future__ import annotations
 

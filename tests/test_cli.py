@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import h5py
@@ -378,7 +379,7 @@ def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys
         if stage == "motion":
             signal.raise_signal(kind)
 
-    monkeypatch.setattr(cli, "_progress", lambda: cli.nullcontext(interrupt))
+    monkeypatch.setattr("athcodec.cli.verbs.progress", lambda: nullcontext(interrupt))
     try:
         result = run("encode", SAMPLE, tmp_path / "a.ath", "--effort", "fast")
     except SystemExit as told:
@@ -390,7 +391,7 @@ def test_an_interrupted_decode_leaves_nothing_behind(encoded, tmp_path, monkeypa
     def interrupt(stage, fraction):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_progress", lambda: cli.nullcontext(interrupt))
+    monkeypatch.setattr("athcodec.cli.verbs.progress", lambda: nullcontext(interrupt))
     assert run("decode", encoded, tmp_path / "a.h5") == 130
     assert list(tmp_path.iterdir()) == []
 

@@ -1,0 +1,62 @@
+"""The command `athcodec`: verbs.py does what arguments.py understands; clips.py opens the files, printing.py shows.
+
+Results go to stdout, as a table or with --json as one JSON object; messages and progress go to stderr,
+progress only where that is a terminal. Exit codes: 0 done, 1 an error or a failed check, 2 wrong usage,
+130 interrupted. An error is one line; its traceback comes with --debug. How a clip is coded is not known here
+(encoder.py, decoder.py), nor what an error measure is (metrics.py).
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from athcodec.cli.arguments import make_parser
+from athcodec.cli.printing import one_line, say
+
+INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
+"""Exit codes: 128 and the number of the signal, as shells have it."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (default: that of the process) and return its exit code.
+
+    Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 when told to terminate.
+    """
+    args = make_parser().parse_args(argv)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name need not be valid text
+    try:
+        with _termination_unwinds():
+            code = args.run(args)
+            sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read stdout has left. What is still buffered goes nowhere, or Python complains at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except Exception as error:
+        if args.debug:
+            traceback.print_exc()
+        say("error", one_line(error))
+        return 1
+
+
+@contextmanager
+def _termination_unwinds() -> Iterator[None]:
+    """Let SIGTERM end the block as an exception does, so that unfinished files are removed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

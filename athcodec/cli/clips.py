@@ -1,0 +1,239 @@
+"""Clips and .ath files as the arguments of a verb ask for them, and what is measured on them."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import athcodec
+from athcodec import discovery
+from athcodec.ath import Thresholds
+from athcodec.cli.printing import counted, progress, say
+from athcodec.clip import MotionClip
+from athcodec.decoder import Decoder, Depth
+from athcodec.encoder import DEFAULT_REL_ERROR
+from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
+from athcodec.excerpt import Excerpt
+from athcodec.files import check_target
+from athcodec.joining import BLEND
+from athcodec.metrics import ErrorMeter, compare_clips
+from athcodec.units import Length
+
+ROUNDING = 1e-6
+"""How far, relatively, the encoder's figure of an error and that of ErrorMeter may differ."""
+
+
+def clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip:
+    """The clip in a file, or all of several files and of their takes, as one."""
+    with ExitStack() as opened:
+        parts = []
+        for path in paths:
+            whole = opened.enter_context(read_clip(args, path))
+            _say_takes(whole, path, args)
+            parts += [(name, Path(path).stem, part) for name, part in athcodec.split(whole).items()]
+        names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
+        loops = _checked_names(names, len(parts), args)
+        clips: dict[str, MotionClip] = {}
+        for name, (_, _, clip) in zip(names, parts):
+            if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
+                clip = dataclasses.replace(clip, rest=next(iter(clips.values())).rest)
+            clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
+        joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
+        opened.pop_all()
+    return joined
+
+
+def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
+    """Those of the loops. ClipError where they do not fit the clips."""
+    if len(names) != clip_count:
+        raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
+    loops = names if args.loop == ["all"] else args.loop or []
+    for name in (*loops, *({name: name for name in names if names.count(name) > 1})):
+        if names.count(name) != 1:
+            raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
+    if args.loop_blend and not loops:
+        raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
+    return loops
+
+
+def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
+    played, others = (clip.metadata.get(name) for name in ("animations", "other_animations"))
+    if others and not args.only:
+        say("takes", f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
+                      "--takes all makes a clip of each")
+
+
+def excerpt_of(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
+    """What of a file is decoded: frames of a clip, or all clips."""
+    if args.clip is not None or len(decoder.clips) == 1:
+        return Excerpt(decoder, args.depth, _frames(args.frames, decoder.frame_count))
+    if args.frames != (None, None):
+        names = ", ".join(clip.name for clip in decoder.clips)
+        raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
+    return Excerpt(decoder, args.depth, all_clips=True)
+
+
+def with_sources(decoder: Decoder, args: argparse.Namespace,
+                  opened: ExitStack) -> list[tuple[Decoder, str, MotionClip]]:
+    """The clips to verify, and what to compare each with: a clip of a file."""
+    if not args.against:
+        return []
+    if args.clip is not None or len(decoder.clips) == 1:
+        played = [decoder]
+    else:
+        played = [decoder.play(clip.name) for clip in decoder.clips]
+    sources = [(path, clip) for path in args.against
+               for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
+    if len(sources) != len(played):
+        raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
+    return [(each, path, clip) for each, (path, clip) in zip(played, sources)]
+
+
+def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
+    """The clip in `path`, read as the options of _source_arguments say."""
+    return athcodec.read(path, args.source_format, rest=getattr(args, "rest", "auto"), fps=args.fps, mesh=args.mesh,
+                         field=args.field, only=args.only or (), takes=args.takes or (), unit=args.unit,
+                         up_axis=args.up_axis)
+
+
+@contextmanager
+def open_file(path: str | Path, stats: bool = False, **options: Any) -> Iterator[Decoder]:
+    with naming(path), athcodec.open(path, **options) as decoder:
+        try:
+            yield decoder
+        finally:
+            if stats:
+                say("stats", _stats(decoder))
+
+
+@contextmanager
+def naming(path: str | Path) -> Iterator[None]:
+    """Let the errors of the block say which file they are about."""
+    try:
+        yield
+    except AthError as error:
+        if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
+            raise
+        raise type(error)(f"{path}: {error}") from error
+
+
+def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
+    """The clip on the branches that --hierarchy asks for: a method's, or a file's; its own without it."""
+    if hierarchy is None and clip.has_branches:
+        return clip
+    if hierarchy is None or hierarchy == "auto" or hierarchy in discovery.METHODS:
+        found = athcodec.find_branches(clip, hierarchy or "auto")
+        say("hierarchy", str(found))
+    elif hierarchy.lower().endswith(".mtg"):
+        from athcodec.sources.mtg import mtg_branches
+
+        found = athcodec.Found(*mtg_branches(hierarchy, clip), "file")
+    else:
+        found = discovery.load(hierarchy)
+    return discovery.with_branches(clip, found)
+
+
+def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
+    """The one keyword of encode() that says how far off the clip may be, or how large the file."""
+    if args.max_error is not None:
+        return {"max_error": args.max_error.in_scene_units(unit)}
+    if args.target_size is not None:
+        return {"target_size": args.target_size}
+    return {"rel_error": args.rel_error or DEFAULT_REL_ERROR}
+
+
+def thresholds(tam: tuple[Length, int, Length, int] | None, unit: Any) -> Thresholds | None:
+    if tam is None:
+        return None
+    epsilon, eta, xi, lam = tam
+    return Thresholds(epsilon.in_scene_units(unit), eta, xi.in_scene_units(unit), lam)
+
+
+def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
+    """Frames A to B - 1 of A:B, where None is the clip's end; LevelUnavailable beyond it."""
+    start = 0 if bounds[0] is None else bounds[0]
+    stop = frame_count if bounds[1] is None else bounds[1]
+    if not start < stop <= frame_count:
+        raise LevelUnavailable(f"frames: got {start}:{stop}, expected A:B with A < B <= {frame_count}")
+    return range(start, stop)
+
+
+def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dict[str, Any]]:
+    """One entry per level: what it promises, and how far off the source it is."""
+    with naming(source), clip.watched(), progress() as report:
+        if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
+            clip = athcodec.looped(clip, blend)
+        got, expected = ((item.frame_count, item.vertex_count) for item in (clip, decoder))
+        if got != expected:
+            raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
+        weights = decoder.error_weights
+        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.depths]
+        for start, stop in decoder.segments:
+            reference = clip.block(start, stop)
+            for depth, meter in enumerate(meters):
+                meter.add(reference, decoder.positions(slice(start, stop), depth))
+            if report:
+                report("measure", stop / clip.frame_count)
+    levels = [_measured(level, meter) for level, meter in zip(decoder.depths, meters, strict=True)]
+    if weights is not None:
+        promised = decoder.max_error_bound / float(weights.max())
+        levels[-1]["kept"] &= meters[-1].max_weighted_error <= promised * (1 + ROUNDING)
+    return levels
+
+
+def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
+    return {
+        "depth": level.depth,
+        "promised_max_error": level.max_error,
+        "max_error": meter.max_error,
+        "rms_error": meter.rms_error,
+        "kg_error_percent": meter.kg_error,
+        "motion_normalised_error": meter.motion_normalised_error,
+        "kept": meter.max_error <= level.max_error * (1 + ROUNDING),
+    }
+
+
+def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:
+    levels = measured["depths"]
+    broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
+    if levels[-1]["max_error"] > result["max_error_bound"]:
+        broken.append((levels[-1], result["max_error_bound"]))
+    for level, promised in broken[:1]:
+        raise AthError(
+            f"{result['file']}: level {level['depth']}: got max error {level['max_error']:.6g} against "
+            f"{measured['against']}, expected at most {promised:.6g}"
+        )
+
+
+def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth: int) -> ErrorMeter:
+    decoded = encoded.with_name(f"{encoded.stem}_level_{depth}.h5")
+    athcodec.write(Excerpt(decoder, depth), decoded)
+    with athcodec.read_hdf5(decoded) as again:
+        return compare_clips(clip, again)
+
+
+def check_output(path: str, source: str) -> None:
+    """Refuse, before any work, what can only fail after it, and what would destroy the input."""
+    check_target(path)
+    if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
+        raise FileExistsError(f"{path}: is the input, expected another file name")
+
+
+def _stats(decoder: Decoder) -> str:
+    """What was read of a file, and what that asked of a server."""
+    requests = getattr(decoder.source, "requests", None)
+    if requests is None:
+        return f"{decoder.bytes_read:,} bytes read of {decoder.file_length:,}"
+    return f"{counted(requests, 'request')}, {decoder.source.bytes:,} bytes fetched of {decoder.file_length:,}"
+
+
+def what_is_missing(decoder: Decoder) -> str:
+    if decoder.complete:
+        return decoder.missing
+    got, expected = decoder.info()["available_bytes"], decoder.file_length
+    return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.missing}"

@@ -1,0 +1,242 @@
+"""What the command line shows: tables, JSON, one-line messages, progress."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from athcodec.decoder import Decoder
+from athcodec.encoder import DEFAULT_REL_ERROR, Seam
+from athcodec.errors import AthError
+from athcodec.metrics import ErrorMeter
+
+JUMP = 3
+"""How many times the ways from frame to frame are what the way over a loop's seam should not be."""
+
+LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
+MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
+_TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
+
+Report = Callable[[str, float], None]
+
+
+def print_file(path: str, decoder: Decoder, as_json: bool) -> None:
+    facts = facts_of(path, decoder)
+    if as_json:
+        print_json(facts)
+    else:
+        _print_facts(facts)
+
+
+def facts_of(path: str | Path, decoder: Decoder) -> dict[str, Any]:
+    """decoder.info(), and per level what it adds to the file cut before it."""
+    facts = {"file": os.fspath(path)} | decoder.info()
+    facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
+    facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
+    facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
+    before = decoder.container.prelude_length
+    for level in facts["depths"]:
+        level["added_bytes"] = level["bytes"] - before
+        level["share"] = level["added_bytes"] / facts["bytes"]
+        before = level["bytes"]
+    return facts
+
+
+def _print_facts(facts: dict[str, Any]) -> None:
+    ath = facts["ath"]
+    rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
+    print(
+        f"{facts['file']}: {counted(facts['vertices'], 'vertex', 'vertices')} on "
+        f"{counted(facts['branches'], 'branch', 'branches')}, {counted(facts['frames'], 'frame')}{rate} in "
+        f"{counted(facts['segments'], 'segment')}, format {facts['format']}"
+    )
+    print(
+        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves; "
+        f"epsilon {ath['epsilon']:g}, eta {ath['eta']}, xi {ath['xi']:g}, lambda {ath['lam']}"
+    )
+    unit = f" {facts['unit']}" if facts["unit"] else ""
+    print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    if facts["levels"] < facts["full_levels"]:
+        print(f"Holds levels 0 to {facts['levels'] - 1} of 0 to {facts['full_levels'] - 1}.")
+    if facts["missing"]:
+        print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or facts["clips"][0]["loop"]:
+        _print_clips(facts)
+    _print_levels(facts)
+
+
+def _print_clips(facts: dict[str, Any]) -> None:
+    """Errors at the seam are those of the deepest stored level."""
+    rows = [[clip["name"], f"{clip['frames']:,}", f"{clip['seconds']:.4g}", f"{clip['segments']:,}",
+             f"{clip['seam_errors'][facts['levels'] - 1]:.3g}" if clip["loop"] else "",
+             *(f"{error:.3g}" for error in clip["max_errors"])] for clip in facts["clips"]]
+    levels = [f"max at {level}" for level in range(facts["levels"])]
+    print_table(["clip", "frames", "seconds", "segments", _head("loop's seam", facts["unit"]), *levels], rows)
+
+
+def _print_levels(facts: dict[str, Any]) -> None:
+    columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
+    cells = [
+        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"]
+        for level in facts["depths"]
+    ]
+    print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
+
+
+def _level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
+    """One row per level, ending in its `cells`, between what the file holds before and behind them."""
+    levels, total = facts["depths"], facts["bytes"]
+
+    def row(name: str, nodes: str, size: int) -> list[str]:
+        return [name, nodes, f"{size:,}", f"{size / total:.1%}"]
+
+    rows = [row("prelude", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
+    for level, more in zip(levels, cells, strict=True):
+        name = f"{level['depth']}" if level["available"] else f"{level['depth']} (incomplete)"
+        rows.append(row(name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
+    behind = total - levels[-1]["bytes"]
+    return [*rows, row("arrays", "", behind)] if behind else rows
+
+
+def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
+    seconds = facts["frames"] / facts["fps"]
+    columns = [*(_head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
+    cells = []
+    for level, meter in zip(facts["depths"], meters, strict=True):
+        errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
+        relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
+        cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
+    print(
+        f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
+        "decoded every depth and measured it against the source:"
+    )
+    print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
+    print(_size(facts))
+
+
+def print_verdict(result: dict[str, Any]) -> None:
+    for clip in result["clips"]:
+        if clip["name"]:
+            print(f"{clip['name']}, against {clip['against']}:")
+        lengths = [_head(name, result["unit"]) for name in ("promised", "max", "RMS")]
+        rows = []
+        for level in clip["depths"]:
+            measures = [f"{level[name]:.4g}" for name in MEASURES]
+            rows.append([f"{level['depth']}", *measures, "yes" if level["kept"] else "NO"])
+        print_table(["depth", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
+    if result["ok"]:
+        sources = ", ".join(clip["against"] for clip in result["clips"])
+        more = f"; every depth is as close to {sources} as the file says" if sources else ""
+        print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
+
+
+def print_preview(todo: Sequence[Any], as_json: bool) -> None:
+    if as_json:
+        print_json({"clips": [{"input": each.item.shown, "output": each.item.output, "settings": each.item.settings,
+                                "reason": each.reason or None} for each in todo]})
+        return
+    rows = [[each.item.name, each.reason or "kept", each.item.output,
+             ", ".join(f"{name}={value}" for name, value in each.item.settings.items()) or "default"] for each in todo]
+    print_table(["clip", "why", "output", "settings"], rows, "left")
+    print(f"{counted(sum(bool(each.reason) for each in todo), 'clip')} of {len(todo):,} to do.")
+
+
+def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
+    if args.json:
+        failed = [{name: record[name] for name in ("input", "output", "reason")} for record in outcome.failed]
+        print_json({"done": len(outcome.done), "kept": len(outcome.kept), "failed": failed, "bytes": outcome.bytes,
+                     "raw_bytes": outcome.raw_bytes, "seconds": outcome.seconds})
+    else:
+        ratio = f", {outcome.raw_bytes / outcome.bytes:.1f} to 1" if outcome.bytes else ""
+        print(f"{args.out}: {counted(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
+              f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s")
+    for record in outcome.failed:
+        say("failed", f"{record['output']}: {record['reason']}")
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
+    for index, name in enumerate(columns):
+        table.add_column(Text(name), justify=justify if index else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)
+
+
+def print_json(facts: dict[str, Any]) -> None:
+    print(json.dumps(_finite(facts), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    """`value` for JSON, which knows neither infinity nor NaN: they become null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def _head(name: str, unit: Any) -> str:
+    return f"{name} ({unit})" if unit else name
+
+
+def _size(facts: dict[str, Any]) -> str:
+    return (
+        f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: "
+        f"{facts['ratio']:.1f} to 1."
+    )
+
+
+def say(kind: str, message: str) -> None:
+    print(f"athcodec: {kind}: {message}", file=sys.stderr)
+
+
+def say_seam(seam: Seam, path: str) -> None:
+    jumps = seam.step > JUMP * seam.step_beside + seam.error
+    say("loop", f"{seam.clip or path}: vertices go up to {seam.step:.3g} from the last frame to the first, "
+                 f"{seam.step_beside:.3g} from frame to frame beside that; the file is off by {seam.error:.3g} there"
+                 + ("; it jumps, --loop-blend smooths it" if jumps else ""))
+
+
+def one_line(error: Exception) -> str:
+    """What went wrong, where, got, expected. An error that nobody foresaw is named by its class."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    text = " ".join(str(error).split())
+    foreseen = isinstance(error, (AthError, OSError))
+    return text if foreseen and text else f"{type(error).__name__}: {text} (--debug shows where)"
+
+
+@contextmanager
+def progress() -> Iterator[Report | None]:
+    """A function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def report(stage: str, fraction: float) -> None:
+            if fraction < bar.tasks[task].completed:  # other work, such as measuring what was encoded
+                bar.reset(task, total=1.0)
+            bar.update(task, completed=fraction, description=stage)
+
+        yield report

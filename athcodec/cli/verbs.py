@@ -1,0 +1,272 @@
+"""What each verb of the command line does: a function that takes the parsed arguments and returns the exit code."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import athcodec
+from athcodec import discovery
+from athcodec.cli.clips import (
+    bound,
+    check_output,
+    clip_to_encode,
+    decode_and_measure,
+    excerpt_of,
+    measure_against,
+    naming,
+    open_file,
+    read_clip,
+    refuse_broken_promises,
+    thresholds,
+    what_is_missing,
+    with_branches,
+    with_sources,
+)
+from athcodec.cli.printing import (
+    facts_of,
+    one_line,
+    print_demo,
+    print_file,
+    print_json,
+    print_outcome,
+    print_preview,
+    print_table,
+    print_verdict,
+    progress,
+    say,
+    say_seam,
+)
+from athcodec.encoder import DEFAULT_REL_ERROR
+from athcodec.errors import AthError
+from athcodec.hierarchy import branch_orders
+
+DEMO_PAGE = "athcodec_demo.html"
+
+
+def encode(args: argparse.Namespace) -> int:
+    paths = [args.input, *(args.paths or ())]
+    output = args.output or paths.pop()
+    for path in paths:
+        check_output(output, path)
+    with clip_to_encode(paths, args) as clip, naming(paths[0]), progress() as report:
+        unit = clip.metadata.get("unit")
+        summary = athcodec.encode(
+            with_branches(clip, args.hierarchy),
+            output,
+            segment_frames=args.segment_frames,
+            tam=thresholds(args.tam, unit),
+            exact_rest=args.exact_rest, lossless=args.lossless, weights=args.weights,
+            attributes=args.attributes,
+            effort=args.effort,
+            jobs=args.jobs,
+            progress=report,
+            **bound(args, unit),
+        )
+    with open_file(output, strict=True) as decoder:
+        print_file(output, decoder, args.json)
+    for seam in summary.seams:
+        say_seam(seam, paths[0])
+    return 0
+
+
+def batch(args: argparse.Namespace) -> int:
+    from athcodec import batch
+    from athcodec.batch.show import show_of_terminal
+
+    inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
+    items = batch.find(inputs, args.out, settings=_batch_settings(args),
+                       patterns=batch.load_settings(args.settings) if args.settings else None)
+    where = {"manifest": args.manifest, "redo": args.redo}
+    how = {"workers": args.workers, "scheduler": args.scheduler, "verify": args.verify}
+    if args.split:
+        how["split"] = args.split
+    if args.dry_run:
+        print_preview(batch.preview(items, args.out, **where), args.json)
+        return 0
+    outcome = batch.run(items, args.out, **where, **how, show=show_of_terminal())
+    print_outcome(outcome, args)
+    return 1 if outcome.failed else 0
+
+
+def _listed(path: str) -> list[str]:
+    """Inputs from a file, one per line; "-" is stdin."""
+    with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
+        return [line.rstrip("\r\n") for line in file if line.strip()]
+
+
+def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
+    """The settings of a clip that options of the command line give."""
+    from athcodec.batch.settings import BOUNDS, READING
+
+    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend")
+    given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
+    given |= {name: getattr(args, name) for name, usual in (("attributes", "all"), ("effort", "default"))
+              if getattr(args, name) != usual}
+    if given.get("rest") == "auto":
+        del given["rest"]
+    if args.max_error is not None:
+        given["max_error"] = str(args.max_error) if args.max_error.unit else args.max_error.value
+    if args.tam is not None:
+        epsilon, eta, xi, lam = args.tam
+        given["tam"] = [str(epsilon), eta, str(xi), lam]
+    return given
+
+
+def hierarchy(args: argparse.Namespace) -> int:
+    if args.save:
+        check_output(args.save, args.input)
+    with read_clip(args, args.input) as clip, naming(args.input), progress() as report:
+        if report:
+            report("branches", 0.0)
+        found = athcodec.find_branches(clip, args.method, args.root)
+    if args.save:
+        discovery.save(found, args.save)
+    sizes = np.bincount(found.vertex_branch)
+    orders = branch_orders(found.branch_parent)
+    if args.json:
+        print_json({"file": args.input, "method": found.method, "vertices": len(found.vertex_branch),
+                     "branches": len(sizes), "roots": int((found.branch_parent < 0).sum()),
+                     "branches_per_order": np.bincount(orders).tolist(),
+                     "vertices_per_order": np.bincount(orders, sizes).astype(int).tolist(), "saved": args.save})
+        return 0
+    print(f"{args.input}: {found}")
+    rows = [[f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
+            for order in range(orders.max() + 1)]
+    print_table(["order", "branches", "vertices"], rows)
+    if args.save:
+        print(f"{args.save}: edit it, and use it with athcodec encode --hierarchy")
+    return 0
+
+
+def decode(args: argparse.Namespace) -> int:
+    check_output(args.output, args.input)
+    with open_file(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
+        excerpt = excerpt_of(decoder, args)
+        with progress() as report:
+            athcodec.write(excerpt, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
+        if decoder.missing:
+            say("warning", f"{args.input}: decoded to level {excerpt.depth}; {what_is_missing(decoder)}")
+        print(f"{args.output}: {excerpt.frame_count:,} frames, {excerpt.vertex_count:,} vertices, "
+              f"level {excerpt.depth}")
+    return 0
+
+
+def info(args: argparse.Namespace) -> int:
+    with open_file(args.file, args.stats) as decoder:
+        print_file(args.file, decoder, args.json)
+    return 0
+
+
+def verify(args: argparse.Namespace) -> int:
+    result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
+    try:
+        with open_file(args.file, args.stats, strict=True, clip=args.clip) as decoder, ExitStack() as opened:
+            decoder.check()
+            result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
+            for played, source, clip in with_sources(decoder, args, opened):
+                measured = {"name": played.clip.name, "against": source}
+                measured["depths"] = measure_against(played, source, clip)
+                result["clips"].append(measured)
+                refuse_broken_promises(result, measured)
+        result["ok"] = True
+    except AthError as error:
+        result["error"] = one_line(error)
+    if args.json:
+        print_json(result)
+    else:
+        print_verdict(result)
+    if not result["ok"]:
+        say("error", result["error"])
+    return 0 if result["ok"] else 1
+
+
+def truncate(args: argparse.Namespace) -> int:
+    check_output(args.output, args.input)
+    with naming(args.input):
+        athcodec.truncate(args.input, args.output, args.depth)
+    before, after = (os.path.getsize(path) for path in (args.input, args.output))
+    print(f"{args.output}: levels 0 to {args.depth}, {after:,} of {before:,} bytes")
+    return 0
+
+
+def formats(args: argparse.Namespace) -> int:
+    from athcodec import exporters, sources
+
+    read, written = ({each.name: each for each in module.FORMATS} for module in (sources, exporters))
+    rows = [{"format": name, "reads": _suffixes(read.get(name)), "writes": _suffixes(written.get(name)),
+             "title": each.title, "extra": each.extra, "installed": each.is_installed}
+            for name, each in (written | read).items()]
+    if args.json:
+        print_json({"formats": rows})
+        return 0
+    cells = [[row["format"], " ".join(row["reads"]), " ".join(row["writes"]), row["title"], _needs(row)]
+             for row in rows]
+    print_table(["format", "reads", "writes", "what", "needs"], cells, justify="left")
+    return 0
+
+
+def _suffixes(kind: Any) -> list[str]:
+    return list(kind.suffixes) if kind else []
+
+
+def _needs(row: dict[str, Any]) -> str:
+    if not row["extra"]:
+        return ""
+    return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
+
+
+def view(args: argparse.Namespace) -> int:
+    from athcodec import view
+
+    with naming(args.file):
+        if args.export:
+            check_output(args.export, args.file)
+            print(f"{args.export}: {view.export_page(args.file, args.export, args.clip):,} bytes, opens in any browser")
+            return 0
+        view.serve(args.file, args.port, lambda address: _say_where(address, args.no_browser), args.clip)
+    return 0
+
+
+def _say_where(address: str, no_browser: bool) -> None:
+    from athcodec import view
+
+    print(f"{address} (Ctrl-C ends it)", flush=True)
+    if not no_browser:
+        view.open_browser(address)
+
+
+def demo(args: argparse.Namespace) -> int:
+    with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        source = athcodec.sample_path()
+        encoded = Path(folder, f"{source.stem}.ath")
+        with athcodec.read_hdf5(source) as clip:
+            with progress() as report:
+                athcodec.encode(clip, encoded, rel_error=DEFAULT_REL_ERROR, progress=report)
+            with open_file(encoded, strict=True) as decoder:
+                meters = [decode_and_measure(decoder, clip, encoded, d) for d in range(decoder.level_count)]
+                print_demo(facts_of(encoded, decoder), meters)
+        _export_demo(encoded, Path(args.keep or ".", DEMO_PAGE))
+        if args.keep is not None:
+            print(f"The file and its decoded levels are in {folder}.")
+    return 0
+
+
+def _export_demo(encoded: Path, page: Path) -> None:
+    from athcodec import view
+
+    try:
+        view.export_page(encoded, page)
+    except OSError as error:  # a folder that is read-only is no reason to fail at the end
+        say("warning", f"no page to look at: {one_line(error)}")
+    else:
+        print(f"The sample moves in {page.resolve()}: open it in a browser.")
