@@ -339,7 +339,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
     def read(_) -> None:
         for _ in range(10):
             decoder.check()
-            for name in ("attributes", "metadata", "faces", "edges"):
+            for name in ("attributes", "joined_metadata", "faces", "edges"):
                 vars(decoder).pop(name)   # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata == full_clip.metadata

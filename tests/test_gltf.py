@@ -430,10 +430,10 @@ def rich_file(path):
     return made.save(path)
 
 
-def tried(path):
+def tried(path, **options):
     """Reads all of it, whatever it is."""
     try:
-        with read(path, "gltf") as clip:
+        with read(path, "gltf", **options) as clip:
             for _ in clip.blocks():
                 pass
     except (ClipError, MissingExtra, OSError) as error:
@@ -455,6 +455,18 @@ def test_cut_or_changed_files_are_refused_and_nothing_else(tmp_path):
             data[place] = rng.choice([rng.integers(0, 256), ord("9"), ord("-"), ord("0")])
         bad.write_bytes(data)
         tried(bad)
+
+
+def test_cut_or_changed_takes_are_refused_and_nothing_else(tmp_path):
+    whole = with_takes(tmp_path / "a.glb").read_bytes()
+    bad, rng = tmp_path / "bad.glb", np.random.default_rng(2)
+    size = 20 + int.from_bytes(whole[12:16], "little")  # the text
+    for _ in range(300):
+        data = bytearray(whole)
+        for place in rng.integers(20, size, rng.integers(1, 6)):
+            data[place] = rng.choice([rng.integers(32, 127), ord("9"), ord("-"), ord("0")])
+        bad.write_bytes(data)
+        tried(bad, takes="all")
 
 
 def test_a_file_that_changes_while_it_is_read_is_noticed(tmp_path):
