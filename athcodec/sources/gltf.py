@@ -4,9 +4,9 @@ Vertices are those of the meshes in the order of the nodes in the scene; a mesh 
 Frames are evaluated a block at a time; keys of animations and base meshes are held in memory, morph targets are read
 when a frame needs them. Frames lie at `fps`; by default at the rate that the keys were sampled at, else 30 per second.
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
-names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One whose
-extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco, instancing
-on the GPU, materials, cameras; normals of a mesh that moves.
+names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
+whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. Not read: Draco,
+instancing on the GPU, materials, cameras; normals of a mesh that moves.
 """
 
 from __future__ import annotations
