@@ -65,6 +65,11 @@ class Source:
         self.segments = [segment for segments in self.span_segments for segment in segments]
 
     @property
+    def span_starts(self) -> list[int]:
+        """The first segment of each clip of the file."""
+        return np.cumsum([0, *map(len, self.span_segments[:-1])]).tolist()
+
+    @property
     def reach(self) -> float:
         """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
         low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)

@@ -383,7 +383,8 @@ class Decoder:
         """What `athcodec info --json` prints: of the whole file, all clips together."""
         return {
             "vertices": self.vertex_count, "frames": self.container.header.frame_count, "fps": self.fps,
-            "branches": self.branch_count, "segments": self.container.header.segment_count, "nodes": self._player.info.node_count, "bytes": self.file_length,
+            "branches": self.branch_count, "segments": self.container.header.segment_count,
+            "nodes": self._player.info.node_count, "bytes": self.file_length,
             "available_bytes": self.container.available_length, "max_error_bound": self.max_error_bound,
             "complete": self.complete, "levels": self.level_count, "full_levels": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),

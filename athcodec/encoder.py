@@ -34,7 +34,7 @@ from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.progress import Course, Progress
 from athcodec.progress import weights as stage_weights
-from athcodec.search import EFFORTS, decide
+from athcodec.search import EFFORTS, SAMPLES, decide
 from athcodec.shapes import Shapes
 from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, split_segments
 
@@ -59,9 +59,9 @@ class LevelSummary:
 
 @dataclass(frozen=True)
 class Seam:
-    """Where a loop begins again: the largest way of any vertex from the source's last frame to its first (`step`), and
-    from frame to frame beside that (`step_beside`, which it resembles in a seamless loop); how far off the file's step is
-    at most (`error`). Scene units."""
+    """Where a loop begins again, in scene units. step: the largest way of any vertex from the source's last frame to
+    its first; step_beside: from frame to frame beside that, which it resembles in a seamless loop; error: how far off
+    the file's step is at most."""
 
     clip: str
     step: float
@@ -189,8 +189,9 @@ def _course(clip: MotionClip, progress: Progress | None, segment_frames: int | N
             target_size: int | None, draft: bool = False) -> Course:
     segments = split_segments(clip.frame_count, clip.vertex_count, segment_frames or DEFAULT_SEGMENT,
                               ct.Limits.memory_bytes)
-    return Course(progress, stage_weights(clip.vertex_count, segments, effort, branches=not clip.has_branches,
-                                    sizes=target_size is not None, motion=not draft))
+    return Course(progress, stage_weights(clip.vertex_count, segments, effort,
+                                          samples=min(SAMPLES, len(clip.span_frames)), branches=not clip.has_branches,
+                                          sizes=target_size is not None, motion=not draft))
 
 
 def _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs) -> None:
@@ -229,7 +230,8 @@ def _best_branches(clip: MotionClip, fraction: float, report: Progress) -> Found
         return found[0]
     start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
     stop = min(clip.frame_count, start + TRIAL_FRAMES)
-    some = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.rest.astype(clip.rest_dtype))
+    some = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps,
+                      rest=clip.rest.astype(clip.rest_dtype))
 
     def size(each: Found, part: float) -> float:
         report("branches", part)

@@ -1,8 +1,8 @@
 """Several clips of one plant as one, for one file; and clips that repeat without a jump.
 
-A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such clips
-one after the other; the encoder sees one long clip whose spans it codes apart. `split` is its inverse. `looped` makes a
-clip that can be played over and over. All read frames only when they are asked for.
+A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such
+clips one after the other; the encoder sees one long clip whose spans it codes apart. `split` is its inverse. `looped`
+makes a clip that can be played over and over. All read frames only when they are asked for.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip an
 def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     """One clip of several by name, which go into one .ath file, in this order.
 
-    They have the same vertices, branches, faces, edges and attributes, which the file holds once, and the same rest pose:
-    where that of a clip is its first frame, as it is for sources without one, the others' counts. Metadata in which they
-    differ are kept for each. Closing the result closes them all. Raises ClipError where they do not fit together.
+    They have the same vertices, branches, faces, edges and attributes, which the file holds once, and the same rest
+    pose: where that of a clip is its first frame, as it is for sources without one, the others' counts. Metadata in
+    which they differ are kept for each. Closing the result closes them all. Raises ClipError where they do not fit
+    together.
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -65,13 +66,14 @@ def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     """The clip as a loop: behind its last frame comes its first, after the mean time of a frame.
 
-    blend: for a motion that does not end where it began, so many frames at its end are taken off and blended into those at
-    its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a third of
-    the frames. Raises ClipError.
+    blend: for a motion that does not end where it began, so many frames at its end are taken off and blended into those
+    at its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a
+    third of the frames. Raises ClipError.
     """
     span = _only_span("", clip)
     if not 0 <= blend <= clip.frame_count // 3:
-        raise ClipError(f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip")
+        raise ClipError(f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the "
+                        "clip")
     frames = clip.frame_count - blend
     spans = (dataclasses.replace(span, frame_count=frames, loop=True),)
     if not blend:
@@ -130,15 +132,17 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
     for other, clip in own.items():
         if not np.array_equal(clip.rest, chosen.rest):
             vertex = int(np.linalg.norm(clip.rest - chosen.rest, axis=1).argmax())
-            raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is {clip.rest[vertex].tolist()}, "
-                            f"not {chosen.rest[vertex].tolist()}), expected clips of one plant")
+            raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is "
+                            f"{clip.rest[vertex].tolist()}, not {chosen.rest[vertex].tolist()}), expected clips of one "
+                            "plant")
     return chosen.rest.astype(chosen.rest_dtype)
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     """What all have in common, and under OWN what each has of its own."""
     every = [clip.metadata for clip in clips.values()]
-    common = {key: value for key, value in every[0].items() if all(key in each and each[key] == value for each in every)}
+    common = {key: value for key, value in every[0].items()
+              if all(key in each and each[key] == value for each in every)}
     own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
            for name, clip in clips.items()}
     own = {name: metadata for name, metadata in own.items() if metadata}

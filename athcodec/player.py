@@ -63,7 +63,8 @@ class Clip(Structure):
     """ath_clip."""
 
     _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
+    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
+                                              "reserved").split()]
 
 
 class Chunk(Structure):

@@ -300,8 +300,8 @@ class _Http:
         """The server ignores ranges: what it sends is taken as a whole where it can be kept."""
         length = None if "Content-Encoding" in answer.headers else answer.content_length
         if length is not None and length > KEPT_BYTES:
-            raise self._refusal(f"the server ignores byte ranges and the file has {length} bytes; expected ranges, or at "
-                                f"most {KEPT_BYTES} bytes")
+            raise self._refusal(f"the server ignores byte ranges and the file has {length} bytes; expected ranges, or "
+                                f"at most {KEPT_BYTES} bytes")
         data = await self._body(answer, length)
         self._check_same(len(data), answer.headers)
         return data

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,10 +37,43 @@ from athcodec.transform import Plan, SegmentMotion, position_error
 
 EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
+SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that shapes are learned from
 SHAPES_KEPT = 6  # between trials
 WORTH = {"_with_learned": 2, "_with_shapes": 6, "_with_node_steps": 4}  # trials, of what a step does besides
 
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
+
+    positions: np.ndarray
+    frames: int
+
+    @property
+    def scale(self) -> float:
+        return self.frames / self.positions.shape[2]
+
+    def of_part(self, part: Part) -> Sample:
+        return Sample(self.positions[part.vertices], self.frames)
+
+
+def samples_of(source: Source) -> list[Sample]:
+    """The segment in the middle of a clip; of several clips those of a few, from calm to wild, each for its like."""
+    middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
+    if len(middles) == 1:
+        return [Sample(source.positions(middles[0]), source.clip.frame_count)]
+    lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
+    groups = np.array_split(np.argsort([_moved(source, each) for each in middles], kind="stable"),
+                            min(SAMPLES, len(middles)))
+    return [Sample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups]
+
+
+def _moved(source: Source, segment: int) -> float:
+    """How far vertices go from the first frame of a segment to its middle, RMS."""
+    start, stop = source.segments[segment]
+    first, middle = (source.clip.block(each, each + 1).astype(np.float64) for each in (start, (start + stop) // 2))
+    return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)
 
 
 def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
@@ -52,7 +85,7 @@ def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress
     return settings, shape, search.shapes(shape.plan, settings)
 
 
-def first_settings(source: Source, ath: Ath, bound: float, sample: np.ndarray) -> Settings:
+def first_settings(source: Source, ath: Ath, bound: float, wildest: Sample) -> Settings:
     """Where a search starts from."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
@@ -60,20 +93,22 @@ def first_settings(source: Source, ath: Ath, bound: float, sample: np.ndarray) -
     return Settings(
         bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
         level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.wide,
-        loose=loose_branches(source, sample), lags=lags(source, rest_step), omega=(0,) * levels,
+        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step), omega=(0,) * levels,
         learned=(False,) * levels, shaped=None, node_steps=np.full(levels, step))
 
 
 class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
 
-    share: what the clip is a part of, if it is one.
+    samples: from calm to wild; that in the middle says what maps of nodes need. share: what the clip is a part of, if
+    it is one.
     """
 
-    def __init__(self, source: Source, ath: Ath, start: Settings, sample: np.ndarray, effort: str, report: Progress,
+    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[Sample], effort: str, report: Progress,
                  jobs: int | None = None, share: Share | None = None):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
-        self.start, self.sample, self.levels = start, sample, ath.height + 2
+        self.start, self.samples, self.levels = start, samples, ath.height + 2
+        self.sample = samples[len(samples) // 2].positions
         self.share = share or Share.everything(self.levels)
         self.doubt: float | None = None  # of SHAPE_DOUBTS, that the shapes found best had to overcome
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
@@ -85,8 +120,8 @@ class Search:
     def of(cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
            jobs: int | None = None) -> Search:
         """For a clip that is no part."""
-        sample = source.positions(len(source.segments) // 2)
-        return cls(source, ath, first_settings(source, ath, bound, sample), sample, effort, report, jobs)
+        samples = samples_of(source)
+        return cls(source, ath, first_settings(source, ath, bound, samples[-1]), samples, effort, report, jobs)
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -143,8 +178,8 @@ class Search:
         some = replace(start, sheet=part.source.wide, loose=start.loose[kept], lags=start.lags[kept], limit=limit)
         share = Share.of(branch_records(self.source.hierarchy, self.ath, start),
                          branch_records(part.source.hierarchy, part.ath, some))
-        search = Search(part.source, part.ath, some, self.sample[part.vertices], self.effort, self.report, self.jobs,
-                        share)
+        samples = [sample.of_part(part) for sample in self.samples]
+        search = Search(part.source, part.ath, some, samples, self.effort, self.report, self.jobs, share)
         found = search.best()
         inner, all_inner = search.inner_nodes(), self.inner_nodes()
         coarser = np.where(inner > 0, np.sqrt(share.vertices * inner / np.maximum(all_inner, 1)), 1.0)
@@ -158,7 +193,7 @@ class Search:
         return replace(settings, shaped=self._pieces_for_shapes(settings, [search.doubt])[0])
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
-        """(bytes of a whole file, bytes per level in the sample) at these settings."""
+        """(bytes of a whole file, and of each level's streams in it) at these settings."""
         varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.omega, settings.learned,
                   settings.sheet.tobytes(), settings.shaped is not None and settings.shaped.tobytes())
         if varied not in self._known:
@@ -169,24 +204,25 @@ class Search:
         shape = self.shape(settings)
         shapes = self.shapes(shape.plan, settings)
         try:
-            coded = code_stems(shape, settings, self.sample, shapes)
+            levels = sum(self._level_bytes(shape, settings, shapes, sample) for sample in self.samples)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
-        levels, heads, shape_bytes = np.zeros(self.levels), np.zeros(self.levels), 0.0
+        shape_bytes = 0.0
         for level, data in entropy.encode_shapes(shape.plan, shapes).items():
             shape_bytes += len(data) * self.share.rows[level]
+        return levels.sum() + shape_bytes + self._prelude_bytes(shape), levels
+
+    def _level_bytes(self, shape: Shape, settings: Settings, shapes: Shapes | None, sample: Sample) -> np.ndarray:
+        """Of the streams in all that a sample stands for, (levels,)."""
+        coded = code_stems(shape, settings, sample.positions, shapes)
+        levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
         corrections = len(coded.correction_chunk)
         if corrections:
             levels += corrections * self._corrected(shape.plan, coded.corrections)
         levels += (levels - heads) * (self.share.rows - 1)
-        return levels.sum() * self._scale + shape_bytes + self._prelude_bytes(shape), levels
-
-    @property
-    def _scale(self) -> float:
-        """Frames of the clip over those of the sample."""
-        return self.source.clip.frame_count / self.sample.shape[2]
+        return levels * sample.scale
 
     def _prelude_bytes(self, shape: Shape) -> float:
         return shape.prelude_bytes * self.share.vertices
@@ -216,12 +252,12 @@ class Search:
         shape = self.shape(plain)
         shapes = self.shapes(shape.plan, plain, everywhere=True)
         pieces = np.repeat(np.arange(len(shapes.counts)), shape.plan.pieces["count"])
-        modes, tracks = (estimated_bits(analyse(shape, plain, self.sample, some)[0].coefficients, pieces,
-                                        len(shapes.counts)) for some in (None, shapes))
+        modes, tracks = (sum(estimated_bits(analyse(shape, plain, sample.positions, some)[0].coefficients, pieces,
+                                            len(shapes.counts)) * sample.scale for sample in self.samples)
+                         for some in (None, shapes))
         owners = np.repeat(np.arange(len(shapes.counts)), shapes.counts)
         price = estimated_bits(shapes.integers, owners, len(shapes.counts))
-        return [(shapes.counts > 0) & ((tracks * self._scale + price) * doubt < modes * self._scale)
-                for doubt in doubts]
+        return [(shapes.counts > 0) & ((tracks + price) * doubt < modes) for doubt in doubts]
 
     def _corrected(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
         """Fractions of the corrections that fall on the pieces of each level."""
@@ -326,7 +362,8 @@ class Search:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         shape, errors = self.shape(settings), self._level_errors(settings.bound)
         segment, _ = analyse(shape, settings, self.sample, self.shapes(shape.plan, settings))
-        rest = self.cost(settings)[1].sum() * self._scale + self._prelude_bytes(shape)
+        rest = self.cost(settings)[1].sum() + self._prelude_bytes(shape)
+        scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         roots = int((self.source.hierarchy.branch_parent < 0).sum())
         chosen = limits = None
@@ -339,7 +376,7 @@ class Search:
             if limits is None:
                 size = sum(len(entropy.encode_affines(segment, level)) * self.share.nodes[level]
                            for level in self._map_levels(shape.plan))
-                if size * self._scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(shape, segment)
                 limits[1:] = np.minimum(qz.NODE_HARM * limits[1:], limits[:-1])  # a deeper level stays the better one

@@ -25,7 +25,6 @@ import athcodec
 from bench import compare, data, progressive
 from bench.clips import REL_ERROR
 from bench.codecs import Codec
-from bench.codecs.programs import lossless
 from bench.curves import Curve
 from bench.opponents import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
 from bench.store import Store

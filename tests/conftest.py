@@ -111,8 +111,9 @@ def medley_clips():
     clip = awkward(seed=7, branches=9, longest=8, frames=90, roots=1, shape="stem", motion="sway")
 
     def part(start, stop, time):
-        return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent, stem_index=clip.stem_index,
-                          rest=clip.rest.astype(clip.rest_dtype), metadata={"unit": "m", "from": start})
+        return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent,
+                          stem_index=clip.stem_index, rest=clip.rest.astype(clip.rest_dtype),
+                          metadata={"unit": "m", "from": start})
 
     return {"calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
             "Böe": part(20, 57, np.sort(np.random.default_rng(2).random(37)) + np.arange(37) / 24),

@@ -302,7 +302,6 @@ def test_the_drill_finds_every_clip_once(tmp_path):
 
 @pytest.mark.parametrize("verb", charts.CHARTS)
 def test_results_of_the_repository_have_pictures(verb, tmp_path):
-    pytest.importorskip("matplotlib", reason=plots.MISSING)
     result = json.loads((ROOT / "bench" / "results" / f"{verb}.json").read_text())
     [picture] = charts.draw(verb, verb, result, tmp_path)
     assert picture.read_bytes().startswith(b"\x89PNG")

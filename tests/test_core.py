@@ -36,7 +36,8 @@ class Info(ctypes.Structure):
 
 class Clip(ctypes.Structure):
     _fields_ = [("name", c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
+    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
+                                              "reserved").split()]
 
 
 class Limits(ctypes.Structure):

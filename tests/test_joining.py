@@ -1,5 +1,5 @@
-"""Several clips of one plant in one file: found by name, each as close to its source as alone, smaller than apart; loops
-without a jump."""
+"""Several clips of one plant in one file: found by name, each as close to its source as alone, smaller than apart;
+loops without a jump."""
 
 from __future__ import annotations
 
@@ -80,6 +80,29 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
     assert together.bytes < 0.6 * sum(apart)
 
 
+def test_the_order_of_the_clips_says_nothing_about_the_size(medley_clips, tmp_path):
+    names = list(medley_clips)
+    orders = (names, names[::-1], names[1:] + names[:1])
+    sizes = [athcodec.encode(athcodec.join({name: medley_clips[name] for name in order}), tmp_path / "a.ath",
+                             max_error=1e-3, segment_frames=16).bytes for order in orders]
+    assert max(sizes) - min(sizes) < 0.005 * max(sizes)
+
+
+def test_a_large_plant_is_searched_on_a_part_of_it_in_all_its_clips(sample_clip, tmp_path, monkeypatch):
+    def part(start, stop):
+        return changed(sample_clip, positions=sample_clip.block(start, stop), time=sample_clip.time[: stop - start])
+
+    clips = {"a": part(0, 40), "b": part(40, 120)}
+    whole = athcodec.encode(athcodec.join(clips), tmp_path / "a.ath", rel_error=1e-3)
+    monkeypatch.setattr("athcodec.part.LARGE", 500)
+    monkeypatch.setattr("athcodec.part.LEAST_PART", 200)
+    searched = athcodec.encode(athcodec.join(clips), tmp_path / "b.ath", rel_error=1e-3)
+    assert searched.max_error_bound == whole.max_error_bound and searched.bytes < 1.05 * whole.bytes
+    with athcodec.open(tmp_path / "b.ath", strict=True) as decoder:
+        for name, clip in clips.items():
+            assert distance(decoder.play(name).positions(), clip.positions) <= decoder.max_error_bound
+
+
 def test_a_cut_off_file_shows_all_clips_at_the_levels_that_are_left(medley_clips, medley_ath, tmp_path):
     shorter = tmp_path / "shorter.ath"
     athcodec.truncate(medley_ath, shorter, 1)
@@ -153,8 +176,9 @@ def test_a_target_size_is_that_of_all_clips_and_branches_are_found_for_all(medle
 def test_clips_of_other_plants_are_refused_by_what_differs(medley_clips):
     calm = medley_clips["calm"]
     other = {
-        "vertices": ({"positions": calm.block(0, 9)[:, :-1], "time": calm.time[:9], "rest": calm.rest[:-1], "spans": (),
-                      "vertex_branch": None, "branch_parent": None, "stem_index": None}, "b: got .* vertices, expected"),
+        "vertices": ({"positions": calm.block(0, 9)[:, :-1], "time": calm.time[:9], "rest": calm.rest[:-1],
+                      "spans": (), "vertex_branch": None, "branch_parent": None, "stem_index": None},
+                     "b: got .* vertices, expected"),
         "rest": ({"rest": calm.rest + 1}, "b: got another rest pose than a .vertex"),
         "faces": ({"faces": np.array([[0, 1, 2]])}, "b: got other faces than a"),
         "attributes": ({"attributes": {"radius": np.ones(3)}}, "b: got another attribute radius than a"),
@@ -225,8 +249,6 @@ def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
 @pytest.mark.parametrize("kind", [each for each in exporters.FORMATS if not each.holds_several],
                          ids=lambda kind: kind.name)
 def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
-    if not kind.is_installed:
-        pytest.skip(f"needs {kind.needs}")
     path = tmp_path / f"a{kind.suffixes[0]}"
     with athcodec.open(medley_ath) as decoder:
         for several in (athcodec.join(medley_clips), Excerpt(decoder, all_clips=True)):

@@ -83,7 +83,8 @@ class Info(ctypes.Structure):
 
 class Clip(ctypes.Structure):
     _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in "first_frame frame_count first_segment segment_count loop reserved".split()]
+    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
+                                              "reserved").split()]
 
 
 class Native:
@@ -297,8 +298,8 @@ def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
                    clip.segment_count, bool(clip.loop),
                    [lib.ath_seam_error(file, i, level) for level in range(info.level_count)]]
                   for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])],
-        "depthFor": [lib.ath_depth_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
-                     for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
+        "depthFor": [lib.ath_depth_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080),
+                                       c_double(1)) for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
     assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
 
 

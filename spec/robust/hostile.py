@@ -30,7 +30,7 @@ sys.path.append(str(ROOT / "tests"))  # what the tests have for making files and
 import hostile_files  # noqa: E402
 from files import with_checksum  # noqa: E402
 from fuzz import seeds  # noqa: E402
-from test_damage import change_a_field, mutations, spoilt_front, struct_fields, use  # noqa: E402
+from test_damage import mutations, spoilt_front, struct_fields, use  # noqa: E402
 
 VECTORS = ROOT / "spec" / "vectors" / "valid"
 SMALL = 4096

@@ -59,7 +59,8 @@ def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--target", action="append", choices=ALL, help="this one alone; may be repeated")
     parser.add_argument("--sanitizer", choices=[name for name in targets.SANITIZERS if name != "coverage"],
                         default="address", help="address (with undefined), memory or none (default: address)")
-    parser.add_argument("--corpus", type=Path, default=BUILD / "corpus", help="folder that grows (default: %(default)s)")
+    parser.add_argument("--corpus", type=Path, default=BUILD / "corpus",
+                        help="folder that grows (default: %(default)s)")
     parser.add_argument("--coverage", action="store_true", help="print the lines of the decoder that are reached")
     parser.add_argument("--seed", type=int, default=0, help="0: another one each time")
     return parser.parse_args(argv)

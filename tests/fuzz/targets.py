@@ -62,7 +62,8 @@ class Outcome:
 def _links_fuzzer(compiler: str) -> bool:
     with TemporaryDirectory() as folder:
         source = Path(folder, "probe.c")
-        source.write_text("int LLVMFuzzerTestOneInput(const char *data, unsigned long size) { return !data && size; }\n")
+        source.write_text("int LLVMFuzzerTestOneInput(const char *data, unsigned long size) "
+                          "{ return !data && size; }\n")
         done = subprocess.run([compiler, "-fsanitize=fuzzer,address", source, "-o", Path(folder, "probe")],
                               capture_output=True)
     return done.returncode == 0
