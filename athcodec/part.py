@@ -97,12 +97,13 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
 
 
-def part_of(source: Source, ath: Ath) -> Part | None:
-    """A part that looks like all of a large plant, with a branch of every level; None where there is no need for one.
+def part_of(source: Source, ath: Ath, effort: str) -> Part | None:
+    """A part that looks like all of a large plant, with a branch of every level; None where there is no need for one,
+    or no hurry.
 
     The longer the clip, the larger the part: what is spent on it remains the same share of the work.
     """
-    wanted = part_vertices(source.clip.vertex_count, len(source.segments))
+    wanted = part_vertices(source.clip.vertex_count, len(source.segments), effort)
     if wanted is None:
         return None
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
@@ -110,9 +111,11 @@ def part_of(source: Source, ath: Ath) -> Part | None:
     return part if len(part.vertices) < source.clip.vertex_count // 2 else None
 
 
-def part_vertices(vertices: int, segments: int) -> int | None:
+def part_vertices(vertices: int, segments: int, effort: str) -> int | None:
     """About how many a part has; None: there is to be no part."""
-    return None if vertices <= LARGE else min(max(int(vertices * segments * SEGMENT_PART), LEAST_PART), LARGE)
+    if vertices <= LARGE or effort == "best":
+        return None
+    return min(max(int(vertices * segments * SEGMENT_PART), LEAST_PART), LARGE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:

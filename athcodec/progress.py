@@ -41,7 +41,7 @@ def weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, samp
     """What the stages are worth. samples: segments that each trial codes; branches: they have to be found first;
     sizes: a target is to be met; motion: it is coded too, after the search."""
     longest = max(stop - start for start, stop in segments)
-    some = vertices if (part := part_vertices(vertices, len(segments))) is None else part
+    some = vertices if (part := part_vertices(vertices, len(segments), effort)) is None else part
     work = {"survey": SURVEY * vertices * segments[-1][1], "search": TRIAL * TRIALS[effort] * samples * some * longest,
             "motion": MOTION * vertices * segments[-1][1]}
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}

@@ -147,7 +147,7 @@ class Search:
 
     def found(self) -> Settings:
         """The best settings, as far as a part shows them where the plant is large."""
-        part = part_of(self.source, self.ath)
+        part = part_of(self.source, self.ath, self.effort)
         return self.best() if part is None else self.best_of_part(part)
 
     def best(self) -> Settings:
