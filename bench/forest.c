@@ -13,7 +13,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "ath.h"
+#include "program.h"
 
 enum { LEVELS = 32, SLOTS = 3, MOTION = 16, STATIC = 32, SHAPES = 19, UNIT_POSES = 64, CHOICES = 4096 };
 
@@ -67,42 +67,11 @@ static double now_ms(void)
     return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
 }
 
-static void *memory_of(size_t size)
-{
-    void *memory = aligned_alloc(64, (size + 64) & ~(size_t)63);
-    if (!memory) {
-        fprintf(stderr, "memory: got none, expected %zu bytes\n", size);
-        exit(1);
-    }
-    return memory;
-}
-
 static void expect(int condition, const char *what)
 {
     if (condition) return;
     fprintf(stderr, "forest: %s\n", what);
     exit(1);
-}
-
-static void expect_ok(const char *what, int result)
-{
-    if (result == ATH_OK) return;
-    fprintf(stderr, "%s: got %s, expected OK\n", what, ath_result_name(result));
-    exit(1);
-}
-
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* The value below which `share` of them lie; sorts them. */
-static double quantile(double *values, int count, double share)
-{
-    qsort(values, (size_t)count, sizeof *values, ascending);
-    int at = (int)ceil(share * count) - 1;
-    return values[at < 0 ? 0 : at];
 }
 
 static void put(const char *before, const char *name, double number)

@@ -1,0 +1,42 @@
+/* What the benchmark's programs share: memory or the end, results that must be OK, quantiles. */
+#ifndef BENCH_PROGRAM_H
+#define BENCH_PROGRAM_H
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "ath.h"
+
+static void *memory_of(size_t size)
+{
+    void *memory = aligned_alloc(64, (size + 64) & ~(size_t)63);
+    if (!memory) {
+        fprintf(stderr, "memory: got none, expected %zu bytes\n", size);
+        exit(1);
+    }
+    return memory;
+}
+
+static void expect_ok(const char *what, int result)
+{
+    if (result == ATH_OK) return;
+    fprintf(stderr, "%s: got %s, expected OK\n", what, ath_result_name(result));
+    exit(1);
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The value below which `share` of them lie; sorts them. */
+static double quantile(double *values, int count, double share)
+{
+    qsort(values, (size_t)count, sizeof *values, ascending);
+    int at = (int)ceil(share * count) - 1;
+    return values[at < 0 ? 0 : at];
+}
+
+#endif
