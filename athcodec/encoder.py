@@ -450,16 +450,13 @@ class _Job:
                            self.clip.dtype == np.float64, len(self.clip.span_frames))
         return _Result(store, header, errors)
 
-    def _clips(self, seam_errors: Sequence[np.ndarray]) -> bytes:
+    def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         return ct.pack_clips(self.clip.spans, [len(segments) for segments in self.source.span_segments], seam_errors)
 
-    def _seam_errors(self, decoder: Decoder) -> list[np.ndarray]:
-        """Of each clip, if it is a loop: how far off its step from the last frame to the first is, (levels,)."""
-        errors = [np.zeros(decoder.level_count) for _ in self.clip.spans]
-        for own, clip, (start, stop) in zip(errors, decoder.clips, self.clip.span_frames):
-            if clip.loop:
-                own[:] = self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start))
-        return errors
+    def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
+        """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
+        return [self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
+                for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames)]
 
     @staticmethod
     def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:

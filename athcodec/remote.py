@@ -128,7 +128,7 @@ def _joined(ranges: list[Range]) -> list[Range]:
 
 def _source(remote: Remote, options: dict):
     """What fetches: HTTP with an eye on its answers, or any other file system."""
-    shown = _without_secrets(remote.url)
+    shown = without_secrets(remote.url)
     try:
         import fsspec
 
@@ -146,7 +146,7 @@ def _source(remote: Remote, options: dict):
     return _Http(remote, system, shown) if http else _AnySystem(remote, system, path, shown)
 
 
-def _without_secrets(url: str) -> str:
+def without_secrets(url: str) -> str:
     """The URL as messages show it: without user, password and query, which may hold keys."""
     parts = urlsplit(url)
     return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}{parts.path}"
@@ -266,7 +266,7 @@ class _Http:
                 self._remote.requests += len(answer.history)
                 return await self._answered(answer, offset, size)
         except (aiohttp.InvalidURL, aiohttp.TooManyRedirects) as error:
-            raise self._refusal(f"{type(error).__name__}: {_without_secrets(self._remote.url)}") from error
+            raise self._refusal(f"{type(error).__name__}: {without_secrets(self._remote.url)}") from error
         except asyncio.TimeoutError:
             raise _Again(f"no answer, or not all of it, within {patience:g} seconds") from None
         except (aiohttp.ClientError, ConnectionError) as error:

@@ -19,7 +19,7 @@ from typing import Any
 from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.errors import ClipError, MissingExtra, RemoteError
 from athcodec.files import is_url
-from athcodec.remote import _one_line, _without_secrets
+from athcodec.remote import _one_line, without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
 
@@ -46,7 +46,7 @@ class Item:
     @property
     def shown(self) -> str:
         """The input as messages and the manifest show it."""
-        return _without_secrets(self.input) if is_url(self.input) else self.input
+        return without_secrets(self.input) if is_url(self.input) else self.input
 
 
 def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
@@ -65,7 +65,7 @@ def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str
         item = Item(name, path, target, settings_of((name, path), default, patterns))
         other = items.setdefault(target, item)
         if other.input != path:
-            place = _without_secrets(target) if is_url(target) else target
+            place = without_secrets(target) if is_url(target) else target
             raise ClipError(f"{item.shown}: would be {place}, as would {other.shown}; expected a name of its own")
     if not items:
         raise ClipError("inputs: got no clips, expected at least one")
@@ -76,7 +76,7 @@ def _target(output: str, name: str) -> str:
     if not is_url(output):
         return os.path.abspath(os.path.join(output, name))
     if "::" in output or "?" in output:
-        raise ClipError(f"{_without_secrets(output)}: got a chain of file systems or a query, expected the plain URL "
+        raise ClipError(f"{without_secrets(output)}: got a chain of file systems or a query, expected the plain URL "
                         "of a directory")
     return f"{output.rstrip('/')}/{name}"
 
@@ -134,7 +134,7 @@ def _fixed_part(pattern: str, separator: str) -> str:
 
 
 def _remote(url: str) -> Iterator[tuple[str, str]]:
-    shown = _without_secrets(url)
+    shown = without_secrets(url)
     is_folder = url.endswith("/")
     if not is_folder and not glob.has_magic(url.partition("?")[0]):
         yield posixpath.basename(url.partition("?")[0].partition("::")[0]), url
@@ -159,9 +159,9 @@ def file_system(url: str) -> tuple[Any, str]:
 
         return fsspec.core.url_to_fs(url)
     except ImportError as error:
-        raise MissingExtra(f'{_without_secrets(url)}: {_one_line(error)}: pip install "athcodec[remote]"') from None
+        raise MissingExtra(f'{without_secrets(url)}: {_one_line(error)}: pip install "athcodec[remote]"') from None
     except ValueError as error:
-        raise RemoteError(f"{_without_secrets(url)}: {_one_line(error)}") from None
+        raise RemoteError(f"{without_secrets(url)}: {_one_line(error)}") from None
 
 
 def download(url: str, path: str) -> str:
@@ -172,7 +172,7 @@ def download(url: str, path: str) -> str:
     except Exception as error:
         if isinstance(error, OSError) and error.errno and error.filename == path:
             raise  # of the local disk
-        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+        raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     return sha256(path)
 
 
@@ -183,7 +183,7 @@ def upload(path: str, url: str) -> dict[str, Any]:
         system.makedirs(system._parent(target), exist_ok=True)
         system.put_file(path, target)
     except Exception as error:
-        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+        raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     return remote_identity(url)
 
 
@@ -225,7 +225,7 @@ def remote_identity(url: str) -> dict[str, Any]:
     try:
         info = system.info(path)
     except Exception as error:
-        raise RemoteError(f"{_without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
+        raise RemoteError(f"{without_secrets(url)}: {type(error).__name__}: {_one_line(error)}") from None
     return {"size": info.get("size")} | {name: str(info[name]) for name in TAGS if info.get(name)}
 
 

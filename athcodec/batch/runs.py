@@ -30,7 +30,7 @@ from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
 from athcodec.files import is_url, remove_leftovers_of, scratch_folder
-from athcodec.remote import _without_secrets
+from athcodec.remote import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
@@ -120,7 +120,7 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
 
 def _manifest_path(output: str | os.PathLike[str], manifest: str | os.PathLike[str] | None) -> str:
     if manifest is None and is_url(output):
-        raise ManifestError(f"{_without_secrets(output)}: got no manifest, expected a file of this machine where "
+        raise ManifestError(f"{without_secrets(output)}: got no manifest, expected a file of this machine where "
                             "outputs go to a URL")
     return os.path.abspath(manifest or os.path.join(output, MANIFEST))
 
@@ -337,7 +337,7 @@ class _Run:
             self.show.kept(item)
             return
         if "done" in result and is_url(item.output) and _fault_of_output(item, result["done"]):
-            result = {"failed": f"{_without_secrets(item.output)}: a worker has stored it, expected to find it there; "
+            result = {"failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
                                 "workers need a file system that all share"}
         status = "done" if "done" in result else "failed"
         record = {"output": _key(item, self.output), "input": item.shown, "status": status, "settings": item.settings,

@@ -53,7 +53,7 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
     loops = names if args.loop == ["all"] else args.loop or []
-    for name in (*loops, *({name: name for name in names if names.count(name) > 1})):
+    for name in (*loops, *names):
         if names.count(name) != 1:
             raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
     if args.loop_blend and not loops:
@@ -79,14 +79,11 @@ def excerpt_of(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
 
 
 def with_sources(decoder: Decoder, args: argparse.Namespace,
-                  opened: ExitStack) -> list[tuple[Decoder, str, MotionClip]]:
+                 opened: ExitStack) -> list[tuple[Decoder, str, MotionClip]]:
     """The clips to verify, and what to compare each with: a clip of a file."""
     if not args.against:
         return []
-    if args.clip is not None or len(decoder.clips) == 1:
-        played = [decoder]
-    else:
-        played = [decoder.play(clip.name) for clip in decoder.clips]
+    played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.clips]
     sources = [(path, clip) for path in args.against
                for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
     if len(sources) != len(played):
