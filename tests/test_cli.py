@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
-import shlex
 import shutil
 import signal
 import subprocess
@@ -22,7 +20,6 @@ from athcodec import cli
 from athcodec.metrics import compare_clips
 from athcodec.sources import read_hdf5, sample_path
 
-README = Path(__file__).resolve().parent.parent / "README.md"
 SAMPLE = str(sample_path())
 
 
@@ -394,31 +391,6 @@ def test_an_interrupted_decode_leaves_nothing_behind(encoded, tmp_path, monkeypa
     monkeypatch.setattr("athcodec.cli.verbs.progress", lambda: nullcontext(interrupt))
     assert run("decode", encoded, tmp_path / "a.h5") == 130
     assert list(tmp_path.iterdir()) == []
-
-
-# ---- the README ----
-
-
-def test_the_examples_of_the_readme_work(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(SAMPLE, "tree.h5")
-    with read_hdf5(SAMPLE) as clip:
-        clip.attributes["slack"] = np.ones(clip.vertex_count, np.float32)
-        athcodec.write(clip, "tree.usdc")
-        for name, frames in {"calm.h5": slice(0, 50), "gale.h5": slice(60, 120)}.items():
-            athcodec.write(dataclasses.replace(clip, positions=clip.positions[frames], time=clip.time[frames],
-                                               rest=clip.rest.astype(np.float32)), name)
-    text = README.read_text("utf-8")
-    shell = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
-    (python,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    serving = re.compile(r"athcodec view (?!.*--export)")  # runs until it is told to stop
-    for line in (line for line in shell.splitlines() if not serving.match(line)):
-        program, *args = shlex.split(line, comments=True)
-        assert program == "athcodec" and run(*args) == 0
-    names = {}
-    exec(compile(python, "README.md", "exec"), names)
-    assert names["frame"].shape == (1001, 3) and names["block"].shape == (48, 1001, 3)
-    assert names["maps"].shape[1:] == (3, 4)
 
 
 def test_formats_are_listed_with_what_they_need(capsys):

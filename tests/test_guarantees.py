@@ -1,4 +1,4 @@
-"""What the README promises of every format: what goes out comes back, in the same order, at the same times."""
+"""What docs/formats.md promises of every format: what goes out comes back, in the same order, at the same times."""
 
 from __future__ import annotations
 

@@ -1,0 +1,96 @@
+"""The examples of README.md and docs/ do what they say, and the reference of the Python API is complete.
+
+Blocks marked `sh`, `python`, `c` and `js` are run as they stand, in the order of their page; `bash` marks commands that install
+something or take long, which are not.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import cli
+from athcodec._library import library_path
+from athcodec.sources import read_hdf5, sample_path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+SERVES = re.compile(r"athcodec view (?!.*--export)")  # runs until it is interrupted
+
+
+def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
+    """(language, text) of the blocks of code in these languages."""
+    found = re.findall(r"^```(\w+)\n(.*?)^```$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    return [(language, text) for language, text in found if language in languages]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The files that the examples start from."""
+    folder = tmp_path_factory.mktemp("examples")
+    shutil.copy(sample_path(), folder / "tree.h5")
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, folder / "tree.ath", effort="fast")
+        clip.attributes["slack"] = np.ones(clip.vertex_count, np.float32)
+        athcodec.write(clip, folder / "tree.usdc")
+        for name, frames in {"calm": slice(0, 50), "gale": slice(60, 120), "storm": slice(60, 120)}.items():
+            motion = dataclasses.replace(clip, positions=clip.positions[frames], time=clip.time[frames],
+                                         rest=clip.rest.astype(np.float32))
+            athcodec.write(motion, folder / f"{name}.h5")
+            athcodec.write(motion, folder / f"{name}.abc")
+    return folder
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh", "python")], ids=lambda page: page.stem)
+def test_commands_and_python_of_a_page_run(page, files, tmp_path, monkeypatch):
+    shutil.copytree(files, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for language, text in blocks(page, "sh", "python"):
+        if language == "python":
+            exec(compile(text, page.name, "exec"), names)
+        for line in text.splitlines() if language == "sh" else ():
+            program, *args = shlex.split(line, comments=True)
+            assert program == "athcodec"
+            assert SERVES.match(line) or cli.main(args) == 0, line
+    if page.stem == "python":
+        assert names["frame"].shape == (1001, 3) and names["block"].shape == (48, 1001, 3)
+        assert names["maps"].shape[1:] == (3, 4)
+
+
+def test_the_c_program_shows_a_coarse_level_at_a_distance(files, tmp_path):
+    ((_, text),) = blocks(ROOT / "docs" / "c-api.md", "c")
+    (tmp_path / "example.c").write_text(text)
+    library = library_path()
+    subprocess.run(["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-I", ROOT / "athcodec" / "core", "example.c", library,
+                    f"-Wl,-rpath,{library.parent}", "-o", "example"], cwd=tmp_path, check=True)
+    shown = subprocess.run([tmp_path / "example", files / "tree.ath"], capture_output=True, text=True, check=True).stdout
+    level, matrices, exact = map(int, re.fullmatch(r"level (\d+): (\d+) matrices, (\d+) exact vertices\n", shown).groups())
+    with athcodec.open(files / "tree.ath") as decoder:
+        assert 0 < level < decoder.deepest and 0 < matrices < decoder.levels[level].nodes and 0 < exact < 1001
+
+
+def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
+    ((_, text),) = blocks(ROOT / "docs" / "webassembly.md", "js")
+    module = (ROOT / "athcodec" / "viewer" / "ath_decoder.mjs").as_uri()
+    given = ("import { readFileSync } from 'node:fs';\n"
+             "const bytes = new Uint8Array(readFileSync(process.argv[2]));\n"
+             "const [distance, fov, height, seconds] = [0.01, 1, 1080, 1];\n")  # so near that all detail is shown
+    (tmp_path / "example.mjs").write_text(given + text.replace("./ath_decoder.mjs", module)
+                                          + "process.stdout.write(new Uint8Array(positions.buffer));\n")
+    shown = subprocess.run(["node", tmp_path / "example.mjs", files / "tree.ath"], capture_output=True, check=True).stdout
+    with athcodec.open(files / "tree.ath") as decoder:
+        assert shown == decoder.positions(30).tobytes()
+
+
+def test_the_reference_has_every_public_name():
+    text = (ROOT / "docs" / "python-reference.md").read_text("utf-8")
+    assert set(re.findall(r"^::: athcodec\.(\w+)$", text, re.MULTILINE)) == set(athcodec.__all__)
