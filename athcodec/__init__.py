@@ -1,5 +1,7 @@
 """athcodec: a codec and file format for the motion of plants, with levels of detail over the branch hierarchy."""
 
+from typing import TYPE_CHECKING
+
 from athcodec import errors
 from athcodec.ath import Ath, Thresholds, build_ath
 from athcodec.clip import MotionClip
@@ -9,6 +11,10 @@ from athcodec.encoder import Summary, encode
 from athcodec.excerpt import Excerpt
 from athcodec.joining import join, looped, split
 from athcodec.truncate import truncate
+
+if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
+    from athcodec.exporters import write, write_hdf5
+    from athcodec.sources import read, read_hdf5, sample_path
 
 __version__ = "0.1.0"
 __all__ = ["Ath", "Decoder", "Excerpt", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode", "errors",
