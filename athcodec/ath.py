@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from athcodec._native import address, lib
-from athcodec.crew import ALONE, Crew
 from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.threads import SERIAL, ThreadPool
 
 if TYPE_CHECKING:
     from athcodec.clip import MotionClip
@@ -318,7 +318,7 @@ def survey(
     progress: Callable[[float], object] | None = None,
     *,
     eta: int = 0,
-    crew: Crew = ALONE,
+    pool: ThreadPool = SERIAL,
 ) -> Survey:
     """All that the ATH needs of a clip's frames, for thresholds that are chosen afterwards.
 
@@ -328,7 +328,7 @@ def survey(
     max_depth  nodes at this depth are taken whole, whatever they do
     progress   called now and then with the part of the frames done, at last with 1.0
     eta        frames; the largest eta that Survey.ath() will be asked for
-    crew       threads; what comes out does not depend on their number
+    pool       threads; what comes out does not depend on their number
 
     Raises ValueError where a number is negative or xi is missing, and ClipError for positions that are NaN
     or infinite.
@@ -350,7 +350,7 @@ def survey(
         return _Extent.of(frames, rest), _Differences.of(_seen_from(pieces.origin, frames), pieces, xi)
 
     extent, differences, gads = None, None, _Largest(limits.eta + 1)
-    for where, how in crew.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * crew.jobs):
+    for where, how in pool.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * pool.jobs):
         extent, differences = (where, how) if extent is None else (extent | where, differences | how)
         gads.add(how.gads)
         if progress is not None:

@@ -11,8 +11,8 @@ from typing import Any
 import athcodec
 from athcodec import discovery
 from athcodec.cli import verbs
-from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
-from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS
+from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 TRACEBACK = "show the traceback of an error"

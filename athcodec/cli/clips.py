@@ -16,7 +16,7 @@ from athcodec.ath import Thresholds
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
-from athcodec.encoder import DEFAULT_REL_ERROR
+from athcodec.encoding import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.excerpt import Excerpt
 from athcodec.files import check_target

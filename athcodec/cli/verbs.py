@@ -44,7 +44,7 @@ from athcodec.cli.printing import (
     say,
     say_seam,
 )
-from athcodec.encoder import DEFAULT_REL_ERROR
+from athcodec.encoding import DEFAULT_REL_ERROR
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
 

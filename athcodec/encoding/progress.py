@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from athcodec.part import part_vertices
+from athcodec.encoding.sample import sample_vertices
 
 Progress = Callable[[str, float], None]
 
@@ -18,7 +18,7 @@ BRANCHES = 0.5  # of all the rest, to find branches for a clip without
 SIZES = 6  # files that are made to meet a target size
 
 
-class Course:
+class WeightedProgress:
     """Takes each stage's own fraction, and tells the whole one, which never falls."""
 
     def __init__(self, progress: Progress | None, weights: dict[str, float]):
@@ -41,7 +41,7 @@ def weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, samp
     """What the stages are worth. samples: segments that each trial codes; branches: they have to be found first;
     sizes: a target is to be met; motion: it is coded too, after the search."""
     longest = max(stop - start for start, stop in segments)
-    some = vertices if (part := part_vertices(vertices, len(segments), effort)) is None else part
+    some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
     work = {"survey": SURVEY * vertices * segments[-1][1], "search": TRIAL * TRIALS[effort] * samples * some * longest,
             "motion": MOTION * vertices * segments[-1][1]}
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}

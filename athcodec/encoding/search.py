@@ -14,12 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from athcodec import entropy
-from athcodec import quantize as qz
 from athcodec.ath import Ath
-from athcodec.coding import (
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import (
+    Components,
+    LearnedModes,
+    components,
+    estimated_bits,
+    learn,
+)
+from athcodec.encoding.motion import Plan, SegmentMotion, position_error
+from athcodec.encoding.progress import TRIALS, Progress
+from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
+from athcodec.encoding.segment import (
+    CodedPrelude,
     Settings,
-    Shape,
     Source,
     analyse,
     analyse_finely,
@@ -27,24 +37,20 @@ from athcodec.coding import (
     code_stems,
     lags,
     loose_branches,
-    threads,
+    thread_count,
 )
 from athcodec.errors import BoundError
-from athcodec.part import Part, Share, part_of
-from athcodec.progress import TRIALS, Progress
-from athcodec.shapes import Components, Shapes, components, estimated_bits, learn
-from athcodec.transform import Plan, SegmentMotion, position_error
 
 EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
-LEARNING_SEGMENTS = 4  # of a clip, that shapes are learned from
-SHAPES_KEPT = 6  # between trials
-WORTH = {"_with_learned": 2, "_with_shapes": 6, "_with_node_steps": 4}  # trials, of what a step does besides
+LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
+PRELUDES_KEPT = 6  # between trials
+WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class SegmentSample:
     """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
 
     positions: np.ndarray
@@ -54,19 +60,19 @@ class Sample:
     def scale(self) -> float:
         return self.frames / self.positions.shape[2]
 
-    def of_part(self, part: Part) -> Sample:
-        return Sample(self.positions[part.vertices], self.frames)
+    def of_part(self, part: PlantSample) -> SegmentSample:
+        return SegmentSample(self.positions[part.vertices], self.frames)
 
 
-def samples_of(source: Source) -> list[Sample]:
+def samples_of(source: Source) -> list[SegmentSample]:
     """The segment in the middle of a clip; of several clips those of a few, from calm to wild, each for its like."""
     middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
     if len(middles) == 1:
-        return [Sample(source.positions(middles[0]), source.clip.frame_count)]
+        return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
     groups = np.array_split(np.argsort([_moved(source, each) for each in middles], kind="stable"),
                             min(SAMPLES, len(middles)))
-    return [Sample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups]
+    return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups]
 
 
 def _moved(source: Source, segment: int) -> float:
@@ -77,43 +83,43 @@ def _moved(source: Source, segment: int) -> float:
 
 
 def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
-           jobs: int | None = None) -> tuple[Settings, Shape, Shapes | None]:
-    """Settings, and what follows from them: hierarchy and rest pose as coded, learned shapes."""
+           jobs: int | None = None) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
+    """Settings, and what follows from them: hierarchy and rest pose as coded, learned learned_modes."""
     search = Search.of(source, ath, bound, effort, report, jobs)
     settings = search.found()
-    shape = search.shape(settings)
-    return settings, shape, search.shapes(shape.plan, settings)
+    prelude = search.prelude(settings)
+    return settings, prelude, search.learned_modes(prelude.plan, settings)
 
 
-def first_settings(source: Source, ath: Ath, bound: float, wildest: Sample) -> Settings:
+def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
     """Where a search starts from."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
     levels = ath.height + 2
     return Settings(
         bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
-        level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.wide,
-        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step), omega=(0,) * levels,
-        learned=(False,) * levels, shaped=None, node_steps=np.full(levels, step))
+        level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.sheet_like,
+        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step), rotation_step_factors=(0,) * levels,
+        learned_bases=(False,) * levels, learned_pieces=None, node_steps=np.full(levels, step))
 
 
 class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
 
-    samples: from calm to wild; that in the middle says what maps of nodes need. share: what the clip is a part of, if
+    samples: from calm to wild; that in the middle says what maps of nodes need. extrapolation: what the clip is a part of, if
     it is one.
     """
 
-    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[Sample], effort: str, report: Progress,
-                 jobs: int | None = None, share: Share | None = None):
+    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[SegmentSample], effort: str, report: Progress,
+                 jobs: int | None = None, extrapolation: ExtrapolationFactors | None = None):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         self.start, self.samples, self.levels = start, samples, ath.height + 2
         self.sample = samples[len(samples) // 2].positions
-        self.share = share or Share.everything(self.levels)
-        self.doubt: float | None = None  # of SHAPE_DOUBTS, that the shapes found best had to overcome
+        self.extrapolation = extrapolation or ExtrapolationFactors.everything(self.levels)
+        self.required_saving: float | None = None  # of REQUIRED_SAVINGS: the one that made the smallest file
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
-        self._shapes: dict[tuple, Shape] = {}
+        self._preludes: dict[tuple, CodedPrelude] = {}
         self._besides = 0
 
     @classmethod
@@ -147,18 +153,18 @@ class Search:
 
     def found(self) -> Settings:
         """The best settings, as far as a part shows them where the plant is large."""
-        part = part_of(self.source, self.ath, self.effort)
+        part = sample_plant(self.source, self.ath, self.effort)
         return self.best() if part is None else self.best_of_part(part)
 
     def best(self) -> Settings:
-        steps = [self._with_basis, self._with_rotations, self._with_learned, self._with_basis, self._with_shapes,
+        steps = [self._with_basis, self._with_rotations, self._with_learned_bases, self._with_basis, self._with_learned_modes,
                  self._with_steps]
         if self.effort == "fast":
             steps = [self._with_rotations]
         if self.source.weights is not None:
             steps.insert(0, self._with_level_steps)
         elif self.effort == "best":
-            steps += [self._with_rotations, self._with_learned, self._with_finer_steps]
+            steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
         settings = self.start
         for step in [*steps, self._with_node_steps]:
             settings = step(settings)
@@ -171,93 +177,97 @@ class Search:
         self._besides += worth
         self.report("search", min((len(self._known) + self._besides) / TRIALS[self.effort], 0.99))
 
-    def best_of_part(self, part: Part) -> Settings:
-        """What is best for a part of the plant, for all of it; its pieces are asked one by one for their shapes."""
+    def best_of_part(self, part: PlantSample) -> Settings:
+        """What is best for a part of the plant, for all of it; its pieces are asked one by one for their learned_modes."""
         start, kept = self.start, part.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[part.vertices]
-        some = replace(start, sheet=part.source.wide, loose=start.loose[kept], lags=start.lags[kept], limit=limit)
-        share = Share.of(branch_records(self.source.hierarchy, self.ath, start),
-                         branch_records(part.source.hierarchy, part.ath, some))
+        some = replace(start, sheet=part.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept], limit=limit)
+        extrapolation = ExtrapolationFactors.of(branch_records(self.source.hierarchy, self.ath, start),
+                                                branch_records(part.source.hierarchy, part.ath, some))
         samples = [sample.of_part(part) for sample in self.samples]
-        search = Search(part.source, part.ath, some, samples, self.effort, self.report, self.jobs, share)
+        search = Search(part.source, part.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
         inner, all_inner = search.inner_nodes(), self.inner_nodes()
-        coarser = np.where(inner > 0, np.sqrt(share.vertices * inner / np.maximum(all_inner, 1)), 1.0)
-        as_wide = np.array_equal(found.sheet, part.source.wide)
+        coarser = np.where(inner > 0, np.sqrt(extrapolation.vertices * inner / np.maximum(all_inner, 1)), 1.0)
+        by_form = np.array_equal(found.sheet, part.source.sheet_like)
         settings = replace(
-            start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step, omega=found.omega,
-            learned=found.learned, sheet=start.sheet if as_wide else np.full_like(start.sheet, found.sheet[0]),
+            start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step,
+            rotation_step_factors=found.rotation_step_factors, learned_bases=found.learned_bases,
+            sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * coarser)
-        if search.doubt is None:
+        if search.required_saving is None:
             return settings
-        return replace(settings, shaped=self._pieces_for_shapes(settings, [search.doubt])[0])
+        return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, and of each level's streams in it) at these settings."""
-        varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.omega, settings.learned,
-                  settings.sheet.tobytes(), settings.shaped is not None and settings.shaped.tobytes())
+        varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.rotation_step_factors,
+                  settings.learned_bases, settings.sheet.tobytes(),
+                  settings.learned_pieces is not None and settings.learned_pieces.tobytes())
         if varied not in self._known:
             self._known[varied] = self._try(settings)
         return self._known[varied]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        shape = self.shape(settings)
-        shapes = self.shapes(shape.plan, settings)
+        prelude = self.prelude(settings)
+        learned_modes = self.learned_modes(prelude.plan, settings)
         try:
-            levels = sum(self._level_bytes(shape, settings, shapes, sample) for sample in self.samples)
+            levels = sum(self._level_bytes(prelude, settings, learned_modes, sample) for sample in self.samples)
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
-        shape_bytes = 0.0
-        for level, data in entropy.encode_shapes(shape.plan, shapes).items():
-            shape_bytes += len(data) * self.share.rows[level]
-        return levels.sum() + shape_bytes + self._prelude_bytes(shape), levels
+        mode_bytes = 0.0
+        for level, data in streams.encode_learned_modes(prelude.plan, learned_modes).items():
+            mode_bytes += len(data) * self.extrapolation.rows[level]
+        return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
 
-    def _level_bytes(self, shape: Shape, settings: Settings, shapes: Shapes | None, sample: Sample) -> np.ndarray:
+    def _level_bytes(self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None,
+                     sample: SegmentSample) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
-        coded = code_stems(shape, settings, sample.positions, shapes)
+        coded = code_stems(prelude, settings, sample.positions, learned_modes)
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
         corrections = len(coded.correction_chunk)
         if corrections:
-            levels += corrections * self._corrected(shape.plan, coded.corrections)
-        levels += (levels - heads) * (self.share.rows - 1)
+            levels += corrections * self._corrected(prelude.plan, coded.corrections)
+        levels += (levels - heads) * (self.extrapolation.rows - 1)
         return levels * sample.scale
 
-    def _prelude_bytes(self, shape: Shape) -> float:
-        return shape.prelude_bytes * self.share.vertices
+    def _prelude_bytes(self, prelude: CodedPrelude) -> float:
+        return prelude.prelude_bytes * self.extrapolation.vertices
 
-    def shapes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> Shapes | None:
-        """Shapes of the pieces that are to have some, or of all, learned from segments spread over the clip."""
-        if settings.shaped is None and not everywhere:
+    def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
+        """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
+        if settings.learned_pieces is None and not everywhere:
             return None
-        known = settings.omega, settings.sheet.tobytes()
+        known = settings.rotation_step_factors, settings.sheet.tobytes()
         if known not in self._components:
-            shape, count = self.shape(settings), len(self.source.segments)
+            prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
-            self._components[known] = components(shape.plan, (
-                analyse_finely(shape, settings, self.source.positions(segment)) for segment in some))
-        return learn(plan, self._components[known], settings.step, None if everywhere else settings.shaped)
+            self._components[known] = components(prelude.plan, (
+                analyse_finely(prelude, settings, self.source.positions(segment)) for segment in some))
+        return learn(plan, self._components[known], settings.step, None if everywhere else settings.learned_pieces)
 
-    def _with_shapes(self, settings: Settings) -> Settings:
-        """Learned shapes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
-        plain = replace(settings, shaped=None)
-        wanted = dict(zip(qz.SHAPE_DOUBTS, self._pieces_for_shapes(plain, qz.SHAPE_DOUBTS)))
-        tried = {None: plain} | {doubt: replace(plain, shaped=some) for doubt, some in wanted.items() if some.any()}
-        self.doubt, settings = self._cheapest_of(tried)
+    def _with_learned_modes(self, settings: Settings) -> Settings:
+        """Learned modes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
+        plain = replace(settings, learned_pieces=None)
+        wanted = dict(zip(qz.REQUIRED_SAVINGS, self._pieces_for_learned_modes(plain, qz.REQUIRED_SAVINGS)))
+        tried = {None: plain} | {saving: replace(plain, learned_pieces=some) for saving, some in wanted.items()
+                                 if some.any()}
+        self.required_saving, settings = self._cheapest_of(tried)
         return settings
 
-    def _pieces_for_shapes(self, plain: Settings, doubts: Sequence[float]) -> list[np.ndarray]:
-        """(P,) bool for each doubt: the pieces that seem to take so many times fewer bits with shapes."""
-        shape = self.shape(plain)
-        shapes = self.shapes(shape.plan, plain, everywhere=True)
-        pieces = np.repeat(np.arange(len(shapes.counts)), shape.plan.pieces["count"])
-        modes, tracks = (sum(estimated_bits(analyse(shape, plain, sample.positions, some)[0].coefficients, pieces,
-                                            len(shapes.counts)) * sample.scale for sample in self.samples)
-                         for some in (None, shapes))
-        owners = np.repeat(np.arange(len(shapes.counts)), shapes.counts)
-        price = estimated_bits(shapes.integers, owners, len(shapes.counts))
-        return [(shapes.counts > 0) & ((tracks + price) * doubt < modes) for doubt in doubts]
+    def _pieces_for_learned_modes(self, plain: Settings, required_savings: Sequence[float]) -> list[np.ndarray]:
+        """(P,) bool for each required saving: pieces whose estimated bits shrink by that factor with learned modes."""
+        prelude = self.prelude(plain)
+        learned_modes = self.learned_modes(prelude.plan, plain, everywhere=True)
+        pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
+        modes, tracks = (sum(estimated_bits(analyse(prelude, plain, sample.positions, some)[0].coefficients, pieces,
+                                            len(learned_modes.counts)) * sample.scale for sample in self.samples)
+                         for some in (None, learned_modes))
+        owners = np.repeat(np.arange(len(learned_modes.counts)), learned_modes.counts)
+        price = estimated_bits(learned_modes.integers, owners, len(learned_modes.counts))
+        return [(learned_modes.counts > 0) & ((tracks + price) * saving < modes) for saving in required_savings]
 
     def _corrected(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
         """Fractions of the corrections that fall on the pieces of each level."""
@@ -266,35 +276,38 @@ class Search:
         return counts / counts.sum()
 
     def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
-        some = {self._shape_key(settings): settings for settings in candidates}  # by shape, each to be made once
-        with ThreadPoolExecutor(threads(self.jobs, self.source)) as pool:
-            list(pool.map(self.shape, some.values()))
+        some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
+        with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
+            list(pool.map(self.prelude, some.values()))
             costs = []
             for cost in pool.map(self.cost, candidates):
                 costs.append(cost)
                 self._tell()
             return costs
 
-    def shape(self, settings: Settings) -> Shape:
+    def prelude(self, settings: Settings) -> CodedPrelude:
         """As in earlier trials, where one had it."""
-        key = self._shape_key(settings)
-        shape = self._shapes.pop(key, None) or Shape(self.source, self.ath, settings)
-        self._shapes[key] = shape  # the last one used
-        while len(self._shapes) > SHAPES_KEPT:
-            self._shapes.pop(next(iter(self._shapes)))
-        return shape
+        key = self._prelude_key(settings)
+        prelude = self._preludes.pop(key, None) or CodedPrelude(self.source, self.ath, settings)
+        self._preludes[key] = prelude  # the last one used
+        while len(self._preludes) > PRELUDES_KEPT:
+            self._preludes.pop(next(iter(self._preludes)))
+        return prelude
 
-    def _shape_key(self, settings: Settings) -> tuple:
+    def _prelude_key(self, settings: Settings) -> tuple:
         return settings.rest_step, settings.sheet.tobytes()
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
-        sheets = [self.source.wide, np.zeros_like(self.source.wide), np.ones_like(self.source.wide)]
-        if not self.source.wide.any() or self.source.wide.all():
+        sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
+        if not self.source.sheet_like.any() or self.source.sheet_like.all():
             sheets = sheets[1:]
-        omegas = {settings.omega, (2,) * self.levels} if not any(settings.omega) else {settings.omega}
-        candidates = [replace(settings, sheet=sheet, omega=omega) for sheet in sheets for omega in sorted(omegas)]
-        return replace(self._cheapest(candidates), omega=settings.omega)
+        rotations = {settings.rotation_step_factors}
+        if not any(settings.rotation_step_factors):
+            rotations.add((2,) * self.levels)
+        candidates = [replace(settings, sheet=sheet, rotation_step_factors=factors)
+                      for sheet in sheets for factors in sorted(rotations)]
+        return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
 
     def _with_level_steps(self, settings: Settings) -> Settings:
         """Coarser steps for levels whose vertices, and those that hang on them, may be further off."""
@@ -307,9 +320,9 @@ class Search:
 
     def _with_rotations(self, settings: Settings) -> Settings:
         factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
-        candidates = [replace(settings, omega=(k,) * self.levels) for k in factors]
+        candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
         per_level = np.array([levels for _, levels in self._costs(candidates)])
-        mixed = replace(settings, omega=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
+        mixed = replace(settings, rotation_step_factors=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
         return self._cheapest([settings, mixed, *candidates])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
@@ -319,12 +332,12 @@ class Search:
         costs = [cost for cost, _ in self._costs(list(candidates.values()))]
         return list(candidates.items())[int(np.argmin(costs))]
 
-    def _with_learned(self, settings: Settings) -> Settings:
+    def _with_learned_bases(self, settings: Settings) -> Settings:
         """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
-        learning = replace(settings, learned=(True,) * self.levels)
+        learning = replace(settings, learned_bases=(True,) * self.levels)
         (cost, cosines), (_, learned) = self._costs([settings, learning])
-        mixed = replace(settings, learned=tuple((learned < cosines).tolist()))
-        return mixed if any(mixed.learned) and self.cost(mixed)[0] < cost else settings
+        mixed = replace(settings, learned_bases=tuple((learned < cosines).tolist()))
+        return mixed if any(mixed.learned_bases) and self.cost(mixed)[0] < cost else settings
 
     def _with_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.15, 1.4)
@@ -338,7 +351,7 @@ class Search:
             before, settings = settings, self._walk(settings, "step", factor, math.inf)
             if self.source.exact_rest:
                 break
-            settings = self._walk(settings, "rest_step", rest_factor, self.share.rest_cap * settings.bound)
+            settings = self._walk(settings, "rest_step", rest_factor, self.extrapolation.rest_cap * settings.bound)
             if (settings.step, settings.rest_step) == (before.step, before.rest_step):
                 break
         return settings
@@ -360,9 +373,9 @@ class Search:
 
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
-        shape, errors = self.shape(settings), self._level_errors(settings.bound)
-        segment, _ = analyse(shape, settings, self.sample, self.shapes(shape.plan, settings))
-        rest = self.cost(settings)[1].sum() + self._prelude_bytes(shape)
+        prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
+        segment, _ = analyse(prelude, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
         roots = int((self.source.hierarchy.branch_parent < 0).sum())
@@ -374,13 +387,13 @@ class Search:
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:
-                size = sum(len(entropy.encode_affines(segment, level)) * self.share.nodes[level]
-                           for level in self._map_levels(shape.plan))
+                size = sum(len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
+                           for level in self._map_levels(prelude.plan))
                 if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
-                chosen, limits = steps, self._errors_of_maps(shape, segment)
-                limits[1:] = np.minimum(qz.NODE_HARM * limits[1:], limits[:-1])  # a deeper level stays the better one
-            elif (self._errors_of_maps(shape, segment) <= limits).all():
+                chosen, limits = steps, self._errors_of_maps(prelude, segment)
+                limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # a deeper level stays the better one
+            elif (self._errors_of_maps(prelude, segment) <= limits).all():
                 chosen = steps
             else:
                 break
@@ -389,7 +402,7 @@ class Search:
     def _map_levels(self, plan: Plan) -> list[int]:
         return [level for level in range(self.levels) if plan.has_affines(level)]
 
-    def _errors_of_maps(self, shape: Shape, segment: SegmentMotion) -> np.ndarray:
+    def _errors_of_maps(self, prelude: CodedPrelude, segment: SegmentMotion) -> np.ndarray:
         """RMS errors of the sample at the levels that have maps."""
-        poses = (segment.pose(level, shape.origin, shape.dtype) for level in self._map_levels(shape.plan))
-        return np.sqrt([position_error(pose, self.sample, shape.origin, shape.plan.crew)[1] for pose in poses])
+        poses = (segment.pose(level, prelude.origin, prelude.dtype) for level in self._map_levels(prelude.plan))
+        return np.sqrt([position_error(pose, self.sample, prelude.origin, prelude.plan.pool)[1] for pose in poses])

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from athcodec import quantize as qz
 from athcodec.ath import Ath
 from athcodec.clip import MotionClip
-from athcodec.coding import Source
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.motion import Plan
+from athcodec.encoding.segment import Source
 from athcodec.hierarchy import Hierarchy
 from athcodec.sources.frames import Frames
-from athcodec.transform import Plan
 
 LARGE = 1 << 16  # vertices: a smaller plant is looked at as a whole
 LEAST_PART = 1 << 15  # vertices of a part
@@ -22,7 +22,7 @@ SEGMENT_PART = 1 / 64  # of the plant that a part may have more for each segment
 SUBTREES = 8  # of a part, at least
 
 
-class Part:
+class PlantSample:
     """Some branches of a plant, each with what it hangs on, as a source of their own with the plant's segments.
 
     branches, vertices  those that it has, ascending in file order
@@ -66,7 +66,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Share:
+class ExtrapolationFactors:
     """How many times as much the plant has as its part: vertices, and for each level, (levels,), rows of its stream and
     nodes that have maps. And how coarse a rest pose may be tried, over the bound."""
 
@@ -76,12 +76,12 @@ class Share:
     rest_cap: float
 
     @classmethod
-    def everything(cls, levels: int) -> Share:
+    def everything(cls, levels: int) -> ExtrapolationFactors:
         """Of a plant that is no part."""
         return cls(1.0, np.ones(levels), np.ones(levels), qz.REST_CAP)
 
     @classmethod
-    def of(cls, whole: np.ndarray, part: np.ndarray) -> Share:
+    def of(cls, whole: np.ndarray, part: np.ndarray) -> ExtrapolationFactors:
         """Of branches, (B,) of _native.BRANCH."""
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, part)]
         rows, nodes = (np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
@@ -97,21 +97,21 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
 
 
-def part_of(source: Source, ath: Ath, effort: str) -> Part | None:
+def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
     """A part that looks like all of a large plant, with a branch of every level; None where there is no need for one,
     or no hurry.
 
     The longer the clip, the larger the part: what is spent on it remains the same share of the work.
     """
-    wanted = part_vertices(source.clip.vertex_count, len(source.segments), effort)
+    wanted = sample_vertices(source.clip.vertex_count, len(source.segments), effort)
     if wanted is None:
         return None
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
-    part = Part(source, ath, branches)
+    part = PlantSample(source, ath, branches)
     return part if len(part.vertices) < source.clip.vertex_count // 2 else None
 
 
-def part_vertices(vertices: int, segments: int, effort: str) -> int | None:
+def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
     """About how many a part has; None: there is to be no part."""
     if vertices <= LARGE or effort == "best":
         return None

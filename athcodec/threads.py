@@ -21,35 +21,35 @@ def default_jobs() -> int:
     return min(MOST, os.cpu_count() or 1)
 
 
-class Crew:
+class ThreadPool:
     """So many threads; with one there are none but the caller's, unless there is to be one `beside` it. What they are
-    given must not call on the crew itself."""
+    given must not call on the pool itself."""
 
     def __init__(self, jobs: int = 1, beside: bool = False):
         self.jobs = jobs
-        self._pool = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
+        self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
-    def each(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
+    def map(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
         """What function(*item) gives for each, in order."""
-        if self._pool is None or len(items) < 2:
+        if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
-        return list(self._pool.map(lambda item: function(*item), items))
+        return list(self._executor.map(lambda item: function(*item), items))
 
     def ordered(self, function: Callable[[Any], Any], items: Iterable, ahead: int) -> Iterator:
         """What function(item) gives for each, in order; meanwhile up to `ahead` further items are taken and begun."""
-        if self._pool is None:
+        if self._executor is None:
             yield from map(function, items)
             return
         pending: deque[Future] = deque()
         for item in items:
-            pending.append(self._pool.submit(function, item))
+            pending.append(self._executor.submit(function, item))
             if len(pending) > ahead:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
 
 
-ALONE = Crew()
+SERIAL = ThreadPool()
 
 
 def ranges(count: int, numbers: int) -> list[tuple[int, int]]:

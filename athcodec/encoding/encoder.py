@@ -21,22 +21,33 @@ from typing import BinaryIO
 import numpy as np
 
 from athcodec import container as ct
-from athcodec import entropy
-from athcodec import quantize as qz
 from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
-from athcodec.coding import Settings, Shape, Source, code_segment, threads
-from athcodec.crew import Crew, default_jobs
 from athcodec.decoder import Decoder
 from athcodec.discovery import Found, candidates, with_branches
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.progress import Progress, WeightedProgress
+from athcodec.encoding.progress import weights as stage_weights
+from athcodec.encoding.search import EFFORTS, SAMPLES, decide
+from athcodec.encoding.segment import (
+    CodedPrelude,
+    Settings,
+    Source,
+    code_segment,
+    thread_count,
+)
 from athcodec.errors import BoundError, ClipError
 from athcodec.files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.progress import Course, Progress
-from athcodec.progress import weights as stage_weights
-from athcodec.search import EFFORTS, SAMPLES, decide
-from athcodec.shapes import Shapes
-from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT, split_segments
+from athcodec.segmentation import (
+    DEFAULT_SEGMENT,
+    MAX_SEGMENT,
+    MIN_SEGMENT,
+    split_segments,
+)
+from athcodec.threads import ThreadPool, default_jobs
 
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
@@ -112,7 +123,7 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
     """
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
     check_target(path)  # before any work
-    report = _course(clip, progress, segment_frames, effort, target_size)
+    report = _weighted_progress(clip, progress, segment_frames, effort, target_size)
     job = _Job.begin(clip, report, jobs, rel_error=rel_error, segment_frames=segment_frames, tam=tam,
                      exact_rest=exact_rest, lossless=lossless, weights=weights, attributes=attributes, effort=effort)
     bound = job.bound(max_error, rel_error, target_size)
@@ -130,7 +141,7 @@ class Draft:
     """
 
     settings: Settings
-    shapes: Shapes | None
+    learned_modes: LearnedModes | None
     seen: Survey
     segment_count: int
     found: Found | None  # branches, for a clip without
@@ -153,7 +164,7 @@ def draft(clip: MotionClip, *, max_error: float | None = None, rel_error: float 
           effort: str = "default", jobs: int | None = None, progress: Progress | None = None, **options) -> Draft:
     """The first step of `encode`, whose options it takes: branches, survey, and the search for settings."""
     _check_options(max_error, rel_error, target_size, segment_frames, attributes, effort, jobs)
-    report = _course(clip, progress, segment_frames, effort, target_size, draft=True)
+    report = _weighted_progress(clip, progress, segment_frames, effort, target_size, draft=True)
     with clip.watched():
         job = _Job.begin(clip, report, jobs, rel_error=rel_error, segment_frames=segment_frames,
                          attributes=attributes, effort=effort, **options)
@@ -176,7 +187,7 @@ def write(clip: MotionClip, draft: Draft, coded: Iterable[CodedSegment], path, *
     """The third step: the file that `encode` writes, of all segments, which may come in any order. Raises as
     `code_segments` does, and ValueError where segments are missing."""
     check_target(path)
-    job = _Job.resume(clip, draft, Course(progress, {"motion": 1.0}))
+    job = _Job.resume(clip, draft, WeightedProgress(progress, {"motion": 1.0}))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         return job.write(path, out, spool, job.decided(draft), coded)
 
@@ -185,11 +196,11 @@ def _silent(stage: str, fraction: float) -> None:
     pass
 
 
-def _course(clip: MotionClip, progress: Progress | None, segment_frames: int | None, effort: str,
-            target_size: int | None, draft: bool = False) -> Course:
+def _weighted_progress(clip: MotionClip, progress: Progress | None, segment_frames: int | None, effort: str,
+            target_size: int | None, draft: bool = False) -> WeightedProgress:
     segments = split_segments(clip.frame_count, clip.vertex_count, segment_frames or DEFAULT_SEGMENT,
                               ct.Limits.memory_bytes)
-    return Course(progress, stage_weights(clip.vertex_count, segments, effort,
+    return WeightedProgress(progress, stage_weights(clip.vertex_count, segments, effort,
                                           samples=min(SAMPLES, len(clip.span_frames)), branches=not clip.has_branches,
                                           sizes=target_size is not None, motion=not draft))
 
@@ -289,16 +300,16 @@ def time_chunk(*times: np.ndarray) -> bytes:
     """Content of TIME for times in seconds, (T,) for each clip, exactly: by rules where these give the very same
     numbers."""
     steady = ct.pack_steady_time(*times)
-    return steady or ct.pack_time(entropy.encode_times(np.concatenate(times).astype(np.float64)))
+    return steady or ct.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
 
 
 def _relative_bound(fraction: float | None, job: _Job) -> float:
     """A fraction (None: the default) of the diagonal; where nothing has any extent, of that with the rest pose."""
     least = 2 * qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
     if fraction is None and job.lossless:
-        return max(LOSSLESS_REL_ERROR * job.source.reach, least, job.source.reach / qz.LARGEST_REACH)
+        return max(LOSSLESS_REL_ERROR * job.source.extent, least, job.source.extent / qz.LARGEST_REACH)
     fraction = fraction or DEFAULT_REL_ERROR
-    return fraction * job.seen.diagonal if job.seen.diagonal > 0 else max(fraction * job.source.reach, least)
+    return fraction * job.seen.diagonal if job.seen.diagonal > 0 else max(fraction * job.source.extent, least)
 
 
 def _survey_options(tam: Thresholds | None) -> dict:
@@ -311,12 +322,12 @@ class _Decided:
 
     ath: Ath
     settings: Settings
-    shape: Shape
-    shapes: Shapes | None
+    prelude: CodedPrelude
+    learned_modes: LearnedModes | None
 
     @property
     def mark(self) -> str:
-        return hashlib.sha256(self.shape.hierarchy_stream + self.shape.rest_chunk.stream).hexdigest()
+        return hashlib.sha256(self.prelude.hierarchy_stream + self.prelude.rest_chunk.stream).hexdigest()
 
 
 @dataclass
@@ -354,10 +365,10 @@ class _Job:
         clip, factors = _completed(clip, found, weights)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
-        crew = Crew(jobs or default_jobs())
-        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), crew=crew, **_survey_options(tam))
+        pool = ThreadPool(jobs or default_jobs())
+        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **_survey_options(tam))
         source = Source(clip, hierarchy, seen, segment_frames or DEFAULT_SEGMENT, exact_rest or lossless,
-                        None if factors is None else factors[hierarchy.vertex_source], crew)
+                        None if factors is None else factors[hierarchy.vertex_source], pool)
         return cls(source, tam, attributes == "all", effort, lossless, report, jobs, found, weights)
 
     @classmethod
@@ -370,7 +381,7 @@ class _Job:
         clip, factors = _completed(clip, draft.found, draft.weights)
         options = dict(draft.options)
         source = Source(clip, hierarchy, seen, options.pop("segment_frames"), options.pop("exact_rest"),
-                        None if factors is None else factors[hierarchy.vertex_source], Crew(jobs or default_jobs()))
+                        None if factors is None else factors[hierarchy.vertex_source], ThreadPool(jobs or default_jobs()))
         return cls(source, **options, report=report, jobs=jobs, found=draft.found, weights=draft.weights)
 
     @property
@@ -396,20 +407,20 @@ class _Job:
     def decide(self, bound: float) -> _Decided:
         """Searches for settings."""
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
-                       self.source.reach)
+                       self.source.extent)
         ath = self.seen.ath(self.thresholds(bound))
         return _Decided(ath, *decide(self.source, ath, bound, self.effort, self.report, self.jobs))
 
     def draft(self, decided: _Decided) -> Draft:
         options = {"tam": self.tam, "keep_static": self.keep_static, "effort": self.effort, "lossless": self.lossless,
                    "segment_frames": self.source.segment_frames, "exact_rest": self.source.exact_rest}
-        return Draft(decided.settings, decided.shapes, self.seen, self.segment_count, self.found, self.weights, options,
+        return Draft(decided.settings, decided.learned_modes, self.seen, self.segment_count, self.found, self.weights, options,
                      decided.mark)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         ath = self.seen.ath(self.thresholds(draft.settings.bound))
-        decided = _Decided(ath, draft.settings, Shape(self.source, ath, draft.settings), draft.shapes)
+        decided = _Decided(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
         if decided.mark != draft.mark:
             raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
                             "on machines that calculate alike")
@@ -436,11 +447,11 @@ class _Job:
 
     def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
         """All chunks of a file."""
-        shape = decided.shape
-        self._add_prelude(store, shape, decided.ath)
-        for level, stream in entropy.encode_shapes(shape.plan, decided.shapes).items():
+        prelude = decided.prelude
+        self._add_prelude(store, prelude, decided.ath)
+        for level, stream in streams.encode_learned_modes(prelude.plan, decided.learned_modes).items():
             store.add(ct.SHAPES, stream, level)
-        errors = self._add_motion(store, shape, coded)
+        errors = self._add_motion(store, prelude, coded)
         self._add_static(store)
         if self.clip.spans:
             store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.spans)))
@@ -482,11 +493,11 @@ class _Job:
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
-    def _add_prelude(self, store: ct.ChunkStore, shape: Shape, ath: Ath) -> None:
+    def _add_prelude(self, store: ct.ChunkStore, prelude: CodedPrelude, ath: Ath) -> None:
         limits = ath.thresholds
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
-                                                  shape.hierarchy_stream))
-        store.add(ct.REST, ct.pack_rest(shape.rest_chunk))
+                                                  prelude.hierarchy_stream))
+        store.add(ct.REST, ct.pack_rest(prelude.rest_chunk))
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.span_frames)))
         metadata = self.clip.metadata if self.keep_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
@@ -515,19 +526,19 @@ class _Job:
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
-            return CodedSegment(index, *code_segment(decided.shape, decided.settings, positions, decided.shapes, exact))
+            return CodedSegment(index, *code_segment(decided.prelude, decided.settings, positions, decided.learned_modes, exact))
 
-        at_once = threads(self.jobs, self.source)
-        crew = Crew(at_once, beside=self.source.crew.jobs > 1)
-        return crew.ordered(code, ((index, [self.source.block(index)]) for index in segments), at_once)
+        at_once = thread_count(self.jobs, self.source)
+        pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)
+        return pool.ordered(code, ((index, [self.source.block(index)]) for index in segments), at_once)
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.lossless else None
 
-    def _add_motion(self, store: ct.ChunkStore, shape: Shape, coded: Iterable[CodedSegment]) -> np.ndarray:
+    def _add_motion(self, store: ct.ChunkStore, prelude: CodedPrelude, coded: Iterable[CodedSegment]) -> np.ndarray:
         """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
-        errors = np.zeros((shape.plan.level_count + self.lossless, self.segment_count, 2))
+        errors = np.zeros((prelude.plan.level_count + self.lossless, self.segment_count, 2))
         missing = set(range(self.segment_count))
         for segment in coded:
             if segment.index not in missing:
@@ -596,9 +607,9 @@ def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: 
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
     settings, bound = decided.settings, decided.settings.bound
     choices = {"step_ratio": settings.step / bound, "rest_step_ratio": settings.rest_step / bound,
-               "rotations": list(settings.omega), "learned": list(settings.learned),
+               "rotations": list(settings.rotation_step_factors), "learned": list(settings.learned_bases),
                "sheets": int(settings.sheet.sum()),
-               "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
+               "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, settings.largest_bound,
                    bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices,
