@@ -26,7 +26,7 @@ import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec import container as ct
 from athcodec.encoding import streams
-from athcodec.encoding.encoder import time_chunk
+from athcodec.encoding.job import time_chunk
 from athcodec.encoding.quantise import least_bound
 from athcodec.hierarchy import derived_edges, hierarchy_of
 

@@ -122,7 +122,9 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
         raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
     with athcodec.read(path, **reading_options(item.settings)) as clip:
         blend = loop_frames(item.settings)
-        yield _with_branches(clip if blend is None else athcodec.looped(clip, blend), item.settings.get("hierarchy"))
+        clip = clip if blend is None else athcodec.looped(clip, blend)
+        hierarchy = item.settings.get("hierarchy")
+        yield clip if hierarchy is None else discovery.with_branches(clip, discovery.find_or_load(clip, hierarchy))
     _check_source(item, source)
 
 
@@ -148,18 +150,6 @@ def _local_path(item: Item, folder: str) -> str:
 def _target(item: Item, folder: str) -> str:
     """Where the file is made."""
     return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
-
-
-def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
-    if hierarchy is None:
-        return clip
-    if hierarchy == "auto" or hierarchy in discovery.METHODS:
-        return discovery.with_branches(clip, discovery.find_branches(clip, hierarchy))
-    if hierarchy.lower().endswith(".mtg"):
-        from athcodec.sources.mtg import mtg_branches
-
-        return discovery.with_branches(clip, discovery.Found(*mtg_branches(hierarchy, clip), "file"))
-    return discovery.with_branches(clip, discovery.load(hierarchy))
 
 
 def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:

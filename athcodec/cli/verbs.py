@@ -70,6 +70,8 @@ def encode(args: argparse.Namespace) -> int:
             progress=report,
             **bound(args, unit),
         )
+    if summary.found_branches is not None:
+        say("hierarchy", summary.found_branches)
     with open_file(output, strict=True) as decoder:
         print_file(output, decoder, args.json)
     for seam in summary.seams:

@@ -33,7 +33,7 @@ from athcodec.threads import SERIAL, ThreadPool, ranges
 if TYPE_CHECKING:
     from athcodec.encoding.learned_modes import LearnedModes
 
-RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices that one thread takes at a time
+RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 
 def cosine_basis(frames: int) -> np.ndarray:
@@ -104,8 +104,8 @@ class Plan:
 
     @cached_property
     def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-        """Ranges of pieces that much hangs on, in order, and of those that several threads may do once these are done:
-        whole subtrees of branches, up to a RANGES-th of the vertices."""
+        """Ranges of pieces with large subtrees, in order, and ranges that several threads may process after these:
+        whole subtrees of branches with at most a RANGES-th of the vertices."""
         most = max(LEAST_RANGE, self.vertex_count // RANGES)
         vertices = np.append(self.branches["first"], self.vertex_count).tolist()
         after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
@@ -171,8 +171,8 @@ class SegmentMotion:
 
     def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], learned_modes: LearnedModes | None = None):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
-            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} frames, "
-                             f"{plan.level_count} streams")
+            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
+                             f"frames, {plan.level_count} streams")
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
         self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
@@ -223,7 +223,7 @@ class SegmentMotion:
             self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone))
 
     def clear_nodes(self) -> None:
-        """Forgets the maps of the nodes."""
+        """Sets the maps of the nodes to zero."""
         self.node_tracks.fill(0)
         self.node_steps.fill(0)
 

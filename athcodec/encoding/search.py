@@ -1,7 +1,7 @@
 """Which settings make the smallest file: candidates code a sample of the segments, and their bytes are counted.
 
-Bases, rotations, time bases and steps are searched one after the other, on a part of the plant where that is large.
-`Search` knows what to try; what a trial does is coding.py's business.
+Bases, rotations, time bases and steps are searched one after the other, on a sample of the plant where that is large.
+`Search` knows what to try; a trial itself is segment.py's.
 """
 
 from __future__ import annotations
@@ -60,25 +60,26 @@ class SegmentSample:
     def scale(self) -> float:
         return self.frames / self.positions.shape[2]
 
-    def of_part(self, part: PlantSample) -> SegmentSample:
-        return SegmentSample(self.positions[part.vertices], self.frames)
+    def of_plant(self, sample: PlantSample) -> SegmentSample:
+        return SegmentSample(self.positions[sample.vertices], self.frames)
 
 
 def samples_of(source: Source) -> list[SegmentSample]:
-    """The segment in the middle of a clip; of several clips those of a few, from calm to wild, each for its like."""
+    """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
     middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
     if len(middles) == 1:
         return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
-    groups = np.array_split(np.argsort([_moved(source, each) for each in middles], kind="stable"),
+    groups = np.array_split(np.argsort([_moved(source, segment) for segment in middles], kind="stable"),
                             min(SAMPLES, len(middles)))
-    return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups]
+    return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum()))
+            for group in groups]
 
 
 def _moved(source: Source, segment: int) -> float:
-    """How far vertices go from the first frame of a segment to its middle, RMS."""
+    """RMS displacement of the vertices from the first frame of a segment to its middle."""
     start, stop = source.segments[segment]
-    first, middle = (source.clip.block(each, each + 1).astype(np.float64) for each in (start, (start + stop) // 2))
+    first, middle = (source.clip.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2))
     return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)
 
 
@@ -92,26 +93,27 @@ def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress
 
 
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
-    """Where a search starts from."""
+    """The start of a search."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
     levels = ath.height + 2
     return Settings(
         bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
         level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.sheet_like,
-        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step), rotation_step_factors=(0,) * levels,
-        learned_bases=(False,) * levels, learned_pieces=None, node_steps=np.full(levels, step))
+        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step),
+        rotation_step_factors=(0,) * levels, learned_bases=(False,) * levels, learned_pieces=None,
+        node_steps=np.full(levels, step))
 
 
 class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
 
-    samples: from calm to wild; that in the middle says what maps of nodes need. extrapolation: what the clip is a part of, if
-    it is one.
+    samples: from calm to wild; the one in the middle decides the steps of the nodes' maps. extrapolation: for a clip
+    that is a sample of a larger plant.
     """
 
-    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[SegmentSample], effort: str, report: Progress,
-                 jobs: int | None = None, extrapolation: ExtrapolationFactors | None = None):
+    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[SegmentSample], effort: str,
+                 report: Progress, jobs: int | None = None, extrapolation: ExtrapolationFactors | None = None):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         self.start, self.samples, self.levels = start, samples, ath.height + 2
         self.sample = samples[len(samples) // 2].positions
@@ -120,12 +122,12 @@ class Search:
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
-        self._besides = 0
+        self._extra_trials = 0
 
     @classmethod
     def of(cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
            jobs: int | None = None) -> Search:
-        """For a clip that is no part."""
+        """For a whole plant."""
         samples = samples_of(source)
         return cls(source, ath, first_settings(source, ath, bound, samples[-1]), samples, effort, report, jobs)
 
@@ -152,13 +154,13 @@ class Search:
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
 
     def found(self) -> Settings:
-        """The best settings, as far as a part shows them where the plant is large."""
-        part = sample_plant(self.source, self.ath, self.effort)
-        return self.best() if part is None else self.best_of_part(part)
+        """The best settings; for a large plant those of a sample of it."""
+        sample = sample_plant(self.source, self.ath, self.effort)
+        return self.best() if sample is None else self.best_of_sample(sample)
 
     def best(self) -> Settings:
-        steps = [self._with_basis, self._with_rotations, self._with_learned_bases, self._with_basis, self._with_learned_modes,
-                 self._with_steps]
+        steps = [self._with_basis, self._with_rotations, self._with_learned_bases, self._with_basis,
+                 self._with_learned_modes, self._with_steps]
         if self.effort == "fast":
             steps = [self._with_rotations]
         if self.source.weights is not None:
@@ -168,28 +170,29 @@ class Search:
         settings = self.start
         for step in [*steps, self._with_node_steps]:
             settings = step(settings)
-            self._tell(WORTH.get(step.__name__, 0))
+            self._report(WORTH.get(step.__name__, 0))
         self.report("search", 1.0)
         return settings
 
-    def _tell(self, worth: int = 0) -> None:
-        """Tells how far it has come, after work that was worth so many trials besides those that were made."""
-        self._besides += worth
-        self.report("search", min((len(self._known) + self._besides) / TRIALS[self.effort], 0.99))
+    def _report(self, worth: int = 0) -> None:
+        """Reports progress after work that counts as `worth` trials in addition to those made."""
+        self._extra_trials += worth
+        self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
 
-    def best_of_part(self, part: PlantSample) -> Settings:
-        """What is best for a part of the plant, for all of it; its pieces are asked one by one for their learned_modes."""
-        start, kept = self.start, part.branches
-        limit = start.limit if np.isscalar(start.limit) else start.limit[part.vertices]
-        some = replace(start, sheet=part.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept], limit=limit)
+    def best_of_sample(self, sample: PlantSample) -> Settings:
+        """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
+        start, kept = self.start, sample.branches
+        limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
+        some = replace(start, sheet=sample.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept],
+                       limit=limit)
         extrapolation = ExtrapolationFactors.of(branch_records(self.source.hierarchy, self.ath, start),
-                                                branch_records(part.source.hierarchy, part.ath, some))
-        samples = [sample.of_part(part) for sample in self.samples]
-        search = Search(part.source, part.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
+                                                branch_records(sample.source.hierarchy, sample.ath, some))
+        samples = [segment.of_plant(sample) for segment in self.samples]
+        search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
         inner, all_inner = search.inner_nodes(), self.inner_nodes()
         coarser = np.where(inner > 0, np.sqrt(extrapolation.vertices * inner / np.maximum(all_inner, 1)), 1.0)
-        by_form = np.array_equal(found.sheet, part.source.sheet_like)
+        by_form = np.array_equal(found.sheet, sample.source.sheet_like)
         settings = replace(
             start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step,
             rotation_step_factors=found.rotation_step_factors, learned_bases=found.learned_bases,
@@ -282,7 +285,7 @@ class Search:
             costs = []
             for cost in pool.map(self.cost, candidates):
                 costs.append(cost)
-                self._tell()
+                self._report()
             return costs
 
     def prelude(self, settings: Settings) -> CodedPrelude:
@@ -392,7 +395,7 @@ class Search:
                 if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(prelude, segment)
-                limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # a deeper level stays the better one
+                limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # deeper levels stay better
             elif (self._errors_of_maps(prelude, segment) <= limits).all():
                 chosen = steps
             else:

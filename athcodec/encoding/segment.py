@@ -32,22 +32,21 @@ from athcodec.hierarchy import Hierarchy
 from athcodec.segmentation import split_segments
 from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
-FINER = 32  # times smaller than the step is that at which one learns
+FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
-WORK_BYTES = 1536 << 20  # that segments in work may take where nobody says how many they are
-SEGMENT_WORK = 8  # times its float32 positions is what a segment takes while it is coded
+WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
 
 def thread_count(jobs: int | None, source: Source) -> int:
-    """Segments, or candidates, that are worked on at once: `jobs`, or one per core, at most 4 and few enough for
-    memory."""
+    """Segments, or candidates, that are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES."""
     fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
     return jobs or max(1, min(default_jobs(), fit))
 
 
 @dataclass
 class Source:
-    """A clip in file order, less an origin, cut into segments."""
+    """A clip in file order, relative to an origin, cut into segments."""
 
     clip: MotionClip
     hierarchy: Hierarchy
@@ -88,7 +87,7 @@ class Source:
         """What decoded positions are held to: one for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return qz.error_limit(bound, self.seen.diagonal)
-        return np.array([qz.error_limit(each, self.seen.diagonal) for each in bound * self.weights])
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights])
 
     def smallest_bound(self, bound: float) -> float:
         """Of any vertex."""
@@ -102,7 +101,7 @@ class Source:
         """(levels,) of the vertices of each level and those below it the weight that such a part of them falls short
         of; a level without vertices has that of the one above."""
         level = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
-        below = [self.weights[level >= each] for each in range(levels)]
+        below = [self.weights[level >= first] for first in range(levels)]
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
 
@@ -257,7 +256,7 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
 
 
 def analyse_finely(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> SegmentMotion:
-    """A segment at a step FINER times smaller, in cosines and modes: what is to be learned from."""
+    """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
     segment = SegmentMotion(prelude.plan, positions.shape[2], _level_streams(fine, prelude.plan.level_count, {}))
     segment.analyse(positions, qz.DEAD_ZONE)
@@ -309,7 +308,8 @@ def analyse(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
     return segment, bases
 
 
-def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None) -> Coded:
+def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
+               learned_modes: LearnedModes | None) -> Coded:
     """Streams of the stems and the corrections that keep the limit."""
     plan = prelude.plan
     segment, bases = analyse(prelude, settings, positions, learned_modes)

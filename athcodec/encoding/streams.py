@@ -1,7 +1,7 @@
 """From integers to the bytes of a stream: one function per kind of stream of FORMAT.md.
 
 The models run in the C core; this module knows which arrays each takes. What the bytes are wrapped in (steps, flags) is
-the container's business. Reading streams is the player's (player.py).
+the container's business. Reading streams is the core's.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict
     """Learned learned_modes by level; nothing where there are none."""
     if learned_modes is None:
         return {}
-    arrays = (address(learned_modes.counts, np.int32, len(plan.pieces)), address(learned_modes.first, np.int64, len(plan.pieces)),
+    pieces = len(plan.pieces)
+    arrays = (address(learned_modes.counts, np.int32, pieces), address(learned_modes.first, np.int64, pieces),
               address(learned_modes.integers, np.int32, learned_modes.integers.size))
     return {level: encode_stream("ath_encode_shapes", 4096 + 8 * learned_modes.integers.size, plan.core, *arrays, level)
             for level in learned_modes.levels(plan).tolist()}
