@@ -1,7 +1,7 @@
-"""Threads that share the work on one clip: parts of arrays, or things that come one after the other.
+"""A thread pool for the work on one clip: ranges of arrays, or items that arrive one after the other.
 
-What is shared out does not depend on how many they are, nor does the order in which results come back, so that neither
-shows in a file. Only work that lets go of the interpreter (the C core, NumPy on large arrays) gains by it.
+Neither how work is divided nor the order of results depends on the number of threads, so that a file does not either.
+Only work that releases the GIL (the C core, NumPy on large arrays) gains by it.
 """
 
 from __future__ import annotations
@@ -12,31 +12,33 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-MOST = 4  # threads where nobody says how many
-RANGE_NUMBERS = 3 << 18  # of an array that one thread takes at a time
+MOST = 4  # threads by default
+RANGE_NUMBERS = 3 << 18  # of an array, per call of a thread
 
 
 def default_jobs() -> int:
-    """Threads where nobody says how many: one per core, at most MOST."""
+    """Default number of threads: one per core, at most MOST."""
     return min(MOST, os.cpu_count() or 1)
 
 
 class ThreadPool:
-    """So many threads; with one there are none but the caller's, unless there is to be one `beside` it. What they are
-    given must not call on the pool itself."""
+    """`jobs` threads; a single job runs on the caller's thread, unless `beside` asks for another one.
+
+    Functions that the pool runs must not use the pool themselves.
+    """
 
     def __init__(self, jobs: int = 1, beside: bool = False):
         self.jobs = jobs
         self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
     def map(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
-        """What function(*item) gives for each, in order."""
+        """function(*item) of all items, in order."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
         return list(self._executor.map(lambda item: function(*item), items))
 
     def ordered(self, function: Callable[[Any], Any], items: Iterable, ahead: int) -> Iterator:
-        """What function(item) gives for each, in order; meanwhile up to `ahead` further items are taken and begun."""
+        """function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
         if self._executor is None:
             yield from map(function, items)
             return
@@ -53,6 +55,6 @@ SERIAL = ThreadPool()
 
 
 def ranges(count: int, numbers: int) -> list[tuple[int, int]]:
-    """Runs (start, stop) of 0 to count - 1, whose rows hold so many numbers, for one thread each."""
+    """Runs (start, stop) of 0 to count - 1 for one call each; rows hold `numbers` numbers."""
     length = max(1, RANGE_NUMBERS // max(1, numbers))
     return [(start, min(start + length, count)) for start in range(0, count, length)]

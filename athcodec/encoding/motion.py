@@ -143,15 +143,6 @@ class Plan:
         """Whether nodes of the level have maps of their own."""
         return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
 
-    def affine_levels(self, level: int) -> list[int]:
-        """Levels whose maps are shown at `level`: its own, and those of leaves above that are still whole."""
-        shown = (self.nodes["coded"] == 1) & (self.nodes["level"] <= level) & (self.nodes["last"] >= level)
-        return sorted(set(self.nodes["level"][shown].tolist()))
-
-    def shown_nodes(self, level: int) -> np.ndarray:
-        """Indices of the nodes that move as one at `level`."""
-        return np.flatnonzero((self.nodes["level"] <= level) & (self.nodes["last"] >= level))
-
     def exact_branches(self, level: int) -> np.ndarray:
         """Branches whose stems are exact at `level`."""
         return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
@@ -199,13 +190,6 @@ class SegmentMotion:
             for name, array in (("shape_counts", self.learned_modes.counts), ("shape_first", self.learned_modes.first),
                                 ("shapes", self.learned_modes.units), ("duals", self.learned_modes.duals)):
                 setattr(self.integers, name, array.ctypes.data)
-
-    def restream(self, streams: list[LevelStream]) -> None:
-        """Clears the integers and sets how the next ones are to be read."""
-        self.streams = streams
-        for array in (self.coefficients, self.tracks, self.node_tracks, self.node_steps):
-            array.fill(0)
-        self._bind()
 
     def analyse(self, source: np.ndarray, dead_zone: float) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
