@@ -6,8 +6,6 @@ from athcodec import errors
 from athcodec.ath import Ath, Thresholds, build_ath
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, open
-from athcodec.discovery import Found, find_branches
-from athcodec.encoder import Summary, encode
 from athcodec.excerpt import Excerpt
 from athcodec.joining import join, looped, split
 from athcodec.truncate import truncate
@@ -24,7 +22,11 @@ __all__ = ["Ath", "Decoder", "Excerpt", "Found", "MotionClip", "Summary", "Thres
 
 def __getattr__(name: str):
     # modules that decoding does not need
-    if name in ("read", "read_hdf5", "sample_path"):
+    if name in ("Summary", "encode"):
+        from athcodec import encoding as module
+    elif name in ("Found", "find_branches"):
+        from athcodec import discovery as module
+    elif name in ("read", "read_hdf5", "sample_path"):
         from athcodec import sources as module
     elif name in ("write", "write_hdf5"):
         from athcodec import exporters as module

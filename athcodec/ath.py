@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from athcodec._native import address, lib
-from athcodec.crew import ALONE, Crew
 from athcodec.hierarchy import Hierarchy, hierarchy_of
+from athcodec.threads import SERIAL, ThreadPool
 
 if TYPE_CHECKING:
     from athcodec.clip import MotionClip
@@ -40,7 +40,22 @@ _WORK_VERTICES = 1 << 17    # vertex-frames in work at once, of one thread
 
 @dataclass(frozen=True)
 class Thresholds:
-    """The parameters of TAM (section 3): epsilon and xi in scene units, eta in frames, lam in vertices."""
+    """The parameters of the acceptance test TAM (Song, Yang and Peng 2011, section 3).
+
+    Parameters
+    ----------
+    epsilon, xi : float
+        Scene units, at least 0.
+    eta : int
+        Frames, at least 0.
+    lam : int
+        Vertices, at least 0 (lambda in the paper).
+
+    Raises
+    ------
+    ValueError
+        For a negative threshold.
+    """
 
     epsilon: float
     eta: int
@@ -56,7 +71,7 @@ class Thresholds:
 
 
 class CutPiece(NamedTuple):
-    """Vertices first_vertex .. stop_vertex - 1 (file order) moving as one: a branch's subtree or its stem."""
+    """Vertices first_vertex to stop_vertex - 1 (file order), which move as one: a branch's subtree or its stem."""
 
     branch: int
     first_vertex: int
@@ -73,15 +88,24 @@ class Gaps(NamedTuple):
 
 @dataclass(frozen=True)
 class Ath:
-    """An affine transform hierarchy.
+    """An affine transform hierarchy; `build_ath` makes it (Song, Yang and Peng 2011, section 3).
 
-    hierarchy    the branches and vertices it stands on, in file order
-    thresholds   what TAM was asked
-    rest         (N,3) float64, base pose V_0 in file order
-    node_branch  (M,) int32, the branch whose subtree a node stands for, ascending
-    node_parent  (M,) int32, parent node, -1 for a root
-    node_depth   (M,) int32, 0 for a root
-    whole        (M,) bool, the subtree moves as one: accepted by TAM, or cut at the depth limit
+    Attributes
+    ----------
+    hierarchy : Hierarchy
+        Branches and vertices, in file order.
+    thresholds : Thresholds
+        Those that TAM accepted nodes by.
+    rest : (N, 3) float64
+        Base pose V_0 in file order, scene units.
+    node_branch : (M,) int32
+        The branch whose subtree a node represents, ascending.
+    node_parent : (M,) int32
+        Parent node, -1 for a root.
+    node_depth : (M,) int32
+        0 for a root.
+    whole : (M,) bool
+        The subtree moves as one: accepted by TAM, or cut at the depth limit.
     """
 
     hierarchy: Hierarchy
@@ -94,6 +118,7 @@ class Ath:
 
     @property
     def node_count(self) -> int:
+        """Number of nodes, M."""
         return len(self.node_branch)
 
     @property
@@ -109,52 +134,111 @@ class Ath:
         return inner
 
     def whole_branches(self) -> np.ndarray:
-        """(B,) bool in file order: the branch is a node, and its subtree moves as one (see `whole`).
+        """Which branches are nodes whose subtree moves as one (see `whole`).
 
-        Branches inside such a subtree are no nodes: they are False.
+        Returns
+        -------
+        (B,) bool
+            In file order; False for branches inside such a subtree, which are no nodes.
         """
         result = np.zeros(self.hierarchy.branch_count, bool)
         result[self.node_branch] = self.whole
         return result
 
     def table1(self) -> dict[str, float | int]:
-        """The paper's table 1: depth (levels of nodes), nodes, leaves, and the thresholds."""
+        """Table 1 of the paper: depth (levels of nodes), nodes, leaves, and the thresholds.
+
+        Returns
+        -------
+        dict of str to float or int
+            "depth", "nodes", "leaves", "epsilon", "eta", "xi", "lam".
+        """
         thresholds = self.thresholds
         return {
             "depth": self.height + 1, "nodes": self.node_count, "leaves": int((~self.is_inner).sum()),
             "epsilon": thresholds.epsilon, "eta": thresholds.eta, "xi": thresholds.xi, "lam": thresholds.lam,
         }
 
-    def cut(self, depth: int) -> list[CutPiece]:
-        """The partition of the vertices that playback at a depth moves piece by piece, by first vertex.
+    def cut(self, level: int) -> list[CutPiece]:
+        """The partition of the vertices into what moves as one at a level.
 
-        Its pieces are the subtrees of the nodes of that depth, those of the leaves above it, and the stems
-        of the inner nodes above it. A depth beyond the height gives the cut at the height. Raises
-        ValueError for a negative depth.
+        Parameters
+        ----------
+        level : int
+            At least 0; one beyond the height gives the cut at the height.
+
+        Returns
+        -------
+        list of CutPiece
+            By first vertex: the subtrees of the nodes at that depth, those of the leaves above it, and the stems of
+            the inner nodes above it.
+
+        Raises
+        ------
+        ValueError
+            For a negative level.
         """
-        pieces, shown, is_stem = self._cut_pieces(depth)
+        pieces, shown, is_stem = self._cut_pieces(level)
         columns = (pieces.first_branch[shown], pieces.first[shown], pieces.stop[shown], is_stem)
         return [CutPiece(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def affine(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
-        """A_t of a node's subtree (eq. 2): (T,3,4) float64, taking rest positions to those of each frame.
+        """The maps A_t of a node's subtree (eq. 2).
 
-        positions: a clip, or an array (T,N,3) in source order.
+        Parameters
+        ----------
+        positions : MotionClip or (T, N, 3) array
+            In source order, scene units.
+        node : int
+
+        Returns
+        -------
+        (T, 3, 4) float64
+            Maps from rest positions to those of each frame.
+
+        Raises
+        ------
+        IndexError
+            For a node that does not exist.
         """
         pieces, last = self._path(node)
         return np.concatenate([pieces.fit(frames).matrices()[:, last] for frames in self._frames(positions)])
 
     def affines(self, positions: MotionClip | np.ndarray) -> np.ndarray:
-        """A_t of all nodes: (T,M,3,4) float64, as affine() gives them one by one."""
+        """The maps of all nodes.
+
+        Parameters
+        ----------
+        positions : MotionClip or (T, N, 3) array
+            In source order, scene units.
+
+        Returns
+        -------
+        (T, M, 3, 4) float64
+            The same as `affine` gives for each node.
+        """
         hierarchy, rest = self.hierarchy, self.rest
         pieces = _Pieces.subtrees(hierarchy, rest, self.node_branch, self.node_parent, self.node_depth)
         return np.concatenate([pieces.fit(frames).matrices() for frames in self._frames(positions)])
 
     def residual(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
-        """R_t of a node's subtree (eq. 3), in the space of the base pose: (T,K,3) float64.
+        """The residual R_t of a node's subtree in the space of the base pose (eq. 3); A_t R_t = V_t (eq. 4).
 
-        Vertices are in file order. A_t R_t = V_t (eq. 4). positions: a clip, or an array (T,N,3) in source
-        order.
+        Parameters
+        ----------
+        positions : MotionClip or (T, N, 3) array
+            In source order, scene units.
+        node : int
+
+        Returns
+        -------
+        (T, K, 3) float64
+            Of the K vertices of the subtree, in file order.
+
+        Raises
+        ------
+        IndexError
+            For a node that does not exist.
         """
         pieces, last = self._path(node)
         vertices = slice(pieces.first[last], pieces.stop[last])
@@ -165,14 +249,29 @@ class Ath:
             residuals.append(moved + offset[:, last, None] + pieces.origin)
         return np.concatenate(residuals)
 
-    def approximation(self, positions: np.ndarray, depth: int) -> np.ndarray:
-        """The motion cut at a depth: every piece of `cut(depth)` moves by its own least-squares affine map.
+    def approximation(self, positions: np.ndarray, level: int) -> np.ndarray:
+        """The motion at a level: every piece of `cut(level)` moves by its own least-squares affine map.
 
-        positions: (T,N,3) in source order; the result is (T,N,3) float64 in source order. The pieces' maps
-        are independent of each other, as in the paper, so they may gape where they meet: see
-        attachment_gaps().
+        The maps of different pieces are independent, as in the paper, so pieces may come apart where they meet: see
+        `attachment_gaps`.
+
+        Parameters
+        ----------
+        positions : (T, N, 3) array
+            In source order, scene units.
+        level : int
+
+        Returns
+        -------
+        (T, N, 3) float64
+            In source order.
+
+        Raises
+        ------
+        ValueError
+            For a negative level.
         """
-        pieces, shown, _ = self._cut_pieces(depth)
+        pieces, shown, _ = self._cut_pieces(level)
         result = np.empty(np.shape(positions))
         start = 0
         for frames in self._frames(positions):
@@ -182,14 +281,28 @@ class Ath:
             start = stop
         return result
 
-    def attachment_gaps(self, positions: MotionClip | np.ndarray, depth: int) -> Gaps:
-        """How far the pieces of approximation() come apart where a branch sits on its parent's stem.
+    def attachment_gaps(self, positions: MotionClip | np.ndarray, level: int) -> Gaps:
+        """How far the pieces of `approximation` come apart where a branch is attached to its parent's stem.
 
-        For every branch whose piece is another than its parent's: the distance between the places where the
-        two pieces' maps put the attach vertex, which is the gap that a viewer sees. positions: a clip, or
-        an array (T,N,3) in source order.
+        For every branch whose piece is another than its parent's: the distance between the places where the two
+        pieces' maps put the attach vertex, which is the visible gap.
+
+        Parameters
+        ----------
+        positions : MotionClip or (T, N, 3) array
+            In source order, scene units.
+        level : int
+
+        Returns
+        -------
+        Gaps
+
+        Raises
+        ------
+        ValueError
+            For a negative level.
         """
-        pieces, shown, _ = self._cut_pieces(depth)
+        pieces, shown, _ = self._cut_pieces(level)
         piece_of_branch = np.repeat(shown, (pieces.stop_branch - pieces.first_branch)[shown])
         parent = self.hierarchy.branch_parent
         child = np.flatnonzero((parent >= 0) & (piece_of_branch != piece_of_branch[parent]))
@@ -219,22 +332,22 @@ class Ath:
         order = np.arange(len(path))
         return _Pieces.subtrees(self.hierarchy, self.rest, branches, order - 1, order), len(path) - 1
 
-    def _cut_pieces(self, depth: int) -> tuple[_Pieces, np.ndarray, np.ndarray]:
+    def _cut_pieces(self, level: int) -> tuple[_Pieces, np.ndarray, np.ndarray]:
         """All pieces the cut's maps depend on, the cut's own by first vertex, which of those are stems."""
-        if depth < 0:
-            raise ValueError(f"depth of a cut: got {depth}, expected 0 to {self.height}")
+        if level < 0:
+            raise ValueError(f"level of a cut: got {level}, expected 0 to {self.height}")
         hierarchy = self.hierarchy
-        nodes = np.flatnonzero(self.node_depth <= depth)
+        nodes = np.flatnonzero(self.node_depth <= level)
         renumbered = np.full(self.node_count + 1, -1)
         renumbered[nodes] = np.arange(len(nodes))
         parent = renumbered[self.node_parent[nodes]]
-        divided = np.flatnonzero(self.is_inner[nodes] & (self.node_depth[nodes] < depth))
+        divided = np.flatnonzero(self.is_inner[nodes] & (self.node_depth[nodes] < level))
         branch = self.node_branch[nodes]
         first_branch = np.concatenate([branch, branch[divided]])
         stop_branch = np.concatenate([branch + hierarchy.subtree_branches[branch], branch[divided] + 1])
-        level = np.concatenate([self.node_depth[nodes], self.node_depth[nodes[divided]] + 1])
+        node_depth = np.concatenate([self.node_depth[nodes], self.node_depth[nodes[divided]] + 1])
         parent = np.concatenate([parent, divided])
-        pieces = _Pieces(hierarchy, self.rest, first_branch, stop_branch, parent, level)
+        pieces = _Pieces(hierarchy, self.rest, first_branch, stop_branch, parent, node_depth)
         shown = np.setdiff1d(np.arange(len(first_branch)), divided)
         shown = shown[np.argsort(first_branch[shown])]
         return pieces, shown, shown >= len(nodes)
@@ -242,22 +355,35 @@ class Ath:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """What a pass over all frames of a clip tells: its extent, its motion and TAM for any thresholds.
-
-    hierarchy         the branches and vertices, in file order
-    rest              (N,3) float64, base pose V_0 in file order
-    max_depth         nodes at this depth are taken whole
-    frame_count       frames read, all of whose positions are finite
-    low, high         (3,) float64, corners of the axis-aligned bounding box of all frames
-    rms_motion        root mean square, over frames and vertices, of a vertex's distance from its rest place
-    branches          (C,) the branches above max_depth, whose subtrees are tested
-    largest_gads      (E,C) float64, the largest GADs (eq. 5) of each subtree over the frames, descending;
-                      E is the surveyed eta + 1, or frame_count where that is fewer
-    largest_distance  (C,) float64, distance of the vertex that gets furthest from its base place
-    xi                the surveyed one; None where lam was 0
-    most_beyond_xi    (C,) integers, the most vertices beyond xi in a frame (LAD); None where lam was 0
+    """The statistics of one pass over all frames of a clip: its extent, its motion, and what TAM needs.
 
     Lengths are in scene units. Nothing is kept frame by frame.
+
+    Attributes
+    ----------
+    hierarchy : Hierarchy
+        Branches and vertices, in file order.
+    rest : (N, 3) float64
+        Base pose V_0 in file order.
+    max_depth : int
+        Nodes at this depth are accepted whatever their errors are.
+    frame_count : int
+        Frames read, all of whose positions are finite.
+    low, high : (3,) float64
+        Corners of the axis-aligned bounding box of all frames.
+    rms_motion : float
+        RMS over frames and vertices of a vertex's distance from its rest position.
+    branches : (C,) integer array
+        The branches above max_depth, whose subtrees are tested.
+    largest_gads : (E, C) float64
+        The largest GADs (eq. 5) of each subtree over the frames, descending; E is the surveyed eta + 1, or frame_count
+        where that is fewer.
+    largest_distance : (C,) float64
+        Largest distance of any vertex of the subtree from its base position.
+    xi : float or None
+        The surveyed one; None where lam was 0.
+    most_beyond_xi : (C,) integer array or None
+        The most vertices beyond xi in a frame (LAD); None where lam was 0.
     """
 
     hierarchy: Hierarchy
@@ -281,8 +407,20 @@ class Survey:
     def ath(self, thresholds: Thresholds) -> Ath:
         """The ATH for some thresholds (section 3), without reading the clip again.
 
-        Any epsilon and any eta up to the surveyed one will do, and any xi where lam is 0; with a greater
-        lam, xi must be the surveyed one. Raises ValueError for others.
+        Parameters
+        ----------
+        thresholds : Thresholds
+            Any epsilon and any eta up to the surveyed one, and any xi where lam is 0; with a greater lam, xi must be
+            the surveyed one.
+
+        Returns
+        -------
+        Ath
+
+        Raises
+        ------
+        ValueError
+            For thresholds that were not surveyed.
         """
         accepted = np.ones(self.hierarchy.branch_count, bool)
         accepted[self.branches] = self._keeps_epsilon(thresholds) & self._keeps_xi(thresholds)
@@ -318,20 +456,39 @@ def survey(
     progress: Callable[[float], object] | None = None,
     *,
     eta: int = 0,
-    crew: Crew = ALONE,
+    pool: ThreadPool = SERIAL,
 ) -> Survey:
-    """All that the ATH needs of a clip's frames, for thresholds that are chosen afterwards.
+    """The statistics of a clip's frames from which `Survey.ath` makes the ATH for thresholds chosen afterwards.
 
-    clip       positions (T,N,3) and rest pose; every frame is read once, block by block
-    hierarchy  the clip's, where it is known already
-    lam        vertices; above 0 it is surveyed for a single xi, in scene units, which is then needed
-    max_depth  nodes at this depth are taken whole, whatever they do
-    progress   called now and then with the part of the frames done, at last with 1.0
-    eta        frames; the largest eta that Survey.ath() will be asked for
-    crew       threads; what comes out does not depend on their number
+    Parameters
+    ----------
+    clip : MotionClip
+        Every frame is read once, block by block.
+    hierarchy : Hierarchy, optional
+        The clip's, where it is known already.
+    lam : int
+        Vertices; above 0 the survey is for a single `xi`, which is then needed.
+    xi : float, optional
+        Scene units.
+    max_depth : int
+        Nodes at this depth are accepted whatever their errors are.
+    progress : callable, optional
+        Called with the fraction of the frames read, at last with 1.0.
+    eta : int
+        Frames; the largest eta that `Survey.ath` will be asked for.
+    pool : ThreadPool
+        The result does not depend on the number of threads.
 
-    Raises ValueError where a number is negative or xi is missing, and ClipError for positions that are NaN
-    or infinite.
+    Returns
+    -------
+    Survey
+
+    Raises
+    ------
+    ValueError
+        Where a number is negative or xi is missing.
+    ClipError
+        For positions that are NaN or infinite.
     """
     limits = Thresholds(0.0, eta, 0.0 if xi is None else xi, lam)
     if limits.lam and xi is None:
@@ -350,7 +507,7 @@ def survey(
         return _Extent.of(frames, rest), _Differences.of(_seen_from(pieces.origin, frames), pieces, xi)
 
     extent, differences, gads = None, None, _Largest(limits.eta + 1)
-    for where, how in crew.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * crew.jobs):
+    for where, how in pool.ordered(measured, _portions(clip, hierarchy.vertex_count), 2 * pool.jobs):
         extent, differences = (where, how) if extent is None else (extent | where, differences | how)
         gads.add(how.gads)
         if progress is not None:
@@ -374,20 +531,40 @@ def build_ath(
     *,
     max_error: float | None = None,
 ) -> Ath:
-    """The ATH of a clip (section 3), in one pass over its frames. See survey() for several thresholds.
+    """The ATH of a clip (Song, Yang and Peng 2011, section 3), in one pass over its frames.
 
-    clip       positions (T,N,3) and rest pose, read block by block
-    epsilon    scene units: a frame whose mean residual distance (GAD, eq. 5) exceeds it counts against eta
-    eta        at most so many frames may exceed epsilon
-    xi         scene units: a vertex further than this from its base place counts against lam (LAD)
-    lam        in every frame at most so many vertices may
-    max_error  instead of epsilon and xi: both are this, in scene units
-    hierarchy  the clip's, where it is known already
-    max_depth  nodes at this depth are taken whole, whatever they do
+    Where TAM accepts a subtree, its node is a leaf; otherwise the sub-branches are tested, down to a single branch.
+    For several thresholds see `survey`.
 
-    Where TAM accepts a subtree, its node is a leaf; otherwise the sub-branches are tried, down to a single
-    branch. Raises ValueError where thresholds are missing, given twice or negative, and ClipError for
-    positions that are NaN or infinite.
+    Parameters
+    ----------
+    clip : MotionClip
+        Read block by block.
+    epsilon : float, optional
+        Scene units: a frame whose mean residual distance (GAD, eq. 5) exceeds it counts against `eta`.
+    eta : int
+        At most this number of frames may exceed epsilon.
+    xi : float, optional
+        Scene units: a vertex further than this from its base position counts against `lam` (LAD).
+    lam : int
+        At most this number of vertices may exceed xi in any frame.
+    hierarchy : Hierarchy, optional
+        The clip's, where it is known already.
+    max_depth : int
+        Nodes at this depth are accepted whatever their errors are.
+    max_error : float, optional
+        In place of epsilon and xi: both are this, in scene units.
+
+    Returns
+    -------
+    Ath
+
+    Raises
+    ------
+    ValueError
+        Where thresholds are missing, given twice or negative.
+    ClipError
+        For positions that are NaN or infinite.
     """
     thresholds = _thresholds(epsilon, eta, xi, lam, max_error)
     surveyed = survey(clip, hierarchy, thresholds.lam, thresholds.xi, max_depth, eta=thresholds.eta)

@@ -479,14 +479,14 @@ class StemsHead:
     """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any."""
 
     step: float
-    omega: int
+    rotation_step_factor: int
     bits: int = 0
     rank: int = 0
     basis: bytes = b""
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    data = _STEMS.pack(head.step, head.omega.bit_length(), head.bits, head.rank)
+    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length(), head.bits, head.rank)
     if head.bits:
         data += _BASIS_LENGTH.pack(len(head.basis)) + head.basis
     return data + stream

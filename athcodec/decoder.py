@@ -41,7 +41,7 @@ from athcodec.errors import (
 from athcodec.files import is_url
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.joining import metadata_of
-from athcodec.transform import balanced_segments
+from athcodec.segmentation import balanced_segments
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))

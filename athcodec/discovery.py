@@ -170,6 +170,17 @@ def load(path: str | os.PathLike[str]) -> Found:
     return _found(vertex_branch, parent, stem_index, "file")
 
 
+def find_or_load(clip: MotionClip, hierarchy: str) -> Found:
+    """Branches by "auto" or one of METHODS, or from a file of `save` or in MTG. Raises ClipError, OSError."""
+    if hierarchy == "auto" or hierarchy in METHODS:
+        return find_branches(clip, hierarchy)
+    if hierarchy.lower().endswith(".mtg"):
+        from athcodec.sources.mtg import mtg_branches
+
+        return Found(*mtg_branches(hierarchy, clip), "file")
+    return load(hierarchy)
+
+
 def _runs(vertices: np.ndarray) -> str:
     """"0-5 9 7" for 0 1 2 3 4 5 9 7."""
     breaks = np.flatnonzero(np.diff(vertices) != 1) + 1

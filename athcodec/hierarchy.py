@@ -1,4 +1,4 @@
-"""The branch hierarchy: which branch hangs where, and the vertex order in which every subtree is one range.
+"""The branch hierarchy: the parent of every branch, and the vertex order in which every subtree is one range.
 
 Built from branch labels, or derived from an edge graph by following the larger subtree at every fork, so that
 branch orders count as botanists count them (trunk 0, its branches 1 ...). Edge graphs are rooted by an Euler
@@ -24,17 +24,27 @@ MAX_VERTICES = 2**31 - 1
 class Hierarchy:
     """B branches and N vertices in file order; all arrays are int32 and read-only.
 
-    Branches stand in depth-first preorder, siblings by their source number. Vertices stand stem after stem in
-    that order, each stem from base to tip.
+    Branches are in depth-first preorder, siblings by their source number. Vertices follow stem after stem in that
+    order, each stem from base to tip.
 
-    branch_parent     (B,) below the branch's own index, -1 for a root
-    branch_depth      (B,) 0 for a root
-    first_vertex      (B,) first vertex of the stem
-    stem_count        (B,) vertices of the stem, at least 1
-    subtree_branches  (B,) branches in the subtree, itself included: b .. b + subtree_branches[b] - 1
-    attach            (B,) vertex of the parent's stem that the branch hangs on, -1 for a root
-    vertex_source     (N,) source number of each vertex
-    branch_source     (B,) source number of each branch
+    Attributes
+    ----------
+    branch_parent : (B,)
+        Below the branch's own index, -1 for a root.
+    branch_depth : (B,)
+        0 for a root.
+    first_vertex : (B,)
+        First vertex of the stem.
+    stem_count : (B,)
+        Vertices of the stem, at least 1.
+    subtree_branches : (B,)
+        Branches in the subtree, itself included: b to b + subtree_branches[b] - 1.
+    attach : (B,)
+        Vertex of the parent's stem that the branch is attached to, -1 for a root.
+    vertex_source : (N,)
+        Source number of each vertex.
+    branch_source : (B,)
+        Source number of each branch.
     """
 
     branch_parent: np.ndarray
@@ -47,10 +57,10 @@ class Hierarchy:
     branch_source: np.ndarray
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            array = np.array(getattr(self, each.name), dtype=np.int32)
+        for field in fields(self):
+            array = np.array(getattr(self, field.name), dtype=np.int32)
             array.flags.writeable = False
-            object.__setattr__(self, each.name, array)
+            object.__setattr__(self, field.name, array)
 
     def __repr__(self) -> str:
         depth = int(self.branch_depth.max())
@@ -65,10 +75,26 @@ class Hierarchy:
         vertex_source: np.ndarray | None = None,
         branch_source: np.ndarray | None = None,
     ) -> Hierarchy:
-        """The hierarchy from the parts that say all of it, in file order; no permutation means the identity.
+        """The hierarchy from the arrays that determine the others.
 
-        Raises ClipError where the branches are not in depth-first preorder, a stem is empty, a branch does
-        not attach to its parent's stem, or a permutation is none.
+        Parameters
+        ----------
+        branch_parent, stem_count, attach : (B,) integer arrays
+            In file order.
+        vertex_source : (N,) integer array, optional
+            A permutation; the identity by default.
+        branch_source : (B,) integer array, optional
+            A permutation; the identity by default.
+
+        Returns
+        -------
+        Hierarchy
+
+        Raises
+        ------
+        ClipError
+            Where the branches are not in depth-first preorder, a stem is empty, a branch is not attached to its
+            parent's stem, or a source array is no permutation.
         """
         parent = np.asarray(branch_parent, np.int64)
         count = np.asarray(stem_count, np.int64)
@@ -87,10 +113,12 @@ class Hierarchy:
 
     @property
     def vertex_count(self) -> int:
+        """Number of vertices, N."""
         return len(self.vertex_source)
 
     @property
     def branch_count(self) -> int:
+        """Number of branches, B."""
         return len(self.branch_parent)
 
     @property

@@ -1,8 +1,7 @@
-"""How far decoded motion is from its source: maximum, RMS, Karni-Gotsman and motion-normalised error.
+"""The error of decoded motion against its source: maximum, RMS, Karni-Gotsman and motion-normalised error.
 
-Streams over blocks of frames in float64, so clips larger than memory can be measured. The Karni-Gotsman error
-is that of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. It judges
-positions only: no normals, no perception.
+Blocks of frames are accumulated in float64, so clips larger than memory can be measured. The Karni-Gotsman error is that
+of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. Positions alone are measured.
 """
 
 from __future__ import annotations
@@ -18,12 +17,25 @@ _SLICE_VALUES = 1 << 20
 
 
 class ErrorMeter:
-    """Adds up the difference between reference and decoded positions, block by block.
+    """Accumulates the difference between reference and decoded positions, block by block.
 
-    `rest` (N, 3) is the rest pose that motion_normalised_error needs; without it that one is not available.
-    `weights` (N,) divide the errors of vertices in max_weighted_error; None: all 1.
-    Lengths are in the unit of the positions; frames are counted in the order in which they are added. A
-    decoded NaN counts as infinitely far off.
+    Lengths are in the unit of the positions; frames are counted in the order in which they are added. A decoded NaN
+    counts as an infinite error.
+
+    Parameters
+    ----------
+    rest : (N, 3) array, optional
+        The rest pose, which motion_normalised_error needs.
+    weights : (N,) array, optional
+        Divide the errors of vertices in max_weighted_error; all 1 by default.
+
+    Attributes
+    ----------
+    max_error, max_weighted_error : float
+        Largest distance of any vertex in any frame.
+    worst_frame, worst_vertex : int
+        Where max_error is.
+    frame_count : int
     """
 
     def __init__(self, rest: np.ndarray | None = None, weights: np.ndarray | None = None) -> None:
@@ -39,8 +51,16 @@ class ErrorMeter:
         self._high = np.full(3, -inf)
 
     def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the next frames: two (k, N, 3) arrays of any float dtype; ValueError where their shapes
-        differ.
+        """Add the next frames.
+
+        Parameters
+        ----------
+        reference, decoded : (k, N, 3) float arrays
+
+        Raises
+        ------
+        ValueError
+            Where their shapes differ.
         """
         reference, decoded = np.asarray(reference), np.asarray(decoded)
         if reference.shape != decoded.shape or reference.ndim != 3 or reference.shape[2] != 3:

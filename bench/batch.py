@@ -21,6 +21,7 @@ import numpy as np
 import athcodec
 from athcodec import batch
 from athcodec.batch.show import Show
+from athcodec.encoding import EFFORTS
 from bench.clips import add_rel_error
 from bench.tables import table
 
@@ -57,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
                         help="numbers of workers; the first is what others are compared with (default 1 2)")
     parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="default", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=EFFORTS, default="default", help="(default %(default)s)")
     add_rel_error(parser)
 
 

@@ -22,6 +22,7 @@ from typing import Any
 import athcodec
 from athcodec.batch.inputs import sha256
 from athcodec.batch.runs import MANIFEST
+from athcodec.encoding import EFFORTS
 from bench.batch import COUNT, FRAMES, encode_in_loop, make_clips
 from bench.clips import add_rel_error
 from bench.tables import table
@@ -46,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of each (default %(default)s)")
     parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
                         help="what they are windows of (default: the sample)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="default", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=EFFORTS, default="default", help="(default %(default)s)")
     add_rel_error(parser)
 
 

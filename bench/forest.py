@@ -48,6 +48,7 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
+from athcodec.encoding import EFFORTS
 from bench.clips import add_rel_error
 from bench.decode import compile_program
 from bench.tables import table
@@ -131,7 +132,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="that instances of a clip may have; 0: each its own")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=EFFORTS, default="fast", help="(default %(default)s)")
     add_rel_error(parser)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec.transform import MIN_SEGMENT, split_segments
+from athcodec.segmentation import MIN_SEGMENT, split_segments
 from bench.clips import add_clips, add_rel_error
 from bench.tables import table
 

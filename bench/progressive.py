@@ -21,12 +21,12 @@ from typing import Any
 import athcodec
 from athcodec import container as ct
 from athcodec.ath import Thresholds, survey
-from athcodec.coding import Settings, Shape, Source, code_stems
-from athcodec.entropy import encode_shapes
+from athcodec.encoding.search import Search
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_stems
+from athcodec.encoding.streams import encode_learned_modes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
-from athcodec.search import Search
-from athcodec.transform import DEFAULT_SEGMENT
+from athcodec.segmentation import DEFAULT_SEGMENT
 from bench.clips import Encoded, encoded
 
 TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
@@ -189,19 +189,19 @@ class _Again:
 
     def of_one_level(self) -> list[Settings]:
         """Settings that a single stream could have: what the levels have now, the same for all of them."""
-        levels = len(self.settings.omega)
-        pairs = sorted(set(zip(self.settings.omega, self.settings.learned, strict=True)))
-        return [replace(self.settings, omega=(omega,) * levels, learned=(learned,) * levels)
-                for omega, learned in pairs]
+        levels = len(self.settings.rotation_step_factors)
+        pairs = sorted(set(zip(self.settings.rotation_step_factors, self.settings.learned_bases, strict=True)))
+        return [replace(self.settings, rotation_step_factors=(rotation_step_factors,) * levels, learned_bases=(learned,) * levels)
+                for rotation_step_factors, learned in pairs]
 
     def streams(self, settings: Settings, split: bool = True, one_level: bool = False) -> int:
-        """Bytes of all shapes, stems and corrections."""
-        shape = Shape(self._source, self._ath, settings)
-        pieces = shape.plan.pieces  # the memory that the core reads
+        """Bytes of all learned_modes, stems and corrections."""
+        prelude = CodedPrelude(self._source, self._ath, settings)
+        pieces = prelude.plan.pieces  # the memory that the core reads
         if not split:
             pieces["low_level"], pieces["low_modes"] = -1, 0
         if one_level:
-            pieces["level"] = shape.plan.level_count - 1
-        shapes = self._search.shapes(shape.plan, settings)
-        of_shapes = sum(map(len, encode_shapes(shape.plan, shapes).values()))
-        return of_shapes + sum(code_stems(shape, settings, positions, shapes).bytes for positions in self._positions)
+            pieces["level"] = prelude.plan.level_count - 1
+        learned_modes = self._search.learned_modes(prelude.plan, settings)
+        of_shapes = sum(map(len, encode_learned_modes(prelude.plan, learned_modes).values()))
+        return of_shapes + sum(code_stems(prelude, settings, positions, learned_modes).bytes for positions in self._positions)

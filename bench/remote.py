@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
+from athcodec.encoding import EFFORTS
 from athcodec.remote import READ_AHEAD
 from bench.clips import add_rel_error, stand_of
 from bench.line import Line
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--latency", type=float, default=LATENCY, metavar="SECONDS",
                         help="before an answer (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    parser.add_argument("--effort", choices=EFFORTS, default="fast", help="(default %(default)s)")
     add_rel_error(parser)
 
 

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from athcodec.encoder import EFFORTS
+from athcodec.encoding import EFFORTS
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from bench.clips import Encoded, add_clips, encoded, measure
 from bench.tables import table

@@ -14,9 +14,10 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
-from athcodec import entropy
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
-from athcodec.transform import LevelStream, Plan, SegmentMotion, balanced_segments
+from athcodec.encoding import streams
+from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
+from athcodec.segmentation import balanced_segments
 
 HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
                  "segment_count level_count full_level_count clip_count flags max_error reserved").split()
@@ -117,11 +118,11 @@ def still_file(frames: int = 1, branches: np.ndarray | None = None, *, hierarchy
 
 def still_hierarchy(plan: Plan) -> bytes:
     numbers = (np.arange(count, dtype=np.int32) for count in (len(plan.branches), plan.vertex_count))
-    return hierarchy_chunk(entropy.encode_hierarchy(plan.branches, *numbers))
+    return hierarchy_chunk(streams.encode_hierarchy(plan.branches, *numbers))
 
 
 def still_rest(plan: Plan) -> bytes:
-    stream, _ = entropy.encode_rest(plan.branches, 1.0, plan.rest)
+    stream, _ = streams.encode_rest(plan.branches, 1.0, plan.rest)
     return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream))
 
 
@@ -129,10 +130,10 @@ def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int,
     motion = SegmentMotion(plan, frames, [LevelStream(1.0)] * plan.level_count)
     for level in range(plan.level_count):
         if plan.has_stems(level):
-            payload = ct.pack_stems(ct.StemsHead(1.0, 0), entropy.encode_stems(motion, level))
+            payload = ct.pack_stems(ct.StemsHead(1.0, 0), streams.encode_stems(motion, level))
             store.add(ct.STEMS, payload if stems is None or level > 0 else stems, level, index)
         if plan.has_affines(level):
-            store.add(ct.AFFINES, entropy.encode_affines(motion, level), level, index)
+            store.add(ct.AFFINES, streams.encode_affines(motion, level), level, index)
 
 
 def hierarchy_chunk(stream: bytes) -> bytes:
@@ -152,4 +153,4 @@ def basis_chunk(stream: bytes, frames: int, bits: int) -> bytes:
     motion = SegmentMotion(plan, frames, [learned, LevelStream(1.0)])
     motion.tracks[0, 1, 0, 0] = 1 << bits - 1
     head = ct.StemsHead(1.0, 0, bits, 1, stream)
-    return ct.pack_stems(head, entropy.encode_stems(motion, 0))
+    return ct.pack_stems(head, streams.encode_stems(motion, 0))

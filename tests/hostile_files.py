@@ -12,14 +12,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import zstandard
+from files import Parts, roots, still_file, with_header
+from plants import awkward
 
 import athcodec
 from athcodec import container as ct
-from athcodec import entropy
 from athcodec._native import BRANCH
-from athcodec.transform import Plan
-from files import Parts, roots, still_file, with_header
-from plants import awkward
+from athcodec.encoding import streams
+from athcodec.encoding.motion import Plan
 
 SHEET, WHOLE = 1, 4
 
@@ -75,7 +75,7 @@ def stems_with_gaps(gaps: np.ndarray) -> bytes:
     rest = np.zeros((1 + gaps.size, 3))
     rest[1:, 0] = np.cumsum(gaps, axis=1).ravel()
     plan = Plan(branches, len(rest))
-    stream, _ = entropy.encode_rest(plan.branches, 1.0, rest)
+    stream, _ = streams.encode_rest(plan.branches, 1.0, rest)
     return still_file(branches=branches, rest=ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream)))
 
 

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plants import STEADY, clip_of, plant
 
 import athcodec
-from athcodec import quantize as qz
+from athcodec.encoding import quantise as qz
 from athcodec.errors import BoundError, ClipError
-from plants import STEADY, clip_of, plant
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one

@@ -18,14 +18,27 @@ from io import BytesIO
 import numpy as np
 import pytest
 import zstandard
+from files import Parts, header_fields, opened, with_checksum, with_header
 
 import athcodec
 from athcodec import container as ct
-from athcodec import entropy, errors, player
+from athcodec import errors, player
 from athcodec.container import Container, Limits
-from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, FormatError, LevelUnavailable,
-                             LimitExceeded, NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
-from files import Parts, header_fields, opened, with_checksum, with_header
+from athcodec.encoding import streams
+from athcodec.errors import (
+    BadChecksum,
+    BadChunk,
+    BadChunkTable,
+    BadHeader,
+    FormatError,
+    LevelUnavailable,
+    LimitExceeded,
+    NotAnAthFile,
+    TrailingBytes,
+    Truncated,
+    UnknownChunk,
+    UnsupportedVersion,
+)
 
 REFUSED = (FormatError, LevelUnavailable)
 
@@ -495,7 +508,7 @@ HUGE_DOUBLE = bytes.fromhex("00e6eda64d5d1daeffdc")
 
 
 def times(*values: float) -> bytes:
-    return ct.pack_time(entropy.encode_times(np.array(values, np.float64)))
+    return ct.pack_time(streams.encode_times(np.array(values, np.float64)))
 
 
 def zstd(data: bytes, **options) -> bytes:
@@ -642,12 +655,12 @@ def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts
         head = ct.Rest(decoder.origin, 1.0, pose.dtype, stream, exact=True)
         return opened(parts.with_payload(ct.REST, ct.pack_rest(head))).rest[decoder.hierarchy.vertex_source]
 
-    assert_whole_or_not_it(entropy.encode_exact_rest(decoder.branches, pose), pose, decode)
+    assert_whole_or_not_it(streams.encode_exact_rest(decoder.branches, pose), pose, decode)
 
 
 def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
     uneven = np.random.default_rng(6).random(20).cumsum()
-    assert_whole_or_not_it(entropy.encode_times(uneven), uneven,
+    assert_whole_or_not_it(streams.encode_times(uneven), uneven,
                            lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time)
 
 

@@ -9,16 +9,17 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+from files import Parts, opened, roots, still_file
 from hypothesis import given, settings
+from plants import STEADY, awkward_plants, chain_plant, plant, tube
 
 import athcodec
-from athcodec import Thresholds, entropy, player
+from athcodec import Thresholds, player
 from athcodec import container as ct
 from athcodec._native import LOOSE
+from athcodec.encoding import streams
+from athcodec.encoding.motion import Plan
 from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
-from athcodec.transform import Plan
-from files import Parts, opened, roots, still_file
-from plants import STEADY, awkward_plants, chain_plant, plant, tube
 
 
 @pytest.fixture(scope="module")
@@ -488,6 +489,6 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     head = ct.Rest(np.array([1e39, -1e39, 0.0]), 1.0, np.dtype(np.float32))
-    head.stream, _ = entropy.encode_rest(roots(1), 1.0, np.zeros((1, 3)))
+    head.stream, _ = streams.encode_rest(roots(1), 1.0, np.zeros((1, 3)))
     with opened(still_file(rest=ct.pack_rest(head))) as decoder:
         assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]

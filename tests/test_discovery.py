@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ import athcodec
 from athcodec import MotionClip, discovery
 from athcodec.cli import main
 from athcodec.clip import Skin
+from athcodec.encoding.job import EncodingJob
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders
 from bench.trees.mesh import dress
 from bench.trees.wind import Wind
+from plants import plant
 
 FRAMES = 24
 
@@ -221,3 +224,47 @@ def test_a_method_that_has_nothing_to_go_by_says_so(dressed):
         athcodec.find_branches(bare(dressed), "skeleton")
     with pytest.raises(ValueError, match="method: got 'luck'"):
         athcodec.find_branches(bare(dressed), "luck")
+
+
+def trial_bounds(clip: MotionClip, path: Path, monkeypatch, **options) -> list[float]:
+    """The bounds that candidates for branches are tried at, in scene units."""
+    bounds: list[float] = []
+    encode = EncodingJob.encode
+
+    def noted(job: EncodingJob, bound: float, store) -> object:
+        bounds.append(bound)
+        return encode(job, bound, store)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(EncodingJob, "encode", noted)
+        athcodec.encode(clip, path, effort="fast", **options)
+    return bounds
+
+
+@pytest.fixture
+def loose_points() -> MotionClip:
+    """Points without a mesh, whose branches only their motion shows: several candidates are tried."""
+    clip = plant(seed=3, branches=4, frames=20)
+    return MotionClip(clip.block(0, clip.frame_count), clip.time)
+
+
+def test_candidates_for_branches_are_tried_at_the_bound_of_the_file(loose_points, tmp_path, monkeypatch):
+    assert len(discovery.candidates(loose_points)) > 1
+    bounds = trial_bounds(loose_points, tmp_path / "a.ath", monkeypatch, max_error=0.02)
+    assert len(bounds) > 1
+    assert set(bounds) == {0.02}
+
+
+def test_candidates_for_branches_of_a_lossless_file_are_tried_lossless(loose_points, tmp_path, monkeypatch):
+    lossy = trial_bounds(loose_points, tmp_path / "a.ath", monkeypatch)
+    lossless = trial_bounds(loose_points, tmp_path / "b.ath", monkeypatch, lossless=True)
+    assert max(lossless) < 0.1 * min(lossy)
+
+
+def test_candidates_for_branches_are_tried_at_a_bound_that_meets_the_target_size(loose_points, tmp_path, monkeypatch):
+    tried = []
+    for bound in (0.1, 0.001):
+        size = athcodec.encode(loose_points, tmp_path / "a.ath", max_error=bound, effort="fast").bytes
+        tried.append(trial_bounds(loose_points, tmp_path / "b.ath", monkeypatch, target_size=size))
+    loose, tight = (Counter(bounds).most_common(1)[0][0] for bounds in tried)  # the one that all are judged at
+    assert loose > 10 * tight

@@ -8,14 +8,15 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
+from plants import chain_plant, clip_of, plant
 
 import athcodec
 from athcodec import MotionClip
 from athcodec import clip as clip_module
 from athcodec.container import Limits
+from athcodec.encoding.motion import SegmentMotion
 from athcodec.errors import BoundError, ClipError
-from athcodec.transform import SegmentMotion, decoding_bytes, split_segments
-from plants import chain_plant, clip_of, plant
+from athcodec.segmentation import decoding_bytes, split_segments
 
 
 @pytest.fixture
@@ -347,7 +348,7 @@ def peak_memory(clip: MotionClip, folder) -> int:
 
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
-    monkeypatch.setattr("athcodec.encoder.SPOOL_BYTES", 1 << 16)
+    monkeypatch.setattr("athcodec.encoding.encoder.SPOOL_BYTES", 1 << 16)
     peak_memory(endless_clip(64), tmp_path)   # what is made once, such as imports, is not counted
     short, long = (peak_memory(endless_clip(frames), tmp_path) for frames in (320, 1600))
     raw = 1600 * 200 * 12

@@ -20,14 +20,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import zstandard
+from files import (
+    Parts,
+    basis_chunk,
+    exact_rest_chunk,
+    hierarchy_chunk,
+    opened,
+    roots,
+    still_file,
+)
+from plants import plant
 
 import athcodec
-from athcodec import MotionClip, container, entropy, errors
+from athcodec import MotionClip, container, errors
 from athcodec._native import BRANCH, LOOSE, SHAPE_MODES, SHEET, WHOLE, crc32c, lib
-from athcodec.shapes import Shapes
-from athcodec.transform import LevelStream, Plan, SegmentMotion
-from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
-from plants import plant
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
 VECTORS = FORMAT.parent / "spec" / "vectors" / "valid"
@@ -221,12 +230,12 @@ def test_worked_example_decodes_step_by_step(spec):
                                         spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing})
     assert decode(stream, 1, len(values), 8) == [values]
     assert steps == table("Worked example", "Probability")
-    assert entropy.encode_temporal(np.array([values], np.int32), 8) == stream
+    assert streams.encode_temporal(np.array([values], np.int32), 8) == stream
 
 
 @pytest.mark.parametrize("change", [b"\0", b"\1" * 9])
 def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, change):
-    stream = entropy.encode_temporal(np.array([[0, 3, -20]], np.int32), 8)
+    stream = streams.encode_temporal(np.array([[0, 3, -20]], np.int32), 8)
     assert spec.decode_temporal(stream, 1, 3, 8) == [read_basis(stream, 3)] == [[0, 3, -20]]
     with pytest.raises(spec.Invalid):
         spec.decode_temporal(stream + change, 1, 3, 8)
@@ -464,7 +473,7 @@ def stems(spec: SimpleNamespace, branches: np.ndarray) -> list:
 def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed, dtype):
     file = HandMade(seed, False, None)
     pose = awkward_numbers(np.random.default_rng(seed), file.rest.size, dtype).reshape(-1, 3)
-    stream = entropy.encode_exact_rest(file.branches, pose)
+    stream = streams.encode_exact_rest(file.branches, pose)
     read = read_exact_rest(stream, file.branches, dtype)
     assert read.dtype == dtype and read.tobytes() == pose.tobytes()
     got = spec.decode_exact_rest(stream, stems(spec, file.branches), dtype is np.float64)
@@ -475,11 +484,11 @@ def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed,
 def test_times_come_back_bit_for_bit_by_document_and_code(spec, seed):
     random = np.random.default_rng(seed)
     numbers = awkward_numbers(random, 50, np.float64)
-    stream = entropy.encode_times(numbers)
+    stream = streams.encode_times(numbers)
     assert np.array(spec.decode_times(stream, 50)).tobytes() == numbers.tobytes()
     assert outcome(spec, lambda data: read_times(data, 50), stream) == "invalid", "they do not ascend"
     for times in np.unique(numbers), np.logspace(-300, 300, 40 + seed):
-        stream = entropy.encode_times(times)
+        stream = streams.encode_times(times)
         assert read_times(stream, len(times)).tobytes() == times.tobytes()
         assert np.array(spec.decode_times(stream, len(times))).tobytes() == times.tobytes()
 
@@ -606,7 +615,7 @@ def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
 @pytest.mark.parametrize("values, valid", [([128, -128], True), ([-128, 128], True), ([129, 0], False),
                                            ([0, -129], False), ([0, 1 << 20], False)])
 def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
-    stream = entropy.encode_temporal(np.array([values], np.int32), 30)
+    stream = streams.encode_temporal(np.array([values], np.int32), 30)
     for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), lambda data: [read_basis(data, 2)]:
         assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
 
@@ -671,7 +680,7 @@ class HandMade:
         self.plan = Plan(self.branches, self.vertex_count)
         self.shapes = None
 
-    def _some_shapes(self) -> Shapes:
+    def _some_shapes(self) -> LearnedModes:
         """Of about half of the pieces: up to as many as they may have, some small, some with large numbers."""
         modes = np.minimum(self.plan.pieces["rank"], SHAPE_MODES)
         counts = self.random.integers(0, 3 * modes + 1) * (self.random.random(len(modes)) < 0.6)
@@ -683,7 +692,7 @@ class HandMade:
         units = np.empty(integers.shape)
         assert lib.ath_unit_shapes(len(integers), integers.ctypes.data, units.ctypes.data)
         counts = counts.astype(np.int32)
-        return Shapes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, units)
+        return LearnedModes(counts, np.cumsum(counts, dtype=np.int64) - counts, integers, units, units)
 
     def _skeleton(self) -> tuple[np.ndarray, np.ndarray]:
         branches, rest = np.zeros(len(self.parts), BRANCH), []
@@ -715,21 +724,21 @@ class HandMade:
         counts = len(self.branches), self.vertex_count
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
         self.store.add(container.HIERARCHY, container.pack_hierarchy(
-            (0.5, 3, 0.25, 1), entropy.encode_hierarchy(self.branches, *permutations)))
+            (0.5, 3, 0.25, 1), streams.encode_hierarchy(self.branches, *permutations)))
         head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
         times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:
             pose = (self.rest + self.origin).astype(self.exact)
-            head.stream = entropy.encode_exact_rest(self.branches, pose)
+            head.stream = streams.encode_exact_rest(self.branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - self.origin)
-            times = container.pack_time(entropy.encode_times(self.random.random(self.FRAMES).cumsum()))
+            times = container.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
-            head.stream, decoded = entropy.encode_rest(self.branches, 0.01, self.rest)
+            head.stream, decoded = streams.encode_rest(self.branches, 0.01, self.rest)
             self.plan.set_rest(decoded)
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)
         self.shapes = self._some_shapes()
-        for level, stream in entropy.encode_shapes(self.plan, self.shapes).items():
+        for level, stream in streams.encode_learned_modes(self.plan, self.shapes).items():
             self._add(container.SHAPES, stream, level, 0)
 
     def _rows(self, *shape: int) -> np.ndarray:
@@ -774,14 +783,14 @@ class HandMade:
         motion = self._motion(frames, bases)
         for level in range(levels):
             if self.plan.has_stems(level):
-                head = container.StemsHead(motion.streams[level].step, int(motion.streams[level].omega))
+                head = container.StemsHead(motion.streams[level].step, int(motion.streams[level].rotation_step_factor))
                 if level in bases:
                     head.bits, head.rank = self.bases[level]
-                    head.basis = entropy.encode_temporal(bases[level][: head.rank], head.bits)
-                stream = entropy.encode_stems(motion, level)
+                    head.basis = streams.encode_temporal(bases[level][: head.rank], head.bits)
+                stream = streams.encode_stems(motion, level)
                 self._add(container.STEMS, container.pack_stems(head, stream), level, segment)
             if self.plan.has_affines(level):
-                self._add(container.AFFINES, entropy.encode_affines(motion, level), level, segment)
+                self._add(container.AFFINES, streams.encode_affines(motion, level), level, segment)
         self._add(container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)),
                   levels - 1, segment)
 
@@ -794,7 +803,7 @@ class HandMade:
         vectors = vectors * (self.random.random((self.vertex_count, frames, 1)) < 0.3)
         vertex, frame = np.nonzero(vectors.any(axis=2))
         rows = np.column_stack([vertex, frame, vectors[vertex, frame]]).astype(np.int32)
-        return entropy.encode_corrections(rows, self.vertex_count, frames)
+        return streams.encode_corrections(rows, self.vertex_count, frames)
 
 
 class Sapling(HandMade):

@@ -12,7 +12,7 @@ import athcodec
 from athcodec import exporters
 from athcodec.cli import main
 from athcodec.clip import MotionClip, Span
-from athcodec.encoder import code_segments, draft, write
+from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
 from athcodec.excerpt import Excerpt
 
@@ -94,8 +94,8 @@ def test_a_large_plant_is_searched_on_a_part_of_it_in_all_its_clips(sample_clip,
 
     clips = {"a": part(0, 40), "b": part(40, 120)}
     whole = athcodec.encode(athcodec.join(clips), tmp_path / "a.ath", rel_error=1e-3)
-    monkeypatch.setattr("athcodec.part.LARGE", 500)
-    monkeypatch.setattr("athcodec.part.LEAST_PART", 200)
+    monkeypatch.setattr("athcodec.encoding.sample.LARGE", 500)
+    monkeypatch.setattr("athcodec.encoding.sample.LEAST_SAMPLE", 200)
     searched = athcodec.encode(athcodec.join(clips), tmp_path / "b.ath", rel_error=1e-3)
     assert searched.max_error_bound == whole.max_error_bound and searched.bytes < 1.05 * whole.bytes
     with athcodec.open(tmp_path / "b.ath", strict=True) as decoder:

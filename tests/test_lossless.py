@@ -90,6 +90,15 @@ def test_a_level_count_that_the_hierarchy_does_not_have_is_refused(tmp_path):
         opened(parts.file())
 
 
+def test_the_command_line_makes_lossless_files_as_small_as_the_api_does(tmp_path):
+    """The bound of the last lossy level has a default of its own, which the command line must not replace."""
+    sample = athcodec.sample_path()
+    assert main(["encode", str(sample), str(tmp_path / "cli.ath"), "--lossless", "--effort", "fast"]) == 0
+    with athcodec.read_hdf5(sample) as clip:
+        athcodec.encode(clip, tmp_path / "api.ath", lossless=True, effort="fast")
+    assert (tmp_path / "cli.ath").read_bytes() == (tmp_path / "api.ath").read_bytes()
+
+
 def test_the_command_line_writes_lossless_files(tmp_path):
     athcodec.write_hdf5(tmp_path / "a.h5", plant(seed=8, branches=5, frames=20))
     assert main(["encode", str(tmp_path / "a.h5"), str(tmp_path / "a.ath"), "--lossless"]) == 0

@@ -6,18 +6,29 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+from files import opened, still_file
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from plants import (
+    MOTIONS,
+    SHAPES,
+    STEADY,
+    awkward,
+    awkward_plants,
+    bush,
+    chain_plant,
+    clip_of,
+    plant,
+    tube,
+)
 
 import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec import container as ct
-from athcodec import entropy
-from athcodec.encoder import time_chunk
+from athcodec.encoding import streams
+from athcodec.encoding.job import time_chunk
+from athcodec.encoding.quantise import least_bound
 from athcodec.hierarchy import derived_edges, hierarchy_of
-from athcodec.quantize import least_bound
-from files import opened, still_file
-from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bush, chain_plant, clip_of, plant, tube
 
 
 def largest_error(decoded: np.ndarray, clip: MotionClip) -> float:
@@ -196,7 +207,7 @@ def test_vertices_and_branches_numbered_at_random_come_back_in_their_order(scrat
 def test_times_come_back_exactly(times):
     time = np.unique(times)
     assert np.array_equal(opened(still_file(len(time), time=time_chunk(time))).time, time)
-    number_by_number = ct.pack_time(entropy.encode_times(time))
+    number_by_number = ct.pack_time(streams.encode_times(time))
     assert opened(still_file(len(time), time=number_by_number)).time.tobytes() == time.tobytes()
 
 

@@ -23,11 +23,11 @@ from typing import Any
 
 from athcodec import discovery
 from athcodec.ath import Thresholds
+from athcodec.encoding.search import EFFORTS
 from athcodec.errors import ClipError
 from athcodec.files import is_url
-from athcodec.search import EFFORTS
+from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.sources import FORMATS, format_named
-from athcodec.transform import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import parse_length, parse_size
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # of which a clip has one

@@ -18,14 +18,14 @@ from typing import Any
 
 import athcodec
 from athcodec import container as ct
-from athcodec import discovery, encoder
+from athcodec import discovery, encoding
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
-from athcodec.encoder import CodedSegment, Draft
+from athcodec.encoding import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
 from athcodec.files import is_url
-from athcodec.transform import DEFAULT_SEGMENT, split_segments
+from athcodec.segmentation import DEFAULT_SEGMENT, split_segments
 
 BETWEEN_REPORTS = 0.3  # seconds
 
@@ -72,7 +72,7 @@ def _begin(item: Item, folder: str, split: int, verify: bool, version: str, repo
         if _segment_count(clip, options) <= split:
             summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)
             return _done(item, source, summary, verify, start)
-        draft = encoder.draft(clip, jobs=1, progress=report, **options)
+        draft = encoding.draft(clip, jobs=1, progress=report, **options)
     _pickle(path, [(draft, source, time.perf_counter() - start)])
     return {"draft": draft.segment_count}
 
@@ -84,7 +84,7 @@ def _code(item: Item, folder: str, segments: Sequence[int]) -> Result:
         return {"part": path, "seconds": 0.0}
     draft, source, _ = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
-        _pickle(path, encoder.code_segments(clip, draft, segments, jobs=1))
+        _pickle(path, encoding.code_segments(clip, draft, segments, jobs=1))
     return {"part": path, "seconds": time.perf_counter() - start}
 
 
@@ -92,11 +92,11 @@ def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, repo
     start = time.perf_counter()
     draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
-        summary = encoder.write(clip, draft, _coded(parts), _target(item, folder), progress=report)
+        summary = encoding.write(clip, draft, _coded(parts), _target(item, folder), progress=report)
     return _done(item, source, summary, verify, start - seconds - sum(part["seconds"] for part in parts))
 
 
-def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: bool, start: float) -> Result:
+def _done(item: Item, source: dict[str, Any], summary: encoding.Summary, verify: bool, start: float) -> Result:
     if verify:
         with athcodec.open(summary.path, strict=True) as decoder:
             decoder.check()
@@ -122,7 +122,9 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
         raise ClipError(f"{item.shown}: the download is not what it was, expected a scratch folder that all share")
     with athcodec.read(path, **reading_options(item.settings)) as clip:
         blend = loop_frames(item.settings)
-        yield _with_branches(clip if blend is None else athcodec.looped(clip, blend), item.settings.get("hierarchy"))
+        clip = clip if blend is None else athcodec.looped(clip, blend)
+        hierarchy = item.settings.get("hierarchy")
+        yield clip if hierarchy is None else discovery.with_branches(clip, discovery.find_or_load(clip, hierarchy))
     _check_source(item, source)
 
 
@@ -148,18 +150,6 @@ def _local_path(item: Item, folder: str) -> str:
 def _target(item: Item, folder: str) -> str:
     """Where the file is made."""
     return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
-
-
-def _with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
-    if hierarchy is None:
-        return clip
-    if hierarchy == "auto" or hierarchy in discovery.METHODS:
-        return discovery.with_branches(clip, discovery.find_branches(clip, hierarchy))
-    if hierarchy.lower().endswith(".mtg"):
-        from athcodec.sources.mtg import mtg_branches
-
-        return discovery.with_branches(clip, discovery.Found(*mtg_branches(hierarchy, clip), "file"))
-    return discovery.with_branches(clip, discovery.load(hierarchy))
 
 
 def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:

@@ -11,8 +11,8 @@ from typing import Any
 import athcodec
 from athcodec import discovery
 from athcodec.cli import verbs
-from athcodec.encoder import DEFAULT_REL_ERROR, EFFORTS
-from athcodec.transform import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
+from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 TRACEBACK = "show the traceback of an error"
@@ -41,7 +41,8 @@ def make_parser() -> argparse.ArgumentParser:
 
     _encode_arguments(verb(
         "encode", verbs.encode, "compress a motion into an .ath file",
-        f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}.",
+        f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
+        f"{LOSSLESS_REL_ERROR:g}.",
     ))
     _batch_arguments(verb(
         "batch", verbs.batch, "compress many motions, by several processes",
@@ -143,7 +144,7 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     bound.add_argument(
         "--rel-error", metavar="FRACTION", type=_argument(_fraction),
         help="the same as a fraction of the diagonal of the bounding box over all frames "
-        f"(default {DEFAULT_REL_ERROR:g})",
+        f"(default {DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g})",
     )
     bound.add_argument(
         "--target-size", metavar="SIZE", type=_argument(parse_size),
@@ -161,7 +162,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument(
         "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or a .mtg, or "
-        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, else auto)",
+        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, "
+        "else those of several candidates that make the smallest file)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument("--lossless", action="store_true",

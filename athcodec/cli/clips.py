@@ -16,7 +16,6 @@ from athcodec.ath import Thresholds
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder, Depth
-from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
@@ -120,28 +119,21 @@ def naming(path: str | Path) -> Iterator[None]:
 
 
 def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
-    """The clip on the branches that --hierarchy asks for: a method's, or a file's; its own without it."""
-    if hierarchy is None and clip.has_branches:
+    """The clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is missing."""
+    if hierarchy is None:
         return clip
-    if hierarchy is None or hierarchy == "auto" or hierarchy in discovery.METHODS:
-        found = athcodec.find_branches(clip, hierarchy or "auto")
-        say("hierarchy", str(found))
-    elif hierarchy.lower().endswith(".mtg"):
-        from athcodec.sources.mtg import mtg_branches
-
-        found = athcodec.Found(*mtg_branches(hierarchy, clip), "file")
-    else:
-        found = discovery.load(hierarchy)
+    found = discovery.find_or_load(clip, hierarchy)
+    say("hierarchy", str(found))
     return discovery.with_branches(clip, found)
 
 
 def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
-    """The one keyword of encode() that says how far off the clip may be, or how large the file."""
+    """The keyword of encode() that sets the bound, or the size of the file; empty for encode's own default."""
     if args.max_error is not None:
         return {"max_error": args.max_error.in_scene_units(unit)}
     if args.target_size is not None:
         return {"target_size": args.target_size}
-    return {"rel_error": args.rel_error or DEFAULT_REL_ERROR}
+    return {} if args.rel_error is None else {"rel_error": args.rel_error}
 
 
 def thresholds(tam: tuple[Length, int, Length, int] | None, unit: Any) -> Thresholds | None:

@@ -14,12 +14,18 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
 from athcodec.decoder import Decoder
-from athcodec.encoder import DEFAULT_REL_ERROR, Seam
+from athcodec.encoding import DEFAULT_REL_ERROR, Seam
 from athcodec.errors import AthError
 from athcodec.metrics import ErrorMeter
 

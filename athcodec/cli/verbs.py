@@ -44,7 +44,7 @@ from athcodec.cli.printing import (
     say,
     say_seam,
 )
-from athcodec.encoder import DEFAULT_REL_ERROR
+from athcodec.encoding import DEFAULT_REL_ERROR
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
 
@@ -70,6 +70,8 @@ def encode(args: argparse.Namespace) -> int:
             progress=report,
             **bound(args, unit),
         )
+    if summary.found_branches is not None:
+        say("hierarchy", summary.found_branches)
     with open_file(output, strict=True) as decoder:
         print_file(output, decoder, args.json)
     for seam in summary.seams:

@@ -26,8 +26,8 @@ from typing import Protocol
 import numpy as np
 import zstandard
 
-from athcodec import entropy, quantize
 from athcodec._native import BRANCH, SEGMENT_FRAMES
+from athcodec.encoding import quantise, streams
 from athcodec.hierarchy import Hierarchy
 
 CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
@@ -292,7 +292,7 @@ class Writer:
         return self._add(varint(value), value)
 
     def single(self, value: float) -> float:
-        value = quantize.single(value)
+        value = quantise.single(value)
         return self._add(struct.pack("<f", value), value)
 
     def rows(self, rows: np.ndarray, unit: int = 1) -> np.ndarray:
@@ -326,7 +326,7 @@ class Writer:
         branches = np.zeros(hierarchy.branch_count, BRANCH)
         branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
         branches["attach"] = hierarchy.attach
-        stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+        stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         head = varint(hierarchy.branch_count) + varint(hierarchy.vertex_count) + varint(len(stream))
         return self._add(head + stream, hierarchy)
 
@@ -408,10 +408,10 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
     starts = range(0, positions.shape[2], SEGMENT_FRAMES)
     factor = 1.0
     while factor > 1e-3:
-        step = quantize.single(quantize.CORRECTION_STEP * limit * factor)
+        step = quantise.single(quantise.CORRECTION_STEP * limit * factor)
         parts = [np.ascontiguousarray(positions[:, :, at : at + SEGMENT_FRAMES]) for at in starts]
         found = [
-            entropy.find_corrections(
+            streams.find_corrections(
                 part, np.ascontiguousarray(wanted[:, :, at : at + SEGMENT_FRAMES]), np.zeros(3), limit, step
             )
             for at, part in zip(starts, parts, strict=True)
@@ -426,7 +426,7 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
     result = struct.pack("<f", step)
     for at, part, rows in zip(starts, parts, found, strict=True):
         positions[:, :, at : at + SEGMENT_FRAMES] = part
-        stream = entropy.encode_corrections(rows, len(part), part.shape[2]) if len(rows) else b""
+        stream = streams.encode_corrections(rows, len(part), part.shape[2]) if len(rows) else b""
         result += varint(len(stream)) + stream
     return result
 

@@ -16,9 +16,16 @@ from itertools import product
 
 import numpy as np
 
-from athcodec import quantize
+from athcodec.encoding import quantise
 from bench.codecs import Source
-from bench.codecs.coder import EntropyCoder, Reader, Writer, compiler, read_corrections, write_corrections
+from bench.codecs.coder import (
+    EntropyCoder,
+    Reader,
+    Writer,
+    compiler,
+    read_corrections,
+    write_corrections,
+)
 from bench.codecs.tree import VertexOrder, ordered
 
 FINALISTS = 3
@@ -153,7 +160,7 @@ class Baseline(ABC):
         order = self.write(writer, source, bound, settings)
         lossy, _ = self.read(writer.echo())
         positions = np.ascontiguousarray(lossy, np.float32)
-        limit = quantize.error_limit(bound, source.diagonal)
+        limit = quantise.error_limit(bound, source.diagonal)
         return writer.data() + write_corrections(positions, ordered(source, order), limit)
 
     def decode(self, data: bytes) -> np.ndarray:

@@ -12,14 +12,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from files import Parts, basis_chunk, roots, still_file
+from plants import awkward, bush, clip_of, plant, tube
 
 import athcodec
 from athcodec import MotionClip
 from athcodec import container as ct
-from athcodec import entropy
+from athcodec.encoding import streams
 from athcodec.sources import read_hdf5, sample_path
-from files import Parts, basis_chunk, roots, still_file
-from plants import awkward, bush, clip_of, plant, tube
 
 CORPUS = Path(__file__).resolve().parent.parent / "corpus"
 VECTORS = CORPUS.parent.parent / "spec" / "vectors" / "valid"
@@ -74,7 +74,7 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
 def _wave(frames: int) -> bytes:
     """A learned basis of one row and 8 bits."""
     row = np.rint(100 * np.sin(np.arange(frames)))
-    return entropy.encode_temporal(row.astype(np.int32)[None], 8)
+    return streams.encode_temporal(row.astype(np.int32)[None], 8)
 
 
 def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:

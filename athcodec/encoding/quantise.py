@@ -14,16 +14,16 @@ DEAD_ZONE = 0.55
 NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of maps: step over the error that is theirs
 NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
 FEW_ROOTS = 4  # whose maps are a few bytes
-NODE_HARM = 1.08  # times a level's error that cheaper maps may cost
-SHAPE_STEP = 0.1  # precision of a learned shape: what it moves in a frame (RMS), in steps
-LEAST_SHAPE = 0.12  # what a shape that is kept moves in a frame (RMS), in steps
-LARGEST_SHAPE = 2.0**20
-SHAPE_DOUBTS = (1.0, 1.25)  # how much shapes must seem to save, to be tried for a piece
+NODE_ERROR_TOLERANCE = 1.08  # times a level's own error that cheaper maps may have
+MODE_STEP = 0.1  # precision of a learned mode: what it moves in a frame (RMS), in steps
+LEAST_MODE = 0.12  # what a learned mode that is kept moves in a frame (RMS), in steps
+LARGEST_MODE = 2.0**20
+REQUIRED_SAVINGS = (1.0, 1.25)  # by which factor a piece's estimated bits must shrink for learned modes
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
-LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
-REST_CAP = 1.6  # rest pose step over bound: there its own error reaches the bound
-SAFE_REST_CAP = 2 / 3**0.5  # where no vertex's can be beyond it
+LARGEST_RANGE = 2.0**28  # extent over bound that corrections alone can still express
+REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
+SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 TEMPORAL_BITS = 14
@@ -43,16 +43,16 @@ def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
     return max(2 * float(np.spacing(largest)), SMALLEST_BOUND)
 
 
-def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, reach: float) -> None:
-    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `reach`."""
+def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, extent: float) -> None:
+    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `extent`."""
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound > least):
         reason = ("the smallest that a file can hold" if least == SMALLEST_BOUND else
                   f"twice the spacing of the source's {np.dtype(dtype).name} coordinates")
         raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
-    if reach > LARGEST_REACH * bound:
-        raise BoundError(f"max error: got {bound:.3g}; expected at least {reach / LARGEST_REACH:.3g} for positions "
-                         f"and a rest pose that are up to {reach:.3g} apart")
+    if extent > LARGEST_RANGE * bound:
+        raise BoundError(f"max error: got {bound:.3g}; expected at least {extent / LARGEST_RANGE:.3g} for positions "
+                         f"and a rest pose that are up to {extent:.3g} apart")
 
 
 def single(value: float) -> float:
@@ -71,7 +71,7 @@ def rest_step_ratio(relative_bound: float) -> float:
 
 
 def learn_temporal_basis(moments: np.ndarray, count: int, tolerance: float) -> np.ndarray | None:
-    """Orthonormal rows over time that hold tracks but for a rest below `tolerance` (mean square per number).
+    """Orthonormal rows over time that hold tracks but for a residual below `tolerance` (mean square per number).
 
     moments: (T, T) second moments of `count` tracks in units of their steps. Returns stored integers (rank, T) int32 of
     TEMPORAL_BITS, or None where no basis smaller than the DCT's would do.

@@ -1,9 +1,9 @@
-"""Shapes learned from the motion of single pieces: what they do together, in few tracks.
+"""Modes learned from the motion of single pieces, which take the place of cantilever modes (SHAPES chunks).
 
-A piece bends as its stiffness, its load and its neighbours have it: in a plane, in a few forms. The cantilever's modes
-are the same for all; principal components of a piece's modes over time (Lengyel 1999; Sattler et al. 2005, by clusters)
-say the same in fewer tracks, at the price of the components. They are learned once for a clip, so the more frames there
-are the less they cost. FORMAT.md, "Shapes stream".
+A piece bends in few ways, which its stiffness, its load and its neighbours determine. Cantilever modes are the same for
+all pieces; principal components of a piece's modes over time (Lengyel 1999; by clusters: Sattler et al. 2005) represent
+its motion in fewer tracks, at the price of storing the components. They are learned once for a clip, so their cost per
+frame falls with the number of frames. FORMAT.md, "Shapes stream".
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec import quantize as qz
 from athcodec._native import SHAPE_MODES, SHEET, address, lib
-from athcodec.transform import Plan, SegmentMotion
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.motion import Plan, SegmentMotion
 
 NUMBERS = 3 * SHAPE_MODES
 
 
 @dataclass(frozen=True)
-class Shapes:
-    """Shapes of all pieces, those of a piece behind each other; a row holds NUMBERS."""
+class LearnedModes:
+    """The learned modes of all pieces, those of a piece behind each other; a row holds NUMBERS."""
 
     counts: np.ndarray  # (P,) int32; 0: the piece keeps its modes
     first: np.ndarray  # (P,) int64
     integers: np.ndarray  # (K, NUMBERS) int32, as streams hold them: axis a of mode m at SHAPE_MODES a + m
     units: np.ndarray  # (K, NUMBERS) float64 of unit length: axis a of mode m at 3 m + a
-    duals: np.ndarray  # likewise: what takes a piece's modes to the tracks of its shapes
+    duals: np.ndarray  # likewise: maps a piece's cantilever modes to the tracks of its learned modes
 
     def levels(self, plan: Plan) -> np.ndarray:
         """Levels whose streams hold some of them."""
-        pieces, shaped = plan.pieces, self.counts > 0
-        full = shaped & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
-        return np.union1d(plan.base_level[shaped], pieces["level"][full])
+        pieces, learned = plan.pieces, self.counts > 0
+        full = learned & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
+        return np.union1d(plan.base_level[learned], pieces["level"][full])
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Components:
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
-    """From segments that were analysed finely, without shapes and in cosines."""
+    """Of segments that were analysed with a fine step, without learned modes and in cosines."""
     sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
     groups = [(pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
               for size in np.unique(sizes) for pieces in [np.flatnonzero(sizes == size)]]
@@ -92,23 +92,23 @@ def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -
     return rows.reshape(len(pieces), 3 * size, segment.frames)
 
 
-def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> Shapes:
-    """The shapes that a motion step asks for, of the pieces `wanted`, (P,) bool, or of all."""
+def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
+    """The modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
     counts = np.zeros(len(plan.pieces), np.int32)
     rows: dict[int, np.ndarray] = {}
     least = step * np.sqrt(seen.frames)
     for pieces, lengths, vectors in seen.groups:
-        scale = np.minimum(lengths / (qz.SHAPE_STEP * least), qz.LARGEST_SHAPE)
+        scale = np.minimum(lengths / (qz.MODE_STEP * least), qz.LARGEST_MODE)
         numbers = np.rint(vectors * scale[:, :, None]).astype(np.int32)
-        kept = (lengths > qz.LEAST_SHAPE * least) & numbers.any(axis=2)
+        kept = (lengths > qz.LEAST_MODE * least) & numbers.any(axis=2)
         if wanted is not None:
             kept &= wanted[pieces, None]
         counts[pieces] = np.cumprod(kept, axis=1).sum(axis=1)
         rows |= {int(p): numbers[i, : counts[p]] for i, p in enumerate(pieces)}
-    return _shapes(counts, [rows[p] for p in np.flatnonzero(counts)])
+    return _packed(counts, [rows[p] for p in np.flatnonzero(counts)])
 
 
-def _shapes(counts: np.ndarray, rows: list[np.ndarray]) -> Shapes:
+def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
     units, duals = np.zeros((2, len(integers), NUMBERS))
     first = np.cumsum(counts, dtype=np.int64) - counts
@@ -124,7 +124,7 @@ def _shapes(counts: np.ndarray, rows: list[np.ndarray]) -> Shapes:
         own = units[at: at + len(numbers)]
         duals[at: at + len(own)] = np.linalg.solve(own @ own.T + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
         at += len(own)
-    return Shapes(counts, first, integers, units, duals)
+    return LearnedModes(counts, first, integers, units, duals)
 
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:

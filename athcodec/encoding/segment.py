@@ -13,33 +13,40 @@ from functools import cached_property
 import numpy as np
 
 from athcodec import container as ct
-from athcodec import entropy
-from athcodec import quantize as qz
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip
-from athcodec.crew import ALONE, Crew, default_jobs
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.motion import (
+    LevelStream,
+    Plan,
+    SegmentMotion,
+    gather,
+    position_error,
+    temporal_basis,
+)
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
-from athcodec.shapes import Shapes
-from athcodec.transform import LevelStream, Plan, SegmentMotion, gather, position_error, split_segments, temporal_basis
+from athcodec.segmentation import split_segments
+from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
-FINER = 32  # times smaller than the step is that at which one learns
+FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
-WORK_BYTES = 1536 << 20  # that segments in work may take where nobody says how many they are
-SEGMENT_WORK = 8  # times its float32 positions is what a segment takes while it is coded
+WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
 
-def threads(jobs: int | None, source: Source) -> int:
-    """Segments, or candidates, that are worked on at once: `jobs`, or one per core, at most 4 and few enough for
-    memory."""
+def thread_count(jobs: int | None, source: Source) -> int:
+    """Segments, or candidates, that are coded at once: `jobs`, or one per core, at most 4 and within WORK_BYTES."""
     fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
     return jobs or max(1, min(default_jobs(), fit))
 
 
 @dataclass
 class Source:
-    """A clip in file order, less an origin, cut into segments."""
+    """A clip in file order, relative to an origin, cut into segments."""
 
     clip: MotionClip
     hierarchy: Hierarchy
@@ -47,17 +54,17 @@ class Source:
     segment_frames: int
     exact_rest: bool
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
-    crew: Crew = ALONE
+    pool: ThreadPool = SERIAL
     rest: np.ndarray = field(init=False)  # (N, 3) float64
     origin: np.ndarray = field(init=False)  # (3,) float64
-    wide: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
+    sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
     span_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
 
     def __post_init__(self) -> None:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
-        self.wide = ~_thin_branches(self)
+        self.sheet_like = ~_thin_branches(self)
         self.span_segments = [[(start + a, start + b) for a, b in
                                split_segments(stop - start, self.clip.vertex_count, self.segment_frames,
                                               ct.Limits.memory_bytes)]
@@ -70,7 +77,7 @@ class Source:
         return np.cumsum([0, *map(len, self.span_segments[:-1])]).tolist()
 
     @property
-    def reach(self) -> float:
+    def extent(self) -> float:
         """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
         low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)
         high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
@@ -80,7 +87,7 @@ class Source:
         """What decoded positions are held to: one for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return qz.error_limit(bound, self.seen.diagonal)
-        return np.array([qz.error_limit(each, self.seen.diagonal) for each in bound * self.weights])
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights])
 
     def smallest_bound(self, bound: float) -> float:
         """Of any vertex."""
@@ -94,7 +101,7 @@ class Source:
         """(levels,) of the vertices of each level and those below it the weight that such a part of them falls short
         of; a level without vertices has that of the one above."""
         level = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
-        below = [self.weights[level >= each] for each in range(levels)]
+        below = [self.weights[level >= first] for first in range(levels)]
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
 
@@ -113,7 +120,7 @@ class Source:
 
     def relative(self, block: np.ndarray) -> np.ndarray:
         """(N, 3, T) float64 of a block in file order, less the origin."""
-        return gather(block, self.hierarchy.vertex_source, self.origin, self.crew)
+        return gather(block, self.hierarchy.vertex_source, self.origin, self.pool)
 
     def positions(self, segment: int) -> np.ndarray:
         """(N, 3, T) float64 positions of a segment, less the origin."""
@@ -133,9 +140,9 @@ class Settings:
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
     lags: np.ndarray  # (B,) int32, file order
-    omega: tuple[int, ...]  # per level: rotation factors
-    learned: tuple[bool, ...]  # per level: whether the time basis is
-    shaped: np.ndarray | None  # (P,) bool: pieces that have learned shapes; None: none has
+    rotation_step_factors: tuple[int, ...]  # per level: rotation factors
+    learned_bases: tuple[bool, ...]  # per level: whether the time basis is
+    learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
 
     def step_of(self, level: int) -> float:
@@ -153,15 +160,15 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     return branches
 
 
-class Shape:
+class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
     def __init__(self, source: Source, ath: Ath, settings: Settings):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
-        self.hierarchy_stream = entropy.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-        self.plan = Plan(branches, hierarchy.vertex_count, source.crew)
+        self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.pool)
         self.rest_chunk = self._code_rest(source, branches, settings)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
 
@@ -169,13 +176,13 @@ class Shape:
         head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
         if source.exact_rest:
             pose = source.clip.rest[source.hierarchy.vertex_source].astype(source.clip.rest_dtype)
-            head.exact, head.stream = True, entropy.encode_exact_rest(branches, pose)
+            head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
         else:
-            head.stream, decoded = entropy.encode_rest(branches, head.step, source.rest)
+            head.stream, decoded = streams.encode_rest(branches, head.step, source.rest)
             while np.linalg.norm(decoded - source.rest, axis=1).max() > settings.bound:
                 head.step = qz.single(0.8 * head.step)
-                head.stream, decoded = entropy.encode_rest(branches, head.step, source.rest)
+                head.stream, decoded = streams.encode_rest(branches, head.step, source.rest)
             self.plan.set_rest(decoded)
         return head
 
@@ -184,7 +191,7 @@ def lags(source: Source, step: float) -> np.ndarray:
     """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(source.wide):
+    for b in np.flatnonzero(source.sheet_like):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         lags[b] = qz.rest_lag(source.rest[first: first + count], source.rest[attach] if attach >= 0 else None, step)
@@ -218,14 +225,14 @@ def _thin_branches(source: Source) -> np.ndarray:
     return way <= 1.3 * _stem_sizes(source)
 
 
-def _streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> list[LevelStream]:
-    streams = []
+def _level_streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> list[LevelStream]:
+    level_streams = []
     for level in range(levels):
-        stream = LevelStream(settings.step_of(level), float(settings.omega[level]))
+        stream = LevelStream(settings.step_of(level), float(settings.rotation_step_factors[level]))
         if level in bases:
             stream.temporal = temporal_basis(bases[level], qz.TEMPORAL_BITS)
-        streams.append(stream)
-    return streams
+        level_streams.append(stream)
+    return level_streams
 
 
 def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]:
@@ -248,20 +255,20 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
     return segment.cosines.T @ moments @ segment.cosines, count
 
 
-def analyse_finely(shape: Shape, settings: Settings, positions: np.ndarray) -> SegmentMotion:
-    """A segment at a step FINER times smaller, in cosines and modes: what is to be learned from."""
+def analyse_finely(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> SegmentMotion:
+    """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
-    segment = SegmentMotion(shape.plan, positions.shape[2], _streams(fine, shape.plan.level_count, {}))
+    segment = SegmentMotion(prelude.plan, positions.shape[2], _level_streams(fine, prelude.plan.level_count, {}))
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 
 
-def _learn_bases(shape: Shape, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
+def _learn_bases(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
     """Temporal bases of the levels that learn theirs, from a finer pass with cosines."""
-    levels = [level for level, learned in enumerate(settings.learned) if learned]
+    levels = [level for level, learned in enumerate(settings.learned_bases) if learned]
     if not levels:
         return {}
-    segment = analyse_finely(shape, settings, positions)
+    segment = analyse_finely(prelude, settings, positions)
     bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE)
              for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
@@ -287,71 +294,72 @@ class Coded:
         if not len(self.corrections):
             return b""
         vertices, _, frames = self.decoded.shape
-        stream = entropy.encode_corrections(self.corrections, vertices, frames)
+        stream = streams.encode_corrections(self.corrections, vertices, frames)
         return ct.pack_corrections(self.correction_step, stream)
 
 
-def analyse(shape: Shape, settings: Settings, positions: np.ndarray,
-            shapes: Shapes | None) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
+def analyse(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
+            learned_modes: LearnedModes | None) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
     """The integers of the stems, and the time bases of the levels that learn theirs."""
-    bases = _learn_bases(shape, settings, positions)
-    streams = _streams(settings, shape.plan.level_count, bases)
-    segment = SegmentMotion(shape.plan, positions.shape[2], streams, shapes)
+    bases = _learn_bases(prelude, settings, positions)
+    level_streams = _level_streams(settings, prelude.plan.level_count, bases)
+    segment = SegmentMotion(prelude.plan, positions.shape[2], level_streams, learned_modes)
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment, bases
 
 
-def code_stems(shape: Shape, settings: Settings, positions: np.ndarray, shapes: Shapes | None) -> Coded:
+def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
+               learned_modes: LearnedModes | None) -> Coded:
     """Streams of the stems and the corrections that keep the limit."""
-    plan = shape.plan
-    segment, bases = analyse(shape, settings, positions, shapes)
+    plan = prelude.plan
+    segment, bases = analyse(prelude, settings, positions, learned_modes)
 
-    def streams(level: int) -> tuple[bytes, int]:
-        head = ct.StemsHead(settings.step_of(level), settings.omega[level])
+    def stem_stream(level: int) -> tuple[bytes, int]:
+        head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
         if level in bases:
             head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
-            head.basis = entropy.encode_temporal(bases[level], head.bits)
-        return ct.pack_stems(head, entropy.encode_stems(segment, level)), len(head.basis)
+            head.basis = streams.encode_temporal(bases[level], head.bits)
+        return ct.pack_stems(head, streams.encode_stems(segment, level)), len(head.basis)
 
     levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
-    coded = plan.crew.each(streams, [(level,) for level in levels])
-    stems, heads = ({level: each[i] for level, each in zip(levels, coded)} for i in range(2))
-    decoded = segment.pose(plan.level_count - 1, shape.origin, shape.dtype)
+    coded = plan.pool.map(stem_stream, [(level,) for level in levels])
+    stems, heads = (dict(zip(levels, column)) for column in zip(*coded))
+    decoded = segment.pose(plan.level_count - 1, prelude.origin, prelude.dtype)
     factor = 1.0
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = entropy.find_corrections(decoded, positions, shape.origin, settings.limit, step,
-                                                plan.crew)
+        corrections = streams.find_corrections(decoded, positions, prelude.origin, settings.limit, step,
+                                                plan.pool)
         if corrections is not None:
             return Coded(segment, stems, corrections, decoded, step, heads)
         factor *= 0.5
         if factor < 1e-3:
             raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "
-                             f"{shape.dtype.name} numbers")
+                             f"{prelude.dtype.name} numbers")
 
 
-def code_segment(shape: Shape, settings: Settings, positions: np.ndarray, shapes: Shapes | None,
+def code_segment(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None,
                  exact: np.ndarray | None = None) -> tuple[dict, np.ndarray]:
     """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.
     """
-    plan, last = shape.plan, shape.plan.level_count - 1
-    coded = code_stems(shape, settings, positions, shapes)
+    plan, last = prelude.plan, prelude.plan.level_count - 1
+    coded = code_stems(prelude, settings, positions, learned_modes)
     segment = coded.segment
     segment.analyse_nodes(positions, settings.node_steps, qz.DEAD_ZONE)
     chunks: dict[tuple[int, int], bytes] = {(level, ct.STEMS): data for level, data in coded.stems.items()}
     for level in range(plan.level_count):
         if plan.has_affines(level):
-            chunks[level, ct.AFFINES] = entropy.encode_affines(segment, level)
+            chunks[level, ct.AFFINES] = streams.encode_affines(segment, level)
     if len(coded.corrections):
         chunks[last, ct.CORRECTIONS] = coded.correction_chunk
     if exact is not None:
-        chunks[last + 1, ct.EXACT] = entropy.encode_exact(coded.decoded, exact)
+        chunks[last + 1, ct.EXACT] = streams.encode_exact(coded.decoded, exact)
     errors = np.zeros((plan.level_count + (exact is not None), 2))
     for level in range(plan.level_count):
-        decoded = coded.decoded if level == last else segment.pose(level, shape.origin, shape.dtype)
-        largest, squares = position_error(decoded, positions, shape.origin, plan.crew)
+        decoded = coded.decoded if level == last else segment.pose(level, prelude.origin, prelude.dtype)
+        largest, squares = position_error(decoded, positions, prelude.origin, plan.pool)
         errors[level] = largest, math.sqrt(squares / (positions.shape[0] * positions.shape[2]))
     if errors[last, 0] > settings.largest_bound:
         raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.largest_bound}")

@@ -1,5 +1,6 @@
-"""A part of a large plant that stands for all of it, where only totals matter: whole subtrees chosen evenly along the
-plant, and what they hang on. The search for settings (search.py) looks at such a part.
+"""A sample of a large plant: whole subtrees chosen evenly along it, with the branches that they are attached to.
+
+The search for settings (search.py) codes the sample and extrapolates its bytes to the plant.
 """
 
 from __future__ import annotations
@@ -8,24 +9,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from athcodec import quantize as qz
 from athcodec.ath import Ath
 from athcodec.clip import MotionClip
-from athcodec.coding import Source
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.motion import Plan
+from athcodec.encoding.segment import Source
 from athcodec.hierarchy import Hierarchy
 from athcodec.sources.frames import Frames
-from athcodec.transform import Plan
 
-LARGE = 1 << 16  # vertices: a smaller plant is looked at as a whole
-LEAST_PART = 1 << 15  # vertices of a part
-SEGMENT_PART = 1 / 64  # of the plant that a part may have more for each segment: work in proportion
-SUBTREES = 8  # of a part, at least
+LARGE = 1 << 16  # vertices: smaller plants are not sampled
+LEAST_SAMPLE = 1 << 15  # vertices of a sample
+SEGMENT_SHARE = 1 / 64  # of the plant that each segment of the clip adds to a sample
+SUBTREES = 8  # of a sample, at least
 
 
-class Part:
-    """Some branches of a plant, each with what it hangs on, as a source of their own with the plant's segments.
+class PlantSample:
+    """Some branches of a plant and all their ancestors, as a source of their own with the plant's segments.
 
-    branches, vertices  those that it has, ascending in file order
+    Attributes
+    ----------
+    branches, vertices : (B',) and (N',) integer arrays
+        Those of the plant that are in the sample, ascending in file order.
+    source : Source
+    ath : Ath
     """
 
     def __init__(self, source: Source, ath: Ath, branches: np.ndarray):
@@ -43,10 +49,10 @@ class Part:
         some = MotionClip(Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen),
                                  clip.dtype), clip.time, rest=clip.rest[chosen].astype(clip.rest_dtype),
                           spans=clip.spans)
-        part = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
+        sample = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
                        weights=None if source.weights is None else source.weights[self.vertices])
-        part.segments = source.segments
-        return part
+        sample.segments = source.segments
+        return sample
 
     def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:
         parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]
@@ -66,9 +72,17 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Share:
-    """How many times as much the plant has as its part: vertices, and for each level, (levels,), rows of its stream and
-    nodes that have maps. And how coarse a rest pose may be tried, over the bound."""
+class ExtrapolationFactors:
+    """What a plant has over what its sample has.
+
+    Attributes
+    ----------
+    vertices : float
+    rows, nodes : (levels,) float64
+        Rows of each level's stream, and nodes that have maps.
+    rest_cap : float
+        The largest step of the rest pose to be tried, over the bound.
+    """
 
     vertices: float
     rows: np.ndarray
@@ -76,14 +90,14 @@ class Share:
     rest_cap: float
 
     @classmethod
-    def everything(cls, levels: int) -> Share:
-        """Of a plant that is no part."""
+    def everything(cls, levels: int) -> ExtrapolationFactors:
+        """Of a plant that is not sampled."""
         return cls(1.0, np.ones(levels), np.ones(levels), qz.REST_CAP)
 
     @classmethod
-    def of(cls, whole: np.ndarray, part: np.ndarray) -> Share:
+    def of(cls, whole: np.ndarray, sample: np.ndarray) -> ExtrapolationFactors:
         """Of branches, (B,) of _native.BRANCH."""
-        plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, part)]
+        plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, sample)]
         rows, nodes = (np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
                        for counts in zip(*map(_counts, plans)))
         return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes, qz.SAFE_REST_CAP)
@@ -97,29 +111,29 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
 
 
-def part_of(source: Source, ath: Ath, effort: str) -> Part | None:
-    """A part that looks like all of a large plant, with a branch of every level; None where there is no need for one,
-    or no hurry.
+def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
+    """A sample that represents a large plant, with a branch of every level; None where the plant is small or effort is
+    "best".
 
-    The longer the clip, the larger the part: what is spent on it remains the same share of the work.
+    It grows with the clip, so that the search keeps its share of the work.
     """
-    wanted = part_vertices(source.clip.vertex_count, len(source.segments), effort)
+    wanted = sample_vertices(source.clip.vertex_count, len(source.segments), effort)
     if wanted is None:
         return None
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
-    part = Part(source, ath, branches)
-    return part if len(part.vertices) < source.clip.vertex_count // 2 else None
+    sample = PlantSample(source, ath, branches)
+    return sample if len(sample.vertices) < source.clip.vertex_count // 2 else None
 
 
-def part_vertices(vertices: int, segments: int, effort: str) -> int | None:
-    """About how many a part has; None: there is to be no part."""
+def sample_vertices(vertices: int, segments: int, effort: str) -> int | None:
+    """About how many vertices a sample has; None: the plant is not sampled."""
     if vertices <= LARGE or effort == "best":
         return None
-    return min(max(int(vertices * segments * SEGMENT_PART), LEAST_PART), LARGE)
+    return min(max(int(vertices * segments * SEGMENT_SHARE), LEAST_SAMPLE), LARGE)
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
-    """Branches with about so many vertices, `deepest` among them."""
+    """Branches with about `wanted` vertices in all, `deepest` among them."""
     vertices = np.append(hierarchy.first_vertex, hierarchy.vertex_count).tolist()
     after = (np.arange(hierarchy.branch_count) + hierarchy.subtree_branches).tolist()
     kept = np.zeros(hierarchy.branch_count, bool)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from athcodec.part import part_vertices
+from athcodec.encoding.sample import sample_vertices
 
 Progress = Callable[[str, float], None]
 
@@ -18,30 +18,34 @@ BRANCHES = 0.5  # of all the rest, to find branches for a clip without
 SIZES = 6  # files that are made to meet a target size
 
 
-class Course:
-    """Takes each stage's own fraction, and tells the whole one, which never falls."""
+def silent(stage: str, fraction: float) -> None:
+    """Reports to nobody."""
+
+
+class WeightedProgress:
+    """Takes the fraction of each stage and reports that of the whole, which never falls."""
 
     def __init__(self, progress: Progress | None, weights: dict[str, float]):
         self._progress, self._reached = progress, 0.0
         total, before = sum(weights.values()) or 1.0, 0.0
-        self._spans = {}
+        self._ranges = {}
         for stage, weight in weights.items():
-            self._spans[stage] = before / total, weight / total
+            self._ranges[stage] = before / total, weight / total
             before += weight
 
     def __call__(self, stage: str, fraction: float) -> None:
-        start, length = self._spans.get(stage, (1.0, 0.0))
+        start, length = self._ranges.get(stage, (1.0, 0.0))
         self._reached = max(self._reached, min(start + length * fraction, 1.0))
         if self._progress is not None:
             self._progress(stage, self._reached)
 
 
-def weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, samples: int, branches: bool,
+def stage_weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, samples: int, branches: bool,
             sizes: bool, motion: bool) -> dict[str, float]:
-    """What the stages are worth. samples: segments that each trial codes; branches: they have to be found first;
+    """The estimated work of each stage. samples: segments that each trial codes; branches: they have to be found first;
     sizes: a target is to be met; motion: it is coded too, after the search."""
     longest = max(stop - start for start, stop in segments)
-    some = vertices if (part := part_vertices(vertices, len(segments), effort)) is None else part
+    some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
     work = {"survey": SURVEY * vertices * segments[-1][1], "search": TRIAL * TRIALS[effort] * samples * some * longest,
             "motion": MOTION * vertices * segments[-1][1]}
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}

@@ -1,7 +1,7 @@
 """From integers to the bytes of a stream: one function per kind of stream of FORMAT.md.
 
 The models run in the C core; this module knows which arrays each takes. What the bytes are wrapped in (steps, flags) is
-the container's business. Reading streams is the player's (player.py).
+the container's business. Reading streams is the core's.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec._native import BRANCH, address, encode_stream, lib
-from athcodec.crew import ALONE, Crew, ranges
-from athcodec.shapes import Shapes
-from athcodec.transform import Plan, SegmentMotion
+from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.threads import SERIAL, ThreadPool, ranges
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
@@ -49,25 +49,26 @@ def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
                          address(steps, np.int32, steps.size))
 
 
-def encode_shapes(plan: Plan, shapes: Shapes | None) -> dict[int, bytes]:
-    """Learned shapes by level; nothing where there are none."""
-    if shapes is None:
+def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
+    """Learned learned_modes by level; nothing where there are none."""
+    if learned_modes is None:
         return {}
-    arrays = (address(shapes.counts, np.int32, len(plan.pieces)), address(shapes.first, np.int64, len(plan.pieces)),
-              address(shapes.integers, np.int32, shapes.integers.size))
-    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.shape, *arrays, level)
-            for level in shapes.levels(plan).tolist()}
+    pieces = len(plan.pieces)
+    arrays = (address(learned_modes.counts, np.int32, pieces), address(learned_modes.first, np.int64, pieces),
+              address(learned_modes.integers, np.int32, learned_modes.integers.size))
+    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * learned_modes.integers.size, plan.core, *arrays, level)
+            for level in learned_modes.levels(plan).tolist()}
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
     """Coefficients and tracks of one level."""
-    return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.shape, segment.motion,
+    return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.core, segment.motion,
                          segment.integers, level)
 
 
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:
     """Maps of the nodes of one level."""
-    return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.shape, segment.motion,
+    return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.core, segment.motion,
                          segment.integers, level)
 
 
@@ -86,7 +87,7 @@ def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
 
 
 def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float | np.ndarray,
-                     step: float, crew: Crew = ALONE) -> np.ndarray | None:
+                     step: float, pool: ThreadPool = SERIAL) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
     Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.
@@ -100,7 +101,7 @@ def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarr
             rows[:, 0] += start
         return rows
 
-    parts = crew.each(found, ranges(vertices, 3 * frames))
+    parts = pool.map(found, ranges(vertices, 3 * frames))
     if any(rows is None for rows in parts):
         return None
     corrections = np.concatenate(parts)

@@ -23,39 +23,17 @@ from athcodec._native import (
     SEGMENT_FRAMES,
     Integers,
     Motion,
-    Shape,
+    PlanStruct,
     Stream,
     address,
     lib,
 )
-from athcodec.crew import ALONE, Crew, ranges
+from athcodec.threads import SERIAL, ThreadPool, ranges
 
 if TYPE_CHECKING:
-    from athcodec.shapes import Shapes
+    from athcodec.encoding.learned_modes import LearnedModes
 
-MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
-SEGMENT_BYTES = 128 << 20
-SHARES, LEAST_SHARE = 24, 1024  # of a plant's vertices that one thread takes at a time
-
-
-def decoding_bytes(vertex_count: int, frames: int) -> int:
-    """Memory that decoding a segment takes, at most: integers, two sets of positions, bases."""
-    return vertex_count * (3 * frames * (4 + 8 + 8) + 8 * PIECE_VERTICES)
-
-
-def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT,
-                   memory: int = 2 << 30) -> list[tuple[int, int]]:
-    """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 128 MiB, or where a
-    decoder would need more than `memory` bytes."""
-    limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
-    while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
-        limit -= 1
-    return balanced_segments(frame_count, -(-frame_count // limit))
-
-
-def balanced_segments(frame_count: int, count: int) -> list[tuple[int, int]]:
-    """`count` runs (start, stop) of frames, as long as each other but for one frame."""
-    return [(frame_count * i // count, frame_count * (i + 1) // count) for i in range(count)]
+RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 
 def cosine_basis(frames: int) -> np.ndarray:
@@ -76,8 +54,8 @@ class Plan:
     branches: (B,) of _native.BRANCH in file order. rest: (N, 3) float64, less the origin.
     """
 
-    def __init__(self, branches: np.ndarray, vertex_count: int, crew: Crew = ALONE):
-        self.branches, self.crew = branches, crew
+    def __init__(self, branches: np.ndarray, vertex_count: int, pool: ThreadPool = SERIAL):
+        self.branches, self.pool = branches, pool
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
         if piece_count <= 0:
@@ -85,17 +63,17 @@ class Plan:
         node_count = lib.ath_count_nodes(address(branches, BRANCH, 1), len(branches))
         self.pieces = np.zeros(piece_count, PIECE)
         self.nodes = np.zeros(node_count, NODE)
-        self.shape = Shape(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
+        self.core = PlanStruct(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
                            node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
                            nodes=self.nodes.ctypes.data)
         memory = np.empty(vertex_count, np.int32)
-        lib.ath_plan(self.shape, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
+        lib.ath_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         self.rest = self.bases = None
 
     @property
     def height(self) -> int:
         """Depth of the deepest node; levels run from 0 to height + 1."""
-        return self.shape.height
+        return self.core.height
 
     @property
     def level_count(self) -> int:
@@ -120,15 +98,15 @@ class Plan:
             lib.ath_basis_sheets(self.pieces.ctypes.data, first, stop, at, self.bases.ctypes.data)
 
         for fill in fill_modes, fill_sheets:
-            self.crew.each(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
-        self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
-        lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
+            self.pool.map(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
+        self.core.rest, self.core.bases = at, self.bases.ctypes.data
+        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
 
     @cached_property
-    def shares(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-        """Ranges of pieces that much hangs on, in order, and of those that several threads may do once these are done:
-        whole subtrees of branches, up to a SHARES-th of the vertices."""
-        most = max(LEAST_SHARE, self.vertex_count // SHARES)
+    def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+        """Ranges of pieces with large subtrees, in order, and ranges that several threads may process after these:
+        whole subtrees of branches with at most a RANGES-th of the vertices."""
+        most = max(LEAST_RANGE, self.vertex_count // RANGES)
         vertices = np.append(self.branches["first"], self.vertex_count).tolist()
         after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
         carrying, carried, branch = [], [], 0
@@ -146,9 +124,9 @@ class Plan:
         return tuple([(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried))
 
     @cached_property
-    def node_shares(self) -> list[tuple[int, int]]:
+    def node_ranges(self) -> list[tuple[int, int]]:
         """Ranges of nodes that several threads may do."""
-        share = np.cumsum(self.nodes["count"]) // max(LEAST_SHARE, self.vertex_count // 4)
+        share = np.cumsum(self.nodes["count"]) // max(LEAST_RANGE, self.vertex_count // 4)
         bounds = np.unique(share, return_index=True)[1].tolist()
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
@@ -165,15 +143,6 @@ class Plan:
         """Whether nodes of the level have maps of their own."""
         return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
 
-    def affine_levels(self, level: int) -> list[int]:
-        """Levels whose maps are shown at `level`: its own, and those of leaves above that are still whole."""
-        shown = (self.nodes["coded"] == 1) & (self.nodes["level"] <= level) & (self.nodes["last"] >= level)
-        return sorted(set(self.nodes["level"][shown].tolist()))
-
-    def shown_nodes(self, level: int) -> np.ndarray:
-        """Indices of the nodes that move as one at `level`."""
-        return np.flatnonzero((self.nodes["level"] <= level) & (self.nodes["last"] >= level))
-
     def exact_branches(self, level: int) -> np.ndarray:
         """Branches whose stems are exact at `level`."""
         return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
@@ -184,24 +153,24 @@ class LevelStream:
     """How one level's integers are read: step in scene units, rotation step factor (0: no rotations), time basis."""
 
     step: float
-    omega: float = 0.0
+    rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
 
 
 class SegmentMotion:
     """The quantised motion of one segment."""
 
-    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], shapes: Shapes | None = None):
-        if not 1 <= frames <= MAX_SEGMENT or len(streams) != plan.level_count:
-            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {MAX_SEGMENT} frames, "
-                             f"{plan.level_count} streams")
-        self.plan, self.frames, self.streams, self.shapes = plan, frames, streams, shapes
-        shape = plan.shape
+    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], learned_modes: LearnedModes | None = None):
+        if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
+            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
+                             f"frames, {plan.level_count} streams")
+        self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
+        core = plan.core
         self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
-        self.tracks = np.zeros((shape.piece_count, 2, 3, frames), np.int32)
-        self.node_tracks = np.zeros((shape.node_count, 4, 3, frames), np.int32)
-        self.node_steps = np.zeros(shape.node_count, np.int32)
-        self._carriers = np.empty(lib.ath_carrier_size(shape.carrier_rows, frames))
+        self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
+        self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
+        self.node_steps = np.zeros(core.node_count, np.int32)
+        self._carriers = np.empty(lib.ath_carrier_size(core.carrier_rows, frames))
         self.cosines = cosine_basis(frames)
         self._bind()
 
@@ -211,29 +180,22 @@ class SegmentMotion:
         for c_stream, stream in zip(self._c_streams, self.streams):
             temporal = self.cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
             self._temporal.append(temporal)
-            c_stream.step, c_stream.omega = stream.step, stream.omega
+            c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
                              carriers=self._carriers.ctypes.data, frames=self.frames)
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
-        if self.shapes is not None:
-            for name, array in (("shape_counts", self.shapes.counts), ("shape_first", self.shapes.first),
-                                ("shapes", self.shapes.units), ("duals", self.shapes.duals)):
+        if self.learned_modes is not None:
+            for name, array in (("shape_counts", self.learned_modes.counts), ("shape_first", self.learned_modes.first),
+                                ("shapes", self.learned_modes.units), ("duals", self.learned_modes.duals)):
                 setattr(self.integers, name, array.ctypes.data)
-
-    def restream(self, streams: list[LevelStream]) -> None:
-        """Clears the integers and sets how the next ones are to be read."""
-        self.streams = streams
-        for array in (self.coefficients, self.tracks, self.node_tracks, self.node_steps):
-            array.fill(0)
-        self._bind()
 
     def analyse(self, source: np.ndarray, dead_zone: float) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
         at = self._source(source)
         self._piecewise(lambda motion, first, stop: lib.ath_analyse(
-            self.plan.shape, motion, self.integers, first, stop, at, dead_zone))
+            self.plan.core, motion, self.integers, first, stop, at, dead_zone))
 
     def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
@@ -242,28 +204,28 @@ class SegmentMotion:
         """
         at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
         self._nodewise(lambda motion, first, stop: lib.ath_analyse_nodes(
-            self.plan.shape, motion, self.integers, first, stop, at, steps, dead_zone))
+            self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone))
 
     def clear_nodes(self) -> None:
-        """Forgets the maps of the nodes."""
+        """Sets the maps of the nodes to zero."""
         self.node_tracks.fill(0)
         self.node_steps.fill(0)
 
     def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
         """Calls with a motion and each range of pieces, those that others hang on first."""
-        carrying, carried = self.plan.shares
-        for share in carrying:
-            self._shared(call)(*share)
-        self.plan.crew.each(self._shared(call), carried)
+        carrying, carried = self.plan.piece_ranges
+        for first, stop in carrying:
+            self._with_scratch(call)(first, stop)
+        self.plan.pool.map(self._with_scratch(call), carried)
 
     def _nodewise(self, call: Callable[[Motion, int, int], None]) -> None:
-        self.plan.crew.each(self._shared(call), self.plan.node_shares)
+        self.plan.pool.map(self._with_scratch(call), self.plan.node_ranges)
 
-    def _shared(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
+    def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
         """The call with scratch memory of its own."""
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
-            work = np.empty(lib.ath_motion_work(self.plan.shape.longest, self.frames))
+            work = np.empty(lib.ath_motion_work(self.plan.core.longest, self.frames))
             motion.work = work.ctypes.data
             call(motion, first, stop)
 
@@ -277,13 +239,13 @@ class SegmentMotion:
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(lambda motion, first, stop: lib.ath_pose(
-            self.plan.shape, motion, self.integers, first, stop, *into))
+            self.plan.core, motion, self.integers, first, stop, *into))
         self._nodewise(lambda motion, first, stop: lib.ath_pose_nodes(
-            self.plan.shape, motion, self.integers, first, stop, *into))
+            self.plan.core, motion, self.integers, first, stop, *into))
         return positions
 
 
-def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, crew: Crew = ALONE) -> np.ndarray:
+def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL) -> np.ndarray:
     """Source positions, (T, M, 3) float32 or float64 in the source's order, as (N, 3, T) float64 less the origin;
     vertex_source (N,) int32: the N of its M vertices that are wanted."""
     frames, vertices = len(block), len(vertex_source)
@@ -295,12 +257,12 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, cre
                        block.shape[1], block.dtype == np.float64, block.ctypes.data, address(origin, np.float64, 3),
                        out[start:stop].ctypes.data)
 
-    crew.each(fill, ranges(vertices, 3 * frames))
+    pool.map(fill, ranges(vertices, 3 * frames))
     return out
 
 
 def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray,
-                   crew: Crew = ALONE) -> tuple[float, float]:
+                   pool: ThreadPool = SERIAL) -> tuple[float, float]:
     """Largest distance, and sum of squared distances, of decoded positions from the source."""
     vertices, _, frames = positions.shape
 
@@ -311,5 +273,5 @@ def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray
                       result[:1].ctypes.data, result[1:].ctypes.data)
         return result
 
-    largest, squares = np.transpose(crew.each(measured, ranges(vertices, 3 * frames)))
+    largest, squares = np.transpose(pool.map(measured, ranges(vertices, 3 * frames)))
     return float(largest.max()), float(sum(squares))

@@ -1,0 +1,26 @@
+"""What only an encoder needs: from a motion clip to the bytes of an .ath file.
+
+Data flows one way: a clip is sampled (sample.py) and its settings are searched (search.py); a segment's motion is
+analysed (motion.py, learned_modes.py), quantised (quantise.py) and coded (segment.py, streams.py); job.py puts the
+file together. encoder.py has the entry points. Decoding imports nothing from here.
+"""
+
+from athcodec.encoding.bounds import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
+from athcodec.encoding.encoder import code_segments, draft, encode, write
+from athcodec.encoding.job import CodedSegment, Draft
+from athcodec.encoding.search import EFFORTS
+from athcodec.encoding.summary import Seam, Summary
+
+__all__ = [
+    "DEFAULT_REL_ERROR",
+    "EFFORTS",
+    "LOSSLESS_REL_ERROR",
+    "CodedSegment",
+    "Draft",
+    "Seam",
+    "Summary",
+    "code_segments",
+    "draft",
+    "encode",
+    "write",
+]

@@ -1,0 +1,91 @@
+"""The error bound that a caller asks for: as a length, as a fraction of the clip's size, or as the size of the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.segment import Source
+from athcodec.errors import BoundError
+
+DEFAULT_REL_ERROR = 1e-4
+LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
+
+
+@dataclass(frozen=True)
+class BoundOption:
+    """At most one of the options of `encode` that set the bound; `lossless` changes the default.
+
+    Raises ValueError for several of them, BoundError for one that is no finite number above 0.
+    """
+
+    max_error: float | None = None
+    rel_error: float | None = None
+    target_size: int | None = None
+    lossless: bool = False
+
+    def __post_init__(self) -> None:
+        names = ("max_error", "rel_error", "target_size")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        if len(given) > 1:
+            raise ValueError(f"got {' and '.join(given)}; expected one of them")
+        for name, value in given.items():
+            if not (math.isfinite(value) and value > 0):
+                raise BoundError(f"{name}: got {value}; expected a finite number above 0")
+
+    def in_scene_units(self, source: Source, file_size: Callable[[float], float]) -> float:
+        """The bound for a clip; file_size: bytes of its file at a bound, asked for where a target size is to be met.
+
+        A fraction is of the diagonal of the bounding box over all frames; where nothing has any extent, of that with
+        the rest pose.
+        """
+        if self.max_error is not None:
+            return self.max_error
+        if self.target_size is not None:
+            return _bound_for_size(source, file_size, self.target_size)
+        diagonal, extent = source.seen.diagonal, source.extent
+        least = 2 * least_bound(source)
+        if self.rel_error is None and self.lossless:
+            return max(LOSSLESS_REL_ERROR * extent, least, extent / qz.LARGEST_RANGE)
+        fraction = self.rel_error or DEFAULT_REL_ERROR
+        return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
+
+
+def least_bound(source: Source) -> float:
+    """See quantise.least_bound."""
+    return qz.least_bound(source.seen.low, source.seen.high, source.clip.dtype)
+
+
+def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int) -> float:
+    """A bound whose file takes 97 to 100 % of `target` bytes, or the finest that does not exceed it. Raises BoundError.
+
+    Size falls about as the square root of the bound; between two known sizes it is interpolated in logarithms.
+    """
+    diagonal = source.seen.diagonal or 1.0
+    low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)  # low: file too large; high: fits, once tried
+    sizes: dict[float, float] = {}
+    guess = min(DEFAULT_REL_ERROR, high)
+    while high / low > 1.02 and sizes.get(high, 0) < 0.97 * target:
+        sizes[guess] = file_size(guess * diagonal)
+        low, high = (low, guess) if sizes[guess] <= target else (guess, high)
+        guess = _next_guess(low, high, sizes, target)
+    if sizes.get(high, target + 1) > target:
+        least = file_size(high * diagonal)
+        raise BoundError(f"target size: got {target} bytes; expected at least {least} for this clip")
+    return high * diagonal
+
+
+def _next_guess(low: float, high: float, sizes: dict[float, float], target: int) -> float:
+    """Where in [low, high] the size is expected to be just below the target."""
+    wanted = math.log(0.985 * target)
+    if low in sizes and high in sizes and math.isfinite(sizes[low]):
+        a, b = math.log(sizes[low]), math.log(sizes[high])
+        part = (a - wanted) / (a - b) if a > b else 0.5
+        return low * (high / low) ** min(max(part, 0.05), 0.95)
+    known = low if low in sizes else high
+    if not math.isfinite(sizes[known]):
+        return math.sqrt(low * high)
+    guess = known * math.exp((math.log(sizes[known]) - wanted) / 0.5)
+    return min(max(guess, low * 1.01), high if high not in sizes else high / 1.01)

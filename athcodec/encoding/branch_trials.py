@@ -1,0 +1,79 @@
+"""Which of the branches that discovery.py proposes make the smallest file; each is tried on a few frames."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec.ath import survey
+from athcodec.clip import MotionClip
+from athcodec.discovery import Found, candidates, with_branches
+from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.job import SPOOL_BYTES, EncodingJob, EncodingOptions
+from athcodec.encoding.progress import Progress
+from athcodec.encoding.segment import Source
+from athcodec.errors import BoundError
+from athcodec.hierarchy import hierarchy_of
+from athcodec.segmentation import DEFAULT_SEGMENT
+
+TRIAL_FRAMES = 64
+
+
+def best_branches(clip: MotionClip, option: BoundOption, report: Progress) -> Found:
+    """The candidate that makes the smallest file of a few frames at the bound that is asked for."""
+    found = candidates(clip)
+    if len(found) == 1:
+        return found[0]
+    trial = _Trial(clip, option)
+    sizes = []
+    for branches in found:
+        sizes.append(trial.size(branches))
+        report("branches", len(sizes) / (len(found) + 2))
+    best = found[int(np.argmin(sizes))]
+    if best.stem_index is None or best.method != "motion":
+        return best
+    unordered = dataclasses.replace(best, stem_index=None)  # the source's order of vertices costs no bytes
+    return unordered if trial.size(unordered) < min(sizes) else best
+
+
+class _Trial:
+    """Frames from the middle of a clip, coded on different branches; sizes are extrapolated to the whole clip."""
+
+    def __init__(self, clip: MotionClip, option: BoundOption):
+        start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
+        stop = min(clip.frame_count, start + TRIAL_FRAMES)
+        self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps,
+                                rest=clip.rest.astype(clip.rest_dtype))
+        self._frames_ratio = clip.frame_count / (stop - start)
+        self._option = option
+
+    def size(self, branches: Found) -> float:
+        """Bytes of the whole clip's file on these branches; infinite where the bound cannot be kept."""
+        clip, lossless = with_branches(self._clip, branches), self._option.lossless
+        hierarchy = hierarchy_of(clip)
+        source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=lossless)
+        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
+        if self._option.target_size is not None:
+            self._option = self._bound_of_target(job)
+        return self._job_size(job, self._option.in_scene_units(source, job.file_size))
+
+    def _bound_of_target(self, job: EncodingJob) -> BoundOption:
+        """The bound at which the branches tried first meet the target size, to judge all others at too."""
+        try:
+            bound = self._option.in_scene_units(job.source, lambda bound: self._job_size(job, bound))
+        except BoundError:
+            return BoundOption()
+        return BoundOption(max_error=bound)
+
+    def _job_size(self, job: EncodingJob, bound: float) -> float:
+        with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+            try:
+                entries = job.encode(bound, ct.ChunkStore(spool)).store.entries
+            except BoundError:
+                return math.inf
+        return sum(chunk.length * (self._frames_ratio if chunk.is_motion and chunk.kind != ct.SHAPES else 1)
+                   for chunk, _ in entries)

@@ -1,0 +1,231 @@
+"""The entry points of encoding: a motion clip becomes one .ath file, in one call or in three.
+
+`encode` does all of it. `draft`, `code_segments` and `write` are its three steps, for several processes that work on
+one clip. The work itself is job.py's.
+"""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec.ath import Thresholds
+from athcodec.clip import MotionClip
+from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.branch_trials import best_branches
+from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
+from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.search import SAMPLES
+from athcodec.encoding.summary import Summary
+from athcodec.files import check_target, new_file
+from athcodec.segmentation import split_segments
+
+
+def encode(
+    clip: MotionClip,
+    path: str | PathLike[str],
+    *,
+    max_error: float | None = None,
+    rel_error: float | None = None,
+    target_size: int | None = None,
+    segment_frames: int | None = None,
+    tam: Thresholds | None = None,
+    exact_rest: bool = False,
+    lossless: bool = False,
+    weights: str | np.ndarray | None = None,
+    attributes: str = "all",
+    effort: str = "default",
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Summary:
+    """Compress a clip into an .ath file, which appears under its name only when it is whole.
+
+    At most one of `max_error`, `rel_error` and `target_size` is given.
+
+    Parameters
+    ----------
+    clip : MotionClip
+        A clip without branches gets those that `find_branches` proposes, whichever make the smallest file. Several
+        clips of one plant go into one file when they have been joined (`join`).
+    path : str or path-like
+        The file; an older one is replaced.
+    max_error : float, optional
+        Bound in scene units on the distance of every vertex in every frame from the source.
+    rel_error : float, optional
+        The same as a fraction of the diagonal of the bounding box over all frames; default 1e-4, lossless 4e-7.
+    target_size : int, optional
+        Bytes: the file has the smallest bound that fits.
+    segment_frames : int, optional
+        Longest segment in frames, 16 to 256; default 128.
+    tam : Thresholds, optional
+        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
+        within the bound.
+    exact_rest : bool
+        Keep the rest pose bit for bit.
+    lossless : bool
+        One more level holds the positions bit for bit, and the rest pose is kept likewise; the bound is that of the
+        level before.
+    weights : str or (N,) array, optional
+        A factor above 0 on the bound for each vertex, or the name of the attribute that holds them: vertex v is within
+        weights[v] times the bound. The file promises the largest of these for all vertices.
+    attributes : {"all", "none"}
+        "none" drops faces, edges and named arrays.
+    effort : {"fast", "default", "best"}
+        How long settings are searched.
+    jobs : int, optional
+        Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
+        memory grows with it.
+    progress : callable, optional
+        Called with the stage ("survey", "search", "motion" ...) and the elapsed fraction of the whole time, which
+        never falls and ends with 1.0.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    ClipError
+        For a clip that cannot be stored.
+    BoundError
+        For a bound or size that cannot be kept.
+    ValueError
+        For options that contradict each other or are out of range.
+    OSError
+        Where the file cannot be written.
+    """
+    option = BoundOption(max_error, rel_error, target_size, lossless)
+    options = EncodingOptions.of(segment_frames=segment_frames, tam=tam, exact_rest=exact_rest, lossless=lossless,
+                                 weights=weights, attributes=attributes, effort=effort, jobs=jobs)
+    check_target(path)  # before any work
+    job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
+    with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+        decided = job.decide(bound)
+        return job.write(path, out, spool, decided, job.coded(decided, range(job.segment_count)))
+
+
+def draft(
+    clip: MotionClip,
+    *,
+    max_error: float | None = None,
+    rel_error: float | None = None,
+    target_size: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Draft:
+    """The first step of `encode`, whose options it takes: branches, survey, and the search for settings.
+
+    Raises
+    ------
+    ClipError, BoundError, ValueError
+        As `encode`.
+    """
+    checked = EncodingOptions.of(**options)
+    option = BoundOption(max_error, rel_error, target_size, checked.lossless)
+    with clip.watched():
+        job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
+        return job.draft(job.decide(bound))
+
+
+def code_segments(
+    clip: MotionClip, draft: Draft, segments: Iterable[int], *, jobs: int | None = None
+) -> Iterator[CodedSegment]:
+    """The second step: codes some of the segments 0 to draft.segment_count - 1.
+
+    Parameters
+    ----------
+    clip : MotionClip
+        The clip that the draft was made of; it may have been opened again in another process.
+    draft : Draft
+    segments : iterable of int
+        Ascending.
+    jobs : int, optional
+        Threads, as in `encode`.
+
+    Yields
+    ------
+    CodedSegment
+
+    Raises
+    ------
+    ClipError
+        Where the clip is another than that of the draft, as far as its hierarchy and rest pose show.
+    """
+    job = EncodingJob.resume(clip, draft, jobs=jobs)
+    with clip.watched():
+        yield from job.coded(job.decided(draft), list(segments))
+
+
+def write(
+    clip: MotionClip,
+    draft: Draft,
+    coded: Iterable[CodedSegment],
+    path: str | PathLike[str],
+    *,
+    progress: Progress | None = None,
+) -> Summary:
+    """The third step: writes the file that `encode` would write.
+
+    Parameters
+    ----------
+    clip, draft
+        As in `code_segments`.
+    coded : iterable of CodedSegment
+        All segments, in any order.
+    path : str or path-like
+        The file.
+    progress : callable, optional
+        As in `encode`.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    ClipError
+        As `code_segments`.
+    ValueError
+        Where segments are missing or come twice.
+    OSError
+        Where the file cannot be written.
+    """
+    check_target(path)
+    job = EncodingJob.resume(clip, draft, WeightedProgress(progress, {"motion": 1.0}))
+    with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+        return job.write(path, out, spool, job.decided(draft), coded)
+
+
+def _begin(
+    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress
+) -> tuple[EncodingJob, float]:
+    """The job, whose clip has branches by then, and its bound in scene units."""
+    clip.check()
+    found = None
+    if not clip.has_branches:
+        report("branches", 0.0)
+        found = best_branches(clip, option, report)
+    job = EncodingJob.begin(clip, found, options, report)
+    attempts = itertools.count(1)
+
+    def file_size(bound: float) -> float:
+        size, attempt = job.file_size(bound), next(attempts)
+        report("size", attempt / (attempt + 4))
+        return size
+
+    return job, option.in_scene_units(job.source, file_size)
+
+
+def _weighted_progress(
+    clip: MotionClip, progress: Progress | None, option: BoundOption, options: EncodingOptions, draft: bool = False
+) -> WeightedProgress:
+    segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
+    return WeightedProgress(progress, stage_weights(
+        clip.vertex_count, segments, options.effort, samples=min(SAMPLES, len(clip.span_frames)),
+        branches=not clip.has_branches, sizes=option.target_size is not None, motion=not draft))

@@ -1,0 +1,396 @@
+"""One clip on its way into a file: the stages of FORMAT.md run forward, in closed loop, segment by segment.
+
+The source is read twice: once for what needs all frames (bounding box, TAM), once to code. What the file promises is
+checked on what a decoder will output: every level of every segment is decoded and measured, and vertices beyond the
+bound at the last level are corrected before the segment is written. Settings come from search.py, the streams of a
+segment from segment.py.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec.ath import Ath, Survey, Thresholds, survey
+from athcodec.clip import MotionClip
+from athcodec.decoder import Decoder
+from athcodec.discovery import Found, with_branches
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import LearnedModes
+from athcodec.encoding.progress import Progress, silent
+from athcodec.encoding.search import EFFORTS, decide
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_segment, thread_count
+from athcodec.encoding.summary import LevelSummary, Seam, Summary
+from athcodec.errors import BoundError, ClipError
+from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.threads import ThreadPool, default_jobs
+
+SPOOL_BYTES = 64 << 20
+STATIC_METADATA = ("unit", "up_axis")
+WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
+
+
+@dataclass(frozen=True)
+class EncodingOptions:
+    """The options of `encode` that are not the bound, checked. Raises ValueError."""
+
+    segment_frames: int = DEFAULT_SEGMENT
+    tam: Thresholds | None = None
+    exact_rest: bool = False
+    lossless: bool = False
+    weights: str | np.ndarray | None = None
+    attributes: str = "all"
+    effort: str = "default"
+    jobs: int | None = None
+
+    @classmethod
+    def of(cls, *, segment_frames: int | None = None, **options) -> EncodingOptions:
+        """None for segment_frames is its default."""
+        return cls(DEFAULT_SEGMENT if segment_frames is None else segment_frames, **options)
+
+    def __post_init__(self) -> None:
+        if not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
+            raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
+        if self.attributes not in ("all", "none"):
+            raise ValueError(f"attributes: got {self.attributes!r}; expected 'all' or 'none'")
+        if self.jobs is not None and self.jobs < 1:
+            raise ValueError(f"jobs: got {self.jobs}; expected at least 1")
+        if self.effort not in EFFORTS:
+            raise ValueError(f"effort: got {self.effort!r}; expected one of {', '.join(EFFORTS)}")
+
+
+@dataclass(frozen=True)
+class Draft:
+    """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
+
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `mark` tells
+    a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
+    """
+
+    settings: Settings
+    learned_modes: LearnedModes | None
+    seen: Survey
+    segment_count: int
+    found: Found | None  # branches, for a clip without
+    options: EncodingOptions
+    mark: str
+
+
+@dataclass(frozen=True)
+class CodedSegment:
+    """One segment: chunks {(level, kind): payload}, and (levels, 2) errors of stopping at each level."""
+
+    index: int
+    chunks: dict[tuple[int, int], bytes]
+    errors: np.ndarray
+
+
+def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
+    """Raises ClipError for counts that decoders refuse."""
+    limits = ct.Limits()
+    for name, value, limit in (("vertices", clip.vertex_count, limits.vertices),
+                               ("branches", clip.branch_count, limits.branches),
+                               ("frames", clip.frame_count, limits.frames),
+                               ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth)):
+        if value > limit:
+            raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
+
+
+def _completed(clip: MotionClip, found: Found | None,
+               weights: str | np.ndarray | None) -> tuple[MotionClip, np.ndarray | None]:
+    """The clip on branches that were found for it, and its weights, which it then names."""
+    if found is not None:
+        clip = with_branches(clip, found)
+    return (clip, None) if weights is None else _weighted(clip, weights)
+
+
+def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
+    """The clip, which says where its weights are, and these as (N,) float64. Raises ClipError."""
+    name = weights if isinstance(weights, str) else WEIGHTS
+    attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
+    if name not in attributes:
+        raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
+    array = attributes[name]
+    if array.size != clip.vertex_count or array.dtype.kind not in "biuf":
+        raise ClipError(f"weights: got {array.dtype} of shape {array.shape} in {name!r}, expected a number for each of "
+                        f"{clip.vertex_count} vertices")
+    values = array.reshape(-1).astype(np.float64)
+    bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
+    if bad.size:
+        raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
+    metadata = clip.metadata | {WEIGHTS: name}
+    rest = clip.rest.astype(clip.rest_dtype)
+    return dataclasses.replace(clip, attributes=attributes, metadata=metadata, rest=rest), values
+
+
+def time_chunk(*times: np.ndarray) -> bytes:
+    """Content of TIME for times in seconds, (T,) for each clip, exactly: by rules where these give the very same
+    numbers."""
+    steady = ct.pack_steady_time(*times)
+    return steady or ct.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
+
+
+@dataclass
+class _Decided:
+    """What the streams of a file depend on: settings, and what follows from them."""
+
+    ath: Ath
+    settings: Settings
+    prelude: CodedPrelude
+    learned_modes: LearnedModes | None
+
+    @property
+    def mark(self) -> str:
+        return hashlib.sha256(self.prelude.hierarchy_stream + self.prelude.rest_chunk.stream).hexdigest()
+
+
+@dataclass
+class _Result:
+    store: ct.ChunkStore
+    header: ct.Header
+    errors: np.ndarray
+
+
+@dataclass
+class EncodingJob:
+    """One clip on its way into a file: what does not depend on the bound. `report`: by stages, see progress.py."""
+
+    source: Source
+    options: EncodingOptions
+    report: Progress = silent
+    found: Found | None = None
+
+    @classmethod
+    def begin(cls, clip: MotionClip, found: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
+        """Reads all frames. found: branches for a clip without."""
+        clip, factors = _completed(clip, found, options.weights)
+        hierarchy = hierarchy_of(clip)
+        _check_limits(clip, hierarchy)
+        pool = ThreadPool(options.jobs or default_jobs())
+        thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
+        seen = survey(clip, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
+        return cls(cls._source(clip, seen, factors, options, pool), options, report, found)
+
+    @classmethod
+    def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
+        """The state that the job had which made the draft. Raises ClipError."""
+        seen = draft.seen
+        got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, seen.hierarchy.vertex_count)
+        if got != expected:
+            raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
+        options = dataclasses.replace(draft.options, jobs=jobs)
+        clip, factors = _completed(clip, draft.found, options.weights)
+        source = cls._source(clip, seen, factors, options, ThreadPool(jobs or default_jobs()))
+        return cls(source, options, report, draft.found)
+
+    @staticmethod
+    def _source(clip: MotionClip, seen: Survey, factors: np.ndarray | None, options: EncodingOptions,
+                pool: ThreadPool) -> Source:
+        return Source(clip, seen.hierarchy, seen, options.segment_frames, options.exact_rest or options.lossless,
+                      None if factors is None else factors[seen.hierarchy.vertex_source], pool)
+
+    @property
+    def clip(self) -> MotionClip:
+        return self.source.clip
+
+    @property
+    def _keeps_static(self) -> bool:
+        return self.options.attributes == "all"
+
+    @property
+    def seen(self) -> Survey:
+        return self.source.seen
+
+    @property
+    def segment_count(self) -> int:
+        return len(self.source.segments)
+
+    def thresholds(self, bound: float) -> Thresholds:
+        return self.options.tam or Thresholds(bound, 0, bound, 0)
+
+    def decide(self, bound: float) -> _Decided:
+        """Searches for settings."""
+        qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
+                       self.source.extent)
+        ath = self.seen.ath(self.thresholds(bound))
+        return _Decided(ath, *decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs))
+
+    def draft(self, decided: _Decided) -> Draft:
+        return Draft(decided.settings, decided.learned_modes, self.seen, self.segment_count, self.found, self.options,
+                     decided.mark)
+
+    def decided(self, draft: Draft) -> _Decided:
+        """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
+        ath = self.seen.ath(self.thresholds(draft.settings.bound))
+        decided = _Decided(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
+        if decided.mark != draft.mark:
+            raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
+                            "on machines that calculate alike")
+        return decided
+
+    def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
+        decided = self.decide(bound)
+        return self.fill(store, decided, self.coded(decided, range(self.segment_count)))
+
+    def file_size(self, bound: float) -> float:
+        """Bytes of the file at a bound; infinite where it cannot be kept."""
+        with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+            try:
+                result = dataclasses.replace(self, report=silent).encode(bound, ct.ChunkStore(spool))
+            except BoundError:
+                return math.inf
+        return result.store.size(result.header)
+
+    def write(self, path: str | PathLike[str], out: BinaryIO, spool: BinaryIO, decided: _Decided,
+              coded: Iterable[CodedSegment]) -> Summary:
+        """The whole file into `out`, which is to become `path`."""
+        result = self.fill(ct.ChunkStore(spool), decided, coded)
+        chunks = result.store.write(out, result.header, result.errors)
+        if any(span.loop for span in self.clip.spans):
+            with Decoder(out, strict=True) as decoder:
+                result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
+            out.seek(0)
+            chunks = result.store.write(out, result.header, result.errors)
+        with Decoder(out, strict=True) as decoder:  # before the file gets its name
+            summary = _summary(Path(path), self, decided, result, chunks, decoder)
+        self.report("done", 1.0)
+        return summary
+
+    def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
+        """All chunks of a file."""
+        prelude = decided.prelude
+        self._add_prelude(store, prelude, decided.ath)
+        for level, stream in streams.encode_learned_modes(prelude.plan, decided.learned_modes).items():
+            store.add(ct.SHAPES, stream, level)
+        errors = self._add_motion(store, prelude, coded)
+        self._add_static(store)
+        if self.clip.spans:
+            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.spans)))
+        header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
+                           self.segment_count, len(errors), len(errors),
+                           0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
+                           self.clip.dtype == np.float64, len(self.clip.span_frames))
+        return _Result(store, header, errors)
+
+    def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
+        return ct.pack_clips(self.clip.spans, [len(segments) for segments in self.source.span_segments], seam_errors)
+
+    def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
+        """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
+        return [self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
+                for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames)]
+
+    @staticmethod
+    def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
+        errors = []
+        for level in range(loop.level_count):
+            last, first = (loop.positions(frame, level, np.float64) for frame in (-1, 0))
+            errors.append(np.linalg.norm(first - last - step, axis=1).max())
+        return errors
+
+    def _step(self, frame: int, following: int) -> np.ndarray:
+        """Ways of the vertices from one frame of the source to another, (N, 3) float64."""
+        before, after = (self.clip.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
+        return after - before
+
+    def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
+        """Of the loops of the file just written."""
+        seams = []
+        for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames):
+            if clip.loop:
+                beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
+                step, *steps = (np.linalg.norm(self._step(*frames), axis=1).max()
+                                for frames in [(stop - 1, start), *beside])
+                seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
+        return tuple(seams)
+
+    def _add_prelude(self, store: ct.ChunkStore, prelude: CodedPrelude, ath: Ath) -> None:
+        limits = ath.thresholds
+        store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
+                                                  prelude.hierarchy_stream))
+        store.add(ct.REST, ct.pack_rest(prelude.rest_chunk))
+        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.span_frames)))
+        metadata = self.clip.metadata if self._keeps_static else {
+            key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
+        if metadata:
+            store.add(ct.METADATA, ct.pack_metadata(metadata))
+        if self._keeps_static and self.clip.faces is not None:
+            store.add(ct.FACES, ct.pack_array(self.clip.faces))
+        if self._keeps_static and self.clip.edges is not None:
+            store.add(ct.EDGES, self._edges())
+
+    def _edges(self) -> bytes:
+        derived = derived_edges(self.source.hierarchy)
+        if derived.shape == self.clip.edges.shape and (derived == self.clip.edges).all():
+            return ct.pack_array(None, derived=self.clip.edges.dtype.str)
+        return ct.pack_array(self.clip.edges)
+
+    def _add_static(self, store: ct.ChunkStore) -> None:
+        if self._keeps_static and len(self.clip.attributes) > ct.Limits.attributes:
+            raise ClipError(f"attributes: got {len(self.clip.attributes)}; expected at most {ct.Limits.attributes}")
+        if self._keeps_static:
+            for name, array in self.clip.attributes.items():
+                store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
+
+    def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
+        """Some segments, coded a few at a time, while the next one is read."""
+        def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
+            index, blocks = taken
+            positions, exact = self._positions(blocks.pop())  # not held any longer
+            return CodedSegment(index, *code_segment(
+                decided.prelude, decided.settings, positions, decided.learned_modes, exact))
+
+        at_once = thread_count(self.options.jobs, self.source)
+        pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)
+        return pool.ordered(code, ((index, [self.source.block(index)]) for index in segments), at_once)
+
+    def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """What is coded of a block, and its own numbers where these are to come back."""
+        return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
+
+    def _add_motion(self, store: ct.ChunkStore, prelude: CodedPrelude, coded: Iterable[CodedSegment]) -> np.ndarray:
+        """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
+        errors = np.zeros((prelude.plan.level_count + self.options.lossless, self.segment_count, 2))
+        missing = set(range(self.segment_count))
+        for segment in coded:
+            if segment.index not in missing:
+                raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
+            missing.remove(segment.index)
+            errors[:, segment.index] = segment.errors
+            for (level, kind), payload in segment.chunks.items():
+                store.add(kind, payload, level, segment.index)
+            self.report("motion", 1 - len(missing) / self.segment_count)
+        if missing:
+            raise ValueError(f"segments: got {self.segment_count - len(missing)}, expected all {self.segment_count}")
+        return errors
+
+
+def _summary(path: Path, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk],
+             decoder: Decoder) -> Summary:
+    depths = [LevelSummary(d.depth, d.nodes, d.bytes, d.max_error, d.rms_error) for d in decoder.depths]
+    sizes: dict[str, int] = {}
+    for chunk in chunks:
+        name = ct.KIND_NAMES[chunk.kind]
+        sizes[name] = sizes.get(name, 0) + chunk.length
+    sizes["HEADER"] = result.header.file_length - sum(sizes.values())
+    settings, bound = decided.settings, decided.settings.bound
+    choices = {"step_ratio": settings.step / bound, "rest_step_ratio": settings.rest_step / bound,
+               "rotations": list(settings.rotation_step_factors), "learned": list(settings.learned_bases),
+               "sheets": int(settings.sheet.sum()),
+               "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum())}
+    diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
+    return Summary(path, result.header.file_length, raw, settings.largest_bound,
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices,
+                   job.seams(decoder), None if job.found is None else str(job.found))

@@ -1,0 +1,411 @@
+"""Which settings make the smallest file: candidates code a sample of the segments, and their bytes are counted.
+
+Bases, rotations, time bases and steps are searched one after the other, on a sample of the plant where that is large.
+`Search` knows what to try; a trial itself is segment.py's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from athcodec.ath import Ath
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.learned_modes import (
+    Components,
+    LearnedModes,
+    components,
+    estimated_bits,
+    learn,
+)
+from athcodec.encoding.motion import Plan, SegmentMotion, position_error
+from athcodec.encoding.progress import TRIALS, Progress
+from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
+from athcodec.encoding.segment import (
+    CodedPrelude,
+    Settings,
+    Source,
+    analyse,
+    analyse_finely,
+    branch_records,
+    code_stems,
+    lags,
+    loose_branches,
+    thread_count,
+)
+from athcodec.errors import BoundError
+
+EFFORTS = tuple(TRIALS)
+WALKS = 3  # of both steps
+SAMPLES = 3  # of several clips
+LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
+PRELUDES_KEPT = 6  # between trials
+WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentSample:
+    """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
+
+    positions: np.ndarray
+    frames: int
+
+    @property
+    def scale(self) -> float:
+        return self.frames / self.positions.shape[2]
+
+    def of_plant(self, sample: PlantSample) -> SegmentSample:
+        return SegmentSample(self.positions[sample.vertices], self.frames)
+
+
+def samples_of(source: Source) -> list[SegmentSample]:
+    """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
+    middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
+    if len(middles) == 1:
+        return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
+    lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
+    groups = np.array_split(np.argsort([_moved(source, segment) for segment in middles], kind="stable"),
+                            min(SAMPLES, len(middles)))
+    return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum()))
+            for group in groups]
+
+
+def _moved(source: Source, segment: int) -> float:
+    """RMS displacement of the vertices from the first frame of a segment to its middle."""
+    start, stop = source.segments[segment]
+    first, middle = (source.clip.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2))
+    return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)
+
+
+def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
+           jobs: int | None = None) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
+    """Settings, and what follows from them: hierarchy and rest pose as coded, learned learned_modes."""
+    search = Search.of(source, ath, bound, effort, report, jobs)
+    settings = search.found()
+    prelude = search.prelude(settings)
+    return settings, prelude, search.learned_modes(prelude.plan, settings)
+
+
+def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
+    """The start of a search."""
+    relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
+    step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
+    levels = ath.height + 2
+    return Settings(
+        bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
+        level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.sheet_like,
+        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step),
+        rotation_step_factors=(0,) * levels, learned_bases=(False,) * levels, learned_pieces=None,
+        node_steps=np.full(levels, step))
+
+
+class Search:
+    """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
+
+    samples: from calm to wild; the one in the middle decides the steps of the nodes' maps. extrapolation: for a clip
+    that is a sample of a larger plant.
+    """
+
+    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[SegmentSample], effort: str,
+                 report: Progress, jobs: int | None = None, extrapolation: ExtrapolationFactors | None = None):
+        self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
+        self.start, self.samples, self.levels = start, samples, ath.height + 2
+        self.sample = samples[len(samples) // 2].positions
+        self.extrapolation = extrapolation or ExtrapolationFactors.everything(self.levels)
+        self.required_saving: float | None = None  # of REQUIRED_SAVINGS: the one that made the smallest file
+        self._known: dict[tuple, tuple[float, np.ndarray]] = {}
+        self._components: dict[tuple, Components] = {}
+        self._preludes: dict[tuple, CodedPrelude] = {}
+        self._extra_trials = 0
+
+    @classmethod
+    def of(cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
+           jobs: int | None = None) -> Search:
+        """For a whole plant."""
+        samples = samples_of(source)
+        return cls(source, ath, first_settings(source, ath, bound, samples[-1]), samples, effort, report, jobs)
+
+    def _level_errors(self, bound: float) -> np.ndarray:
+        """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
+
+        The level's own: the RMS that independent least-squares maps would leave, in a few frames, at least the bound.
+        """
+        some = np.linspace(0, self.sample.shape[2] - 1, min(8, self.sample.shape[2])).astype(int)
+        frames = np.empty((len(some), *self.sample.shape[:2]))
+        frames[:, self.source.hierarchy.vertex_source] = np.moveaxis(self.sample[:, :, some], 2, 0) + self.source.origin
+        nodes = self.inner_nodes()
+        errors = np.full(self.levels, bound)
+        for level in np.flatnonzero(nodes):
+            left = self.ath.approximation(frames, int(level)) - frames
+            whole = max(bound, math.sqrt((left**2).sum() / (frames.size / 3)))
+            errors[level] = whole * math.sqrt(self.source.clip.vertex_count / nodes[level])
+        return errors
+
+    def inner_nodes(self) -> np.ndarray:
+        """Nodes of more than one branch, per level."""
+        hierarchy, branches = self.source.hierarchy, self.ath.node_branch
+        branches = branches[hierarchy.subtree_branches[branches] > 1]
+        return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
+
+    def found(self) -> Settings:
+        """The best settings; for a large plant those of a sample of it."""
+        sample = sample_plant(self.source, self.ath, self.effort)
+        return self.best() if sample is None else self.best_of_sample(sample)
+
+    def best(self) -> Settings:
+        steps = [self._with_basis, self._with_rotations, self._with_learned_bases, self._with_basis,
+                 self._with_learned_modes, self._with_steps]
+        if self.effort == "fast":
+            steps = [self._with_rotations]
+        if self.source.weights is not None:
+            steps.insert(0, self._with_level_steps)
+        elif self.effort == "best":
+            steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
+        settings = self.start
+        for step in [*steps, self._with_node_steps]:
+            settings = step(settings)
+            self._report(WORTH.get(step.__name__, 0))
+        self.report("search", 1.0)
+        return settings
+
+    def _report(self, worth: int = 0) -> None:
+        """Reports progress after work that counts as `worth` trials in addition to those made."""
+        self._extra_trials += worth
+        self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
+
+    def best_of_sample(self, sample: PlantSample) -> Settings:
+        """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
+        start, kept = self.start, sample.branches
+        limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
+        some = replace(start, sheet=sample.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept],
+                       limit=limit)
+        extrapolation = ExtrapolationFactors.of(branch_records(self.source.hierarchy, self.ath, start),
+                                                branch_records(sample.source.hierarchy, sample.ath, some))
+        samples = [segment.of_plant(sample) for segment in self.samples]
+        search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
+        found = search.best()
+        inner, all_inner = search.inner_nodes(), self.inner_nodes()
+        coarser = np.where(inner > 0, np.sqrt(extrapolation.vertices * inner / np.maximum(all_inner, 1)), 1.0)
+        by_form = np.array_equal(found.sheet, sample.source.sheet_like)
+        settings = replace(
+            start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step,
+            rotation_step_factors=found.rotation_step_factors, learned_bases=found.learned_bases,
+            sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
+            node_steps=found.node_steps * coarser)
+        if search.required_saving is None:
+            return settings
+        return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
+
+    def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
+        """(bytes of a whole file, and of each level's streams in it) at these settings."""
+        varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.rotation_step_factors,
+                  settings.learned_bases, settings.sheet.tobytes(),
+                  settings.learned_pieces is not None and settings.learned_pieces.tobytes())
+        if varied not in self._known:
+            self._known[varied] = self._try(settings)
+        return self._known[varied]
+
+    def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
+        prelude = self.prelude(settings)
+        learned_modes = self.learned_modes(prelude.plan, settings)
+        try:
+            levels = sum(self._level_bytes(prelude, settings, learned_modes, sample) for sample in self.samples)
+        except BoundError:
+            return math.inf, np.full(self.levels, math.inf)
+        mode_bytes = 0.0
+        for level, data in streams.encode_learned_modes(prelude.plan, learned_modes).items():
+            mode_bytes += len(data) * self.extrapolation.rows[level]
+        return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
+
+    def _level_bytes(self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None,
+                     sample: SegmentSample) -> np.ndarray:
+        """Of the streams in all that a sample stands for, (levels,)."""
+        coded = code_stems(prelude, settings, sample.positions, learned_modes)
+        levels, heads = np.zeros(self.levels), np.zeros(self.levels)
+        for level, data in coded.stems.items():
+            levels[level], heads[level] = len(data), coded.heads[level]
+        corrections = len(coded.correction_chunk)
+        if corrections:
+            levels += corrections * self._corrected(prelude.plan, coded.corrections)
+        levels += (levels - heads) * (self.extrapolation.rows - 1)
+        return levels * sample.scale
+
+    def _prelude_bytes(self, prelude: CodedPrelude) -> float:
+        return prelude.prelude_bytes * self.extrapolation.vertices
+
+    def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
+        """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
+        if settings.learned_pieces is None and not everywhere:
+            return None
+        known = settings.rotation_step_factors, settings.sheet.tobytes()
+        if known not in self._components:
+            prelude, count = self.prelude(settings), len(self.source.segments)
+            some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            self._components[known] = components(prelude.plan, (
+                analyse_finely(prelude, settings, self.source.positions(segment)) for segment in some))
+        return learn(plan, self._components[known], settings.step, None if everywhere else settings.learned_pieces)
+
+    def _with_learned_modes(self, settings: Settings) -> Settings:
+        """Learned modes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
+        plain = replace(settings, learned_pieces=None)
+        wanted = dict(zip(qz.REQUIRED_SAVINGS, self._pieces_for_learned_modes(plain, qz.REQUIRED_SAVINGS)))
+        tried = {None: plain} | {saving: replace(plain, learned_pieces=some) for saving, some in wanted.items()
+                                 if some.any()}
+        self.required_saving, settings = self._cheapest_of(tried)
+        return settings
+
+    def _pieces_for_learned_modes(self, plain: Settings, required_savings: Sequence[float]) -> list[np.ndarray]:
+        """(P,) bool for each required saving: pieces whose estimated bits shrink by that factor with learned modes."""
+        prelude = self.prelude(plain)
+        learned_modes = self.learned_modes(prelude.plan, plain, everywhere=True)
+        pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
+        modes, tracks = (sum(estimated_bits(analyse(prelude, plain, sample.positions, some)[0].coefficients, pieces,
+                                            len(learned_modes.counts)) * sample.scale for sample in self.samples)
+                         for some in (None, learned_modes))
+        owners = np.repeat(np.arange(len(learned_modes.counts)), learned_modes.counts)
+        price = estimated_bits(learned_modes.integers, owners, len(learned_modes.counts))
+        return [(learned_modes.counts > 0) & ((tracks + price) * saving < modes) for saving in required_savings]
+
+    def _corrected(self, plan: Plan, corrections: np.ndarray) -> np.ndarray:
+        """Fractions of the corrections that fall on the pieces of each level."""
+        level_of_vertex = np.repeat(plan.base_level, plan.pieces["count"])
+        counts = np.bincount(level_of_vertex[corrections[:, 0]], minlength=self.levels)
+        return counts / counts.sum()
+
+    def _costs(self, candidates: list[Settings]) -> list[tuple[float, np.ndarray]]:
+        some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
+        with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
+            list(pool.map(self.prelude, some.values()))
+            costs = []
+            for cost in pool.map(self.cost, candidates):
+                costs.append(cost)
+                self._report()
+            return costs
+
+    def prelude(self, settings: Settings) -> CodedPrelude:
+        """As in earlier trials, where one had it."""
+        key = self._prelude_key(settings)
+        prelude = self._preludes.pop(key, None) or CodedPrelude(self.source, self.ath, settings)
+        self._preludes[key] = prelude  # the last one used
+        while len(self._preludes) > PRELUDES_KEPT:
+            self._preludes.pop(next(iter(self._preludes)))
+        return prelude
+
+    def _prelude_key(self, settings: Settings) -> tuple:
+        return settings.rest_step, settings.sheet.tobytes()
+
+    def _with_basis(self, settings: Settings) -> Settings:
+        """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
+        sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
+        if not self.source.sheet_like.any() or self.source.sheet_like.all():
+            sheets = sheets[1:]
+        rotations = {settings.rotation_step_factors}
+        if not any(settings.rotation_step_factors):
+            rotations.add((2,) * self.levels)
+        candidates = [replace(settings, sheet=sheet, rotation_step_factors=factors)
+                      for sheet in sheets for factors in sorted(rotations)]
+        return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
+
+    def _with_level_steps(self, settings: Settings) -> Settings:
+        """Coarser steps for levels whose vertices, and those that hang on them, may be further off."""
+        candidates = []
+        for part in qz.WEIGHT_PARTS:
+            least = self.source.level_weights(self.levels, part)
+            for power in (0.5, 1.0):
+                candidates.append(replace(settings, level_steps=least**power))
+        return self._cheapest([settings, *candidates])
+
+    def _with_rotations(self, settings: Settings) -> Settings:
+        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
+        candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
+        per_level = np.array([levels for _, levels in self._costs(candidates)])
+        mixed = replace(settings, rotation_step_factors=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
+        return self._cheapest([settings, mixed, *candidates])
+
+    def _cheapest(self, candidates: list[Settings]) -> Settings:
+        return self._cheapest_of(dict(enumerate(candidates)))[1]
+
+    def _cheapest_of(self, candidates: dict) -> tuple[Any, Settings]:
+        costs = [cost for cost, _ in self._costs(list(candidates.values()))]
+        return list(candidates.items())[int(np.argmin(costs))]
+
+    def _with_learned_bases(self, settings: Settings) -> Settings:
+        """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
+        learning = replace(settings, learned_bases=(True,) * self.levels)
+        (cost, cosines), (_, learned) = self._costs([settings, learning])
+        mixed = replace(settings, learned_bases=tuple((learned < cosines).tolist()))
+        return mixed if any(mixed.learned_bases) and self.cost(mixed)[0] < cost else settings
+
+    def _with_steps(self, settings: Settings) -> Settings:
+        return self._walk_steps(settings, 1.15, 1.4)
+
+    def _with_finer_steps(self, settings: Settings) -> Settings:
+        return self._walk_steps(settings, 1.04, 1.12)
+
+    def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
+        """Walks step and rest step in turn to the cheapest on geometric grids."""
+        for _ in range(WALKS):
+            before, settings = settings, self._walk(settings, "step", factor, math.inf)
+            if self.source.exact_rest:
+                break
+            settings = self._walk(settings, "rest_step", rest_factor, self.extrapolation.rest_cap * settings.bound)
+            if (settings.step, settings.rest_step) == (before.step, before.rest_step):
+                break
+        return settings
+
+    def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
+        def moved(exponent: int) -> Settings:
+            return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
+
+        def costs_at(exponents) -> dict[int, float]:
+            return dict(zip(exponents, (cost for cost, _ in self._costs([moved(e) for e in exponents]))))
+
+        costs = costs_at((-1, 0, 1))
+        while True:
+            best = min(costs, key=costs.get)
+            wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
+            if not wanted:
+                return moved(best)
+            costs |= costs_at(wanted)
+
+    def _with_node_steps(self, settings: Settings) -> Settings:
+        """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
+        prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
+        segment, _ = analyse(prelude, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
+        scale = self.source.clip.frame_count / self.sample.shape[2]
+        allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
+        roots = int((self.source.hierarchy.branch_parent < 0).sum())
+        chosen = limits = None
+        for quality in qz.NODE_QUALITIES:
+            steps = quality * errors
+            if roots <= qz.FEW_ROOTS:
+                steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
+            segment.clear_nodes()
+            segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
+            if limits is None:
+                size = sum(len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
+                           for level in self._map_levels(prelude.plan))
+                if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
+                    continue
+                chosen, limits = steps, self._errors_of_maps(prelude, segment)
+                limits[1:] = np.minimum(qz.NODE_ERROR_TOLERANCE * limits[1:], limits[:-1])  # deeper levels stay better
+            elif (self._errors_of_maps(prelude, segment) <= limits).all():
+                chosen = steps
+            else:
+                break
+        return replace(settings, node_steps=chosen)
+
+    def _map_levels(self, plan: Plan) -> list[int]:
+        return [level for level in range(self.levels) if plan.has_affines(level)]
+
+    def _errors_of_maps(self, prelude: CodedPrelude, segment: SegmentMotion) -> np.ndarray:
+        """RMS errors of the sample at the levels that have maps."""
+        poses = (segment.pose(level, prelude.origin, prelude.dtype) for level in self._map_levels(prelude.plan))
+        return np.sqrt([position_error(pose, self.sample, prelude.origin, prelude.plan.pool)[1] for pose in poses])

@@ -1,0 +1,85 @@
+"""What encoding reports of the file that it has written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class LevelSummary:
+    """One level of a file just written; errors in scene units."""
+
+    depth: int
+    nodes: int
+    bytes: int
+    max_error: float
+    rms_error: float
+
+
+@dataclass(frozen=True)
+class Seam:
+    """Where a loop begins again; lengths in scene units.
+
+    Attributes
+    ----------
+    clip : str
+        Name of the loop.
+    step : float
+        Largest distance that a vertex of the source moves from the last frame to the first.
+    step_beside : float
+        The same for the frames next to the seam; in a seamless loop both are alike.
+    error : float
+        Largest error of that step at the last level of the file.
+    """
+
+    clip: str
+    step: float
+    step_beside: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What `encode` has written.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    bytes, raw_bytes : int
+        Its size, and that of the positions as float32.
+    max_error_bound : float
+        Largest distance of any vertex in any frame from the source that the file promises, scene units.
+    relative_bound : float
+        The bound over the diagonal of the bounding box of all frames; 0 where that is a point.
+    table1 : dict
+        Nodes, height and mean subtree sizes of the ATH (Song, Yang and Peng 2011, table 1).
+    levels : list of LevelSummary
+        Coarse to fine.
+    chunk_bytes : dict of str to int
+        Bytes per kind of chunk (FORMAT.md), "HEADER" for header and tables.
+    choices : dict
+        The settings that the search chose.
+    seams : tuple of Seam
+        One for each loop.
+    found_branches : str or None
+        The branches that were found for a clip without, in words; None for a clip that has branches.
+    """
+
+    path: Path
+    bytes: int
+    raw_bytes: int
+    max_error_bound: float
+    relative_bound: float
+    table1: dict
+    depths: list[LevelSummary]
+    chunk_bytes: dict[str, int]
+    choices: dict
+    seams: tuple[Seam, ...] = ()
+    found_branches: str | None = None
+
+    @property
+    def ratio(self) -> float:
+        """Bytes of the raw positions over those of the whole file."""
+        return self.raw_bytes / self.bytes

@@ -1,0 +1,60 @@
+"""A thread pool for the work on one clip: ranges of arrays, or items that arrive one after the other.
+
+Neither how work is divided nor the order of results depends on the number of threads, so that a file does not either.
+Only work that releases the GIL (the C core, NumPy on large arrays) gains by it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+MOST = 4  # threads by default
+RANGE_NUMBERS = 3 << 18  # of an array, per call of a thread
+
+
+def default_jobs() -> int:
+    """Default number of threads: one per core, at most MOST."""
+    return min(MOST, os.cpu_count() or 1)
+
+
+class ThreadPool:
+    """`jobs` threads; a single job runs on the caller's thread, unless `beside` asks for another one.
+
+    Functions that the pool runs must not use the pool themselves.
+    """
+
+    def __init__(self, jobs: int = 1, beside: bool = False):
+        self.jobs = jobs
+        self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
+
+    def map(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
+        """function(*item) of all items, in order."""
+        if self._executor is None or len(items) < 2:
+            return [function(*item) for item in items]
+        return list(self._executor.map(lambda item: function(*item), items))
+
+    def ordered(self, function: Callable[[Any], Any], items: Iterable, ahead: int) -> Iterator:
+        """function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
+        if self._executor is None:
+            yield from map(function, items)
+            return
+        pending: deque[Future] = deque()
+        for item in items:
+            pending.append(self._executor.submit(function, item))
+            if len(pending) > ahead:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+
+
+SERIAL = ThreadPool()
+
+
+def ranges(count: int, numbers: int) -> list[tuple[int, int]]:
+    """Runs (start, stop) of 0 to count - 1 for one call each; rows hold `numbers` numbers."""
+    length = max(1, RANGE_NUMBERS // max(1, numbers))
+    return [(start, min(start + length, count)) for start in range(0, count, length)]
