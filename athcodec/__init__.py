@@ -11,6 +11,8 @@ from athcodec.joining import join, looped, split
 from athcodec.truncate import truncate
 
 if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
+    from athcodec.discovery import Found, find_branches
+    from athcodec.encoding import Summary, encode
     from athcodec.exporters import write, write_hdf5
     from athcodec.sources import read, read_hdf5, sample_path
 
