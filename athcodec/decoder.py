@@ -1,7 +1,7 @@
 """From an .ath file back to motion: any depth, any frames, any part that is there.
 
 `open` reads the prelude; a segment's chunks are read when one of its frames is asked for, and only those of the levels
-that the depth needs. Decoding is the C core's (player.py); this module feeds it bytes, says in words what it refuses,
+that the depth needs. Decoding is the C core's (core_file.py); this module feeds it bytes, says in words what it refuses,
 and reads the static data. It never imports the encoder.
 """
 
@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from athcodec import container as ct
-from athcodec import player
+from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
 from athcodec.ath import stem_maps
 from athcodec.clip import check_stem_index
@@ -140,12 +140,12 @@ class Decoder:
         self._clip = self.clips[0]
         self._damaged_from = self._first_damaged_level() if allow_partial else self.container.header.level_count
         self._lock = threading.Lock()
-        self._ready: dict[tuple[int, int], player.Segment] = {}  # the segment shown last, by (segment, depth)
+        self._ready: dict[tuple[int, int], core_file.Segment] = {}  # the segment shown last, by (segment, depth)
 
     def _read_prelude(self) -> None:
         try:
-            self._player = player.File(self.container.prelude(), player.Limits.of(self.limits))
-        except player.PlayError as error:
+            self._player = core_file.File(self.container.prelude(), core_file.Limits.of(self.limits))
+        except core_file.PlayError as error:
             raise self._refusal(error, "header") from None
 
     def _read_clips(self) -> tuple[Clip, ...]:
@@ -177,7 +177,7 @@ class Decoder:
             other.__dict__.pop(own, None)
         return other
 
-    def _refusal(self, error: player.PlayError, where: str) -> Exception:
+    def _refusal(self, error: core_file.PlayError, where: str) -> Exception:
         """What the core refused, in words."""
         refused = error_class(error.code)
         if error.chunk is not None:
@@ -402,7 +402,7 @@ class Decoder:
         """Rest pose as decoded, (N, 3), float32 or what the source had."""
         dtype = np.float64 if self._player.info.rest_wide else np.float32
         with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
-            return self._player.rest(player.SOURCE_ORDER).astype(dtype, copy=False)
+            return self._player.rest(core_file.SOURCE_ORDER).astype(dtype, copy=False)
 
     @property
     def origin(self) -> np.ndarray:
@@ -536,15 +536,15 @@ class Decoder:
         return index, index + 1
 
     @cached_property
-    def _work(self) -> player.Work:
-        return player.Work(self._player.work_size())
+    def _work(self) -> core_file.Work:
+        return core_file.Work(self._player.work_size())
 
     def _in_file(self, segment: int) -> int:
         """A segment of the clip, counted over the whole file."""
         return self._clip.first_segment + segment
 
     @contextmanager
-    def _prepared(self, segment: int, depth: int) -> Iterator[player.Segment]:
+    def _prepared(self, segment: int, depth: int) -> Iterator[core_file.Segment]:
         """A segment of the file ready to be shown, for the caller alone. Raises a FormatError, or LevelUnavailable."""
         with self._lock:
             ready = self._ready.pop((segment, depth), None)
@@ -557,13 +557,13 @@ class Decoder:
             with self._lock:
                 self._ready = {(segment, depth): ready}
 
-    def _prepare(self, segment: int, depth: int, spare: player.Segment | None) -> player.Segment:
+    def _prepare(self, segment: int, depth: int, spare: core_file.Segment | None) -> core_file.Segment:
         """Decodes a segment, into spare memory where that is large enough."""
         size = self._player.segment_size(depth)
         needed, limit = size + self._player.work_size(), self.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {depth}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
-        ready = spare if spare is not None and len(spare.memory) >= size else player.Segment(size)
+        ready = spare if spare is not None and len(spare.memory) >= size else core_file.Segment(size)
         missing = self._player.missing(depth, segment)
         if any(offset + size > self.container.available_length for offset, size in missing):
             raise LevelUnavailable(f"level {depth}, segment {segment}: not in the file; it is cut off at "
@@ -574,7 +574,7 @@ class Decoder:
             for (offset, _), data in zip(missing, bytes_there):
                 self._player.feed(data, offset)
             self._player.prepare(self._work, segment, depth, ready)
-        except player.PlayError as error:
+        except core_file.PlayError as error:
             raise self._refusal(error, f"segment {segment}") from None
         finally:
             for offset, size in missing:
@@ -630,7 +630,7 @@ class Decoder:
         with self._prepared(self._in_file(self._segment_of(frame)), depth) as ready:
             in_file = self._clip.first_frame + frame
             node_matrices = self._player.matrices(ready, in_file, len(nodes))
-            self._player.positions(ready, in_file, positions, player.FILE_ORDER)
+            self._player.positions(ready, in_file, positions, core_file.FILE_ORDER)
         try:
             maps = stem_maps(self.hierarchy, self._player.rest(), positions[None])
         except np.linalg.LinAlgError:

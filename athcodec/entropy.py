@@ -1,7 +1,7 @@
 """From integers to the bytes of a stream: one function per kind of stream of FORMAT.md.
 
 The models run in the C core; this module knows which arrays each takes. What the bytes are wrapped in (steps, flags) is
-the container's business. Reading streams is the player's (player.py).
+the container's business. Reading streams is the player's (core_file.py).
 """
 
 from __future__ import annotations

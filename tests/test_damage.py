@@ -21,7 +21,7 @@ import zstandard
 
 import athcodec
 from athcodec import container as ct
-from athcodec import entropy, errors, player
+from athcodec import core_file, entropy, errors
 from athcodec.container import Container, Limits
 from athcodec.errors import (BadChecksum, BadChunk, BadChunkTable, BadHeader, FormatError, LevelUnavailable,
                              LimitExceeded, NotAnAthFile, TrailingBytes, Truncated, UnknownChunk, UnsupportedVersion)
@@ -359,23 +359,23 @@ def some_limits(rng: np.random.Generator) -> Limits:
     """Mostly those by default; else one of the core's that may be too narrow, or wide."""
     if rng.random() < 0.8:
         return Limits()
-    names = [each.name for each in fields(Limits) if hasattr(player.Limits, each.name)]
+    names = [each.name for each in fields(Limits) if hasattr(core_file.Limits, each.name)]
     return Limits(**{rng.choice(names): int(rng.choice([5, 12, 20, 200])) << int(rng.choice([0, 0, 20]))})
 
 
 def both_readings(data: bytes, limits: Limits) -> str:
     """What container.py says of a front, once the core has said the same."""
-    core = player.Limits.of(limits)
+    core = core_file.Limits.of(limits)
     try:
         container = Container(BytesIO(data), limits=limits)
     except FormatError as error:
-        with pytest.raises(player.PlayError) as caught:
-            player.File(data, core)
-        assert caught.value.code == (player.MISSING if type(error) is Truncated else error.code), error
+        with pytest.raises(core_file.PlayError) as caught:
+            core_file.File(data, core)
+        assert caught.value.code == (core_file.MISSING if type(error) is Truncated else error.code), error
         return error.name
     try:
-        file = player.File(container.prelude(), core)
-    except player.PlayError as error:
+        file = core_file.File(container.prelude(), core)
+    except core_file.PlayError as error:
         with pytest.raises(errors.error_class(error.code)):
             opened(data, limits=limits)
         return "refused for what is behind the front"
@@ -421,10 +421,10 @@ def test_the_core_reads_many_fronts_as_the_container_does(data):
 def test_the_core_asks_for_more_of_any_front_that_is_not_whole(data):
     prelude = Container(BytesIO(data)).prelude_length
     for size in range(prelude):
-        with pytest.raises(player.PlayError, match="MISSING") as caught:
-            player.File(data[:size], player.Limits.of(Limits()))
-        assert caught.value.code == player.MISSING == 66
-    assert player.File(data[:prelude], player.Limits.of(Limits())).info.file_length == len(data)
+        with pytest.raises(core_file.PlayError, match="MISSING") as caught:
+            core_file.File(data[:size], core_file.Limits.of(Limits()))
+        assert caught.value.code == core_file.MISSING == 66
+    assert core_file.File(data[:prelude], core_file.Limits.of(Limits())).info.file_length == len(data)
 
 
 # ---- hostile chunks ----

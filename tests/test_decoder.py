@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import athcodec
-from athcodec import Thresholds, entropy, player
+from athcodec import Thresholds, core_file, entropy
 from athcodec import container as ct
 from athcodec._native import LOOSE
 from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
@@ -280,8 +280,8 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     """Forwards, backwards, as maps, in any type of numbers; another segment, or level, is prepared anew."""
     decoder, _ = played
     prepared = []
-    prepare = player.File.prepare
-    monkeypatch.setattr(player.File, "prepare", lambda file, work, segment, level, into: (
+    prepare = core_file.File.prepare
+    monkeypatch.setattr(core_file.File, "prepare", lambda file, work, segment, level, into: (
         prepared.append((segment, level)), prepare(file, work, segment, level, into)))
     (first, stop), last = decoder.segments[1], decoder.level_count - 1
     decoder.positions(first, last)
