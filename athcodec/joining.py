@@ -83,7 +83,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
 
 
 def with_notes(motion: Any) -> dict[str, Any]:
-    """Metadata of a clip or an Excerpt, as far as it has any, with its name and that it is a loop."""
+    """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
     span = next(iter(getattr(motion, "spans", ())), Span("", 0))
     metadata = getattr(motion, "metadata", None) or {}
     return metadata | ({NAME: span.name} if span.name else {}) | ({LOOP: True} if span.loop else {})

@@ -17,7 +17,7 @@ import athcodec
 from athcodec.cli import main
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
 from athcodec.sources import read
@@ -553,15 +553,15 @@ def far(a, b):
 def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
         for depth in range(decoder.level_count):
-            excerpt = Excerpt(decoder, depth)
+            view = ClipView(decoder, depth)
             path = tmp_path / f"{depth}.glb"
-            write(excerpt, path, animation="joints")
+            write(view, path, animation="joints")
             facts = facts_of(path)["athcodec"]
-            shown = excerpt.block(0, excerpt.frame_count)
+            shown = view.block(0, view.frame_count)
             gltf = pygltflib.GLTF2().load(str(path))
-            worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(excerpt.frame_count))
+            worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(view.frame_count))
             assert worst == pytest.approx(facts["max_error"], rel=1e-3, abs=1e-6)
-            assert worst <= 1.1 * max(excerpt.max_error, 1e-5 * np.linalg.norm(np.ptp(excerpt.rest, axis=0)))
+            assert worst <= 1.1 * max(view.max_error, 1e-5 * np.linalg.norm(np.ptp(view.rest, axis=0)))
             assert facts["depth"] == depth and facts["joints"] >= decoder.depths[depth].nodes
 
 
@@ -569,7 +569,7 @@ def test_from_a_source_through_ath_and_glb_within_the_bound(leafy, leafy_ath, tm
     with athcodec.open(leafy_ath) as decoder:
         bound = decoder.max_error_bound
         for animation, more in (("joints", 1.1 * bound), ("morphs", 1e-6), ("auto", 1.1 * bound)):
-            write(Excerpt(decoder), tmp_path / "a.glb", animation=animation)
+            write(ClipView(decoder), tmp_path / "a.glb", animation=animation)
             positions, clip = frames_of(tmp_path / "a.glb")
             assert far(positions, leafy.block(0, 40)) <= bound + more
             assert clip.time == pytest.approx(leafy.time - leafy.time[0], abs=1e-9)
@@ -722,7 +722,7 @@ def test_clips_keep_names_loops_and_motion_from_glb_through_ath_to_glb(seasons, 
 
 def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path):
     with athcodec.open(seasons_ath) as decoder:
-        write(Excerpt(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
+        write(ClipView(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
     gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
     moved = [{(channel.target.node, channel.target.path) for channel in each.channels} for each in gltf.animations]
     assert len(gltf.skins) == 1 and len(moved) == 4 and all(each == moved[0] for each in moved)

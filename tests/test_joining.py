@@ -14,7 +14,7 @@ from athcodec.cli import main
 from athcodec.clip import MotionClip, Span
 from athcodec.encoder import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 
 
 def distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -232,18 +232,18 @@ def test_split_gives_back_what_was_joined(medley_clips):
     assert athcodec.split(medley_clips["still"]) == {"": medley_clips["still"]}
 
 
-def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
+def test_a_clip_view_of_all_clips_is_what_each_is(medley_clips, medley_ath):
     with athcodec.open(medley_ath) as decoder:
-        excerpt = Excerpt(decoder, 1, all_clips=True)
+        view = ClipView(decoder, 1, all_clips=True)
         frames = np.concatenate([decoder.play(name).positions(depth=1) for name in medley_clips])
-        assert excerpt.spans == athcodec.join(medley_clips).spans
-        assert np.array_equal(np.concatenate([block for _, block in excerpt.blocks()]), frames)
-        assert [start for start, _ in excerpt.blocks()][:3] == [0, 10, 20]
+        assert view.spans == athcodec.join(medley_clips).spans
+        assert np.array_equal(np.concatenate([block for _, block in view.blocks()]), frames)
+        assert [start for start, _ in view.blocks()][:3] == [0, 10, 20]
         for start, stop in ((0, 90), (19, 21), (57, 58), (3, 5)):
-            assert np.array_equal(excerpt.block(start, stop), frames[start:stop])
-        assert np.array_equal(excerpt.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
-        assert excerpt.max_error == max(decoder.play(name).depths[1].max_error for name in medley_clips)
-        assert not Excerpt(decoder, 1, range(3)).spans[0].loop, "some frames of a loop are none"
+            assert np.array_equal(view.block(start, stop), frames[start:stop])
+        assert np.array_equal(view.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
+        assert view.max_error == max(decoder.play(name).depths[1].max_error for name in medley_clips)
+        assert not ClipView(decoder, 1, range(3)).spans[0].loop, "some frames of a loop are none"
 
 
 @pytest.mark.parametrize("kind", [each for each in exporters.FORMATS if not each.holds_several],
@@ -251,12 +251,12 @@ def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
 def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
     path = tmp_path / f"a{kind.suffixes[0]}"
     with athcodec.open(medley_ath) as decoder:
-        for several in (athcodec.join(medley_clips), Excerpt(decoder, all_clips=True)):
+        for several in (athcodec.join(medley_clips), ClipView(decoder, all_clips=True)):
             with pytest.raises(ClipError, match="several clips, calm, Böe, still, round; expected one .*--clip.*glb"):
                 athcodec.write(several, path)
         assert list(tmp_path.iterdir()) == []
         athcodec.write(medley_clips["calm"], path)
-        athcodec.write(Excerpt(decoder), path.with_stem("b"))
+        athcodec.write(ClipView(decoder), path.with_stem("b"))
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".npz"])
@@ -264,7 +264,7 @@ def test_name_and_loop_of_a_clip_go_through_a_file_of_the_schema(suffix, medley_
     path = tmp_path / f"a{suffix}"
     for name, loop in (("calm", True), ("Böe", False)):
         with athcodec.open(medley_ath, clip=name) as decoder:
-            athcodec.write(Excerpt(decoder), path)
+            athcodec.write(ClipView(decoder), path)
             with athcodec.read(path) as clip:
                 assert clip.spans == (Span(name, decoder.frame_count, loop),) and clip.metadata == decoder.metadata
     assert main(["encode", str(path), str(tmp_path / "a.ath")]) == 0

@@ -16,7 +16,7 @@ import pytest
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.exporters import openvat, vat, write
 from athcodec.sources import read
 from plants import plant
@@ -83,16 +83,16 @@ def shown_by_positions(folder, pixels):
 def test_a_shader_shows_every_level_within_the_stated_error(leafy_ath, tmp_path, half):  # noqa: F811
     with athcodec.open(leafy_ath) as decoder:
         for depth in range(decoder.level_count):
-            excerpt = Excerpt(decoder, depth, range(3, 30))
+            view = ClipView(decoder, depth, range(3, 30))
             folder = tmp_path / f"{depth}.vat"
-            write(excerpt, folder, half=half)
+            write(view, folder, half=half)
             frames, facts, _ = shown_by_matrices(folder)
-            wanted, size = excerpt.block(0, 27), float(np.linalg.norm(np.ptp(excerpt.rest, axis=0)))
+            wanted, size = view.block(0, 27), float(np.linalg.norm(np.ptp(view.rest, axis=0)))
             assert far(frames, wanted) == pytest.approx(facts["max_error"], rel=0.01, abs=1e-6 * size)
-            rounding = 2e-3 * np.abs(wanted - excerpt.rest).max() if half else 1e-6 * size
-            assert facts["max_error"] <= max(excerpt.max_error, 1e-5 * size) + rounding
+            rounding = 2e-3 * np.abs(wanted - view.rest).max() if half else 1e-6 * size
+            assert facts["max_error"] <= max(view.max_error, 1e-5 * size) + rounding
             assert (facts["depth"], facts["frames"], facts["start_frame"]) == (depth, 27, 3)
-            assert facts["level_max_error"] == excerpt.max_error
+            assert facts["level_max_error"] == view.max_error
             assert np.allclose(facts["bounds"]["min"], frames.min(axis=(0, 1)), atol=1e-5 * size)
 
 

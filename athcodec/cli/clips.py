@@ -15,10 +15,10 @@ from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
-from athcodec.excerpt import Excerpt
 from athcodec.files import check_target
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
@@ -68,14 +68,14 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
                       "--takes all makes a clip of each")
 
 
-def excerpt_of(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
+def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """What of a file is decoded: frames of a clip, or all clips."""
     if args.clip is not None or len(decoder.clips) == 1:
-        return Excerpt(decoder, args.depth, _frames(args.frames, decoder.frame_count))
+        return ClipView(decoder, args.depth, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
         names = ", ".join(clip.name for clip in decoder.clips)
         raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
-    return Excerpt(decoder, args.depth, all_clips=True)
+    return ClipView(decoder, args.depth, all_clips=True)
 
 
 def with_sources(decoder: Decoder, args: argparse.Namespace,
@@ -209,7 +209,7 @@ def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> 
 
 def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth: int) -> ErrorMeter:
     decoded = encoded.with_name(f"{encoded.stem}_level_{depth}.h5")
-    athcodec.write(Excerpt(decoder, depth), decoded)
+    athcodec.write(ClipView(decoder, depth), decoded)
     with athcodec.read_hdf5(decoded) as again:
         return compare_clips(clip, again)
 

@@ -19,13 +19,13 @@ from athcodec.cli.clips import (
     check_output,
     clip_to_encode,
     decode_and_measure,
-    excerpt_of,
     measure_against,
     naming,
     open_file,
     read_clip,
     refuse_broken_promises,
     thresholds,
+    view_to_decode,
     what_is_missing,
     with_branches,
     with_sources,
@@ -150,13 +150,13 @@ def hierarchy(args: argparse.Namespace) -> int:
 def decode(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     with open_file(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
-        excerpt = excerpt_of(decoder, args)
+        motion = view_to_decode(decoder, args)
         with progress() as report:
-            athcodec.write(excerpt, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
+            athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
-            say("warning", f"{args.input}: decoded to level {excerpt.depth}; {what_is_missing(decoder)}")
-        print(f"{args.output}: {excerpt.frame_count:,} frames, {excerpt.vertex_count:,} vertices, "
-              f"level {excerpt.depth}")
+            say("warning", f"{args.input}: decoded to level {motion.depth}; {what_is_missing(decoder)}")
+        print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
+              f"level {motion.depth}")
     return 0
 
 

@@ -1,7 +1,7 @@
 """Writers: one module per file format, mirroring sources/. Nothing here knows how .ath files are coded.
 
 `write` imports the module of the wanted format and no other. A module has one function,
-`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or an Excerpt of an .ath file.
+`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ FORMATS = (
 
 def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None,
           **options: object) -> None:
-    """Write a MotionClip or an Excerpt to `path`, which appears only when it is whole.
+    """Write a MotionClip or a ClipView to `path`, which appears only when it is whole.
 
     format    the name of one of FORMATS; None: known by the suffix
     options   see WriteOptions

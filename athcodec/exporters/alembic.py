@@ -46,7 +46,7 @@ Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or an Excerpt as .abc. Raises ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .abc. Raises ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder:
         try:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.hierarchy import build_hierarchy, hierarchy_of
 
 ROUNDS = 8
@@ -35,7 +35,7 @@ OF_CLIP = 1e-4  # of the clip's size, where there is no level
 def allowed_error(motion: Any) -> float:
     """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
     size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
-    return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, Excerpt) else OF_CLIP * size
+    return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, ClipView) else OF_CLIP * size
 
 
 @dataclass(eq=False)
@@ -161,7 +161,7 @@ def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[
 
 def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An order of the vertices, and ranges of it that are the parts to begin with."""
-    if isinstance(motion, Excerpt):
+    if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return motion.decoder.hierarchy.vertex_source, parts.first_vertex.astype(np.int64), (
             parts.vertex_count.astype(np.int64))

@@ -168,7 +168,7 @@ class Hdf5Writer:
 def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
-    `clip` is a MotionClip, an Excerpt, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
+    `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
     like them; stem_index, edges, faces, attributes, metadata, spans and rest_dtype are written where it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")

@@ -30,7 +30,7 @@ HIGHEST = 16384
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
                report: Callable[[float], None]) -> dict[str, Any]:
-    """Write a MotionClip or an Excerpt to the new folder `path`; returns what the JSON says. options.half: 16 bits in
+    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: 16 bits in
     place of float.
 
     Raises ClipError where the texture would be larger than engines take, FileExistsError where `path` exists.

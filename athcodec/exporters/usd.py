@@ -51,7 +51,7 @@ INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform",
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or an Excerpt as .usdc, .usda, .usdz or, binary, .usd. Raises ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd. Raises ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder, _saying(path):
         name = Path(path).name

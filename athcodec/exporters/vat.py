@@ -31,7 +31,7 @@ FLOAT16_MAX = 65504.0
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
                report: Callable[[float], None]) -> dict[str, Any]:
-    """Write a MotionClip or an Excerpt to the new folder `path`; returns what the JSON says. options.half: half
+    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
     Raises ClipError where there are more nodes than a texture takes, or motion that half precision cannot hold,

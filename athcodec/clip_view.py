@@ -16,10 +16,10 @@ from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
 
 
-class Excerpt:
+class ClipView:
     """Frames `frames` of `decoder` at level `depth` (None: the deepest complete one), vertices in the source's order.
 
-    It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the excerpt; time and
+    It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the view; time and
     metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
     one after the other, as a MotionClip of several spans has them. Raises LevelUnavailable where depth or frames do not
     exist.
@@ -113,7 +113,7 @@ class Excerpt:
         return polygons(self.faces, self.attributes)
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Frames start to stop - 1 of the excerpt, (stop - start, N, 3)."""
+        """Frames start to stop - 1 of the view, (stop - start, N, 3)."""
         found = []
         for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
             own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
@@ -128,7 +128,7 @@ class Excerpt:
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """What moves as one in frame `frame` of the excerpt; see Decoder.affines."""
+        """What moves as one in frame `frame` of the view; see Decoder.affines."""
         for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
             if first <= frame < last:
                 return decoder.affines(frames[frame - first], self.depth)
