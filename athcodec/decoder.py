@@ -38,7 +38,7 @@ from athcodec.errors import (
     Truncated,
     error_class,
 )
-from athcodec.files import is_url
+from athcodec.atomic_files import is_url
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.joining import metadata_of
 from athcodec.transform import balanced_segments

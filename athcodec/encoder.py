@@ -30,7 +30,7 @@ from athcodec.crew import Crew, default_jobs
 from athcodec.decoder import Decoder
 from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
-from athcodec.files import check_target, new_file
+from athcodec.atomic_files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.progress import Course, Progress
 from athcodec.progress import weights as stage_weights

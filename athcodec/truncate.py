@@ -6,7 +6,7 @@ import os
 
 from athcodec import container as ct
 from athcodec.errors import LevelUnavailable, Truncated
-from athcodec.files import new_file
+from athcodec.atomic_files import new_file
 
 
 def truncate(source, target, depth: int) -> int:

@@ -20,7 +20,7 @@ from urllib.parse import quote, urlsplit
 
 from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError, MissingExtra
-from athcodec.files import is_url, new_file
+from athcodec.atomic_files import is_url, new_file
 
 WEB = Path(__file__).parent / "viewer" / "web"
 PAGE = WEB / "index.html"

@@ -20,7 +20,7 @@ import pytest
 
 import athcodec
 from athcodec import cli, files
-from athcodec.files import Part, new_file
+from athcodec.atomic_files import PendingFile, new_file
 from athcodec.sources import sample_path
 from plants import plant
 
@@ -194,10 +194,10 @@ def test_the_input_is_not_replaced_by_the_output_under_another_name_either(verb,
     assert "is the input" in capsys.readouterr().err and source.read_bytes() == before
 
 
-def test_a_part_can_be_given_up_twice(tmp_path):
-    part = Part(tmp_path / "a.ath")
-    part.discard()
-    part.discard()
+def test_a_pending_file_can_be_discarded_twice(tmp_path):
+    pending = PendingFile(tmp_path / "a.ath")
+    pending.discard()
+    pending.discard()
     assert names(tmp_path) == set()
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.errors import ClipError, MissingExtra, RemoteError
-from athcodec.files import is_url
+from athcodec.atomic_files import is_url
 from athcodec.remote import _one_line, without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files

@@ -12,7 +12,7 @@ import os
 from typing import Any
 
 from athcodec.errors import AthError
-from athcodec.files import PLAIN_OPEN
+from athcodec.atomic_files import PLAIN_OPEN
 
 try:
     import fcntl

@@ -29,7 +29,7 @@ from athcodec.batch.manifest import Manifest, ManifestError, Record, read_record
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
-from athcodec.files import is_url, remove_leftovers_of, scratch_folder
+from athcodec.atomic_files import is_url, remove_leftovers_of, scratch_folder
 from athcodec.remote import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"

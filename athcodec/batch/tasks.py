@@ -24,7 +24,7 @@ from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoder import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
-from athcodec.files import is_url
+from athcodec.atomic_files import is_url
 from athcodec.transform import DEFAULT_SEGMENT, split_segments
 
 BETWEEN_REPORTS = 0.3  # seconds

@@ -19,7 +19,7 @@ from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
-from athcodec.files import check_target
+from athcodec.atomic_files import check_target
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.units import Length

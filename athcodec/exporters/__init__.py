@@ -13,7 +13,7 @@ from os import PathLike
 from typing import Any
 
 from athcodec.errors import ClipError
-from athcodec.files import check_target
+from athcodec.atomic_files import check_target
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]

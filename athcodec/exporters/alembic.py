@@ -32,7 +32,7 @@ from athcodec.exporters.parts import (
     rows_of,
     told,
 )
-from athcodec.files import new_files
+from athcodec.atomic_files import new_files
 from athcodec.sources.parts import OWN, turned_corners
 
 SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,

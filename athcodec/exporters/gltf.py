@@ -42,7 +42,7 @@ from athcodec.exporters.gltf_build import (
     takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
-from athcodec.files import new_file
+from athcodec.atomic_files import new_file
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20

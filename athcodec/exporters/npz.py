@@ -17,7 +17,7 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.files import new_file
+from athcodec.atomic_files import new_file
 from athcodec.hierarchy import branch_orders
 from athcodec.joining import with_notes
 from athcodec.sources.npz import METADATA

@@ -22,7 +22,7 @@ from athcodec.exporters.fitting import portions
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
-from athcodec.files import new_folder
+from athcodec.atomic_files import new_folder
 
 NARROWEST = 64
 HIGHEST = 16384

@@ -31,7 +31,7 @@ from athcodec.exporters.parts import (
     rows_of,
     told,
 )
-from athcodec.files import new_files
+from athcodec.atomic_files import new_files
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20

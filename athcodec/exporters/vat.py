@@ -22,7 +22,7 @@ from athcodec.exporters.fitting import Mapped, Moving, allowed_error, fit
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
-from athcodec.files import new_folder
+from athcodec.atomic_files import new_folder
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
