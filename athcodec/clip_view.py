@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import Span, polygons, span_frames
+from athcodec.clip import ClipRange, clip_range_frames, polygons
 from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
 
@@ -21,8 +21,8 @@ class ClipView:
 
     It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the view; time and
     metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
-    one after the other, as a MotionClip of several spans has them. Raises LevelUnavailable where depth or frames do not
-    exist.
+    one after the other, as a MotionClip of several clip ranges has them. Raises LevelUnavailable where depth or
+    frames do not exist.
     """
 
     def __init__(self, decoder: Decoder, depth: int | None = None, frames: range | None = None, *,
@@ -35,14 +35,14 @@ class ClipView:
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
     @property
-    def spans(self) -> tuple[Span, ...]:
+    def clip_ranges(self) -> tuple[ClipRange, ...]:
         """The clips; frames of a loop that are not all it has are no loop."""
-        return tuple(Span(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
+        return tuple(ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
                      for decoder, frames in self._runs)
 
     @property
-    def span_frames(self) -> list[tuple[int, int]]:
-        return span_frames(self.spans)
+    def clip_range_frames(self) -> list[tuple[int, int]]:
+        return clip_range_frames(self.clip_ranges)
 
     @property
     def frame_count(self) -> int:
@@ -115,7 +115,7 @@ class ClipView:
     def block(self, start: int, stop: int) -> np.ndarray:
         """Frames start to stop - 1 of the view, (stop - start, N, 3)."""
         found = []
-        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+        for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
             if own:
                 found.append(decoder.positions(slice(own.start, own.stop), self.depth))
@@ -123,13 +123,13 @@ class ClipView:
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over all frames, one segment in memory at a time."""
-        for (decoder, frames), (first, _) in zip(self._runs, self.span_frames):
+        for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
             for start, block in decoder.blocks(self.depth, frames=slice(frames.start, frames.stop)):
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
         """What moves as one in frame `frame` of the view; see Decoder.affines."""
-        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+        for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
                 return decoder.affines(frames[frame - first], self.depth)
         raise IndexError(f"frame {frame}: expected 0 to {self.frame_count - 1}")

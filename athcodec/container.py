@@ -20,7 +20,7 @@ import numpy as np
 import zstandard
 
 from athcodec._native import SEGMENT_FRAMES, crc32c
-from athcodec.clip import Span
+from athcodec.clip import ClipRange
 from athcodec.errors import (
     BadChecksum,
     BadChunk,
@@ -459,13 +459,14 @@ def _steady_step(method: int, time: np.ndarray) -> float | None:
         return next(fit, None)
 
 
-def pack_clips(spans: Sequence[Span], segment_counts: Sequence[int], seams: Sequence[Sequence[float] | None]) -> bytes:
+def pack_clips(clip_ranges: Sequence[ClipRange], segment_counts: Sequence[int],
+               seams: Sequence[Sequence[float] | None]) -> bytes:
     """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32."""
     entries = []
-    for span, segments, errors in zip(spans, segment_counts, seams):
-        name = span.name.encode()
-        entries.append(_CLIP.pack(span.frame_count, segments, int(span.loop), len(name)) + name)
-        if span.loop:
+    for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
+        name = clip_range.name.encode()
+        entries.append(_CLIP.pack(clip_range.frame_count, segments, int(clip_range.loop), len(name)) + name)
+        if clip_range.loop:
             entries.append(_round_up(errors).astype("<f4").tobytes())
     return b"".join(entries)
 

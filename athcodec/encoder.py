@@ -24,13 +24,13 @@ from athcodec import container as ct
 from athcodec import entropy
 from athcodec import quantize as qz
 from athcodec.ath import Ath, Survey, Thresholds, survey
+from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.crew import Crew, default_jobs
 from athcodec.decoder import Decoder
 from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
-from athcodec.atomic_files import check_target, new_file
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.progress import Course, Progress
 from athcodec.progress import weights as stage_weights
@@ -190,7 +190,8 @@ def _course(clip: MotionClip, progress: Progress | None, segment_frames: int | N
     segments = split_segments(clip.frame_count, clip.vertex_count, segment_frames or DEFAULT_SEGMENT,
                               ct.Limits.memory_bytes)
     return Course(progress, stage_weights(clip.vertex_count, segments, effort,
-                                          samples=min(SAMPLES, len(clip.span_frames)), branches=not clip.has_branches,
+                                          samples=min(SAMPLES, len(clip.clip_range_frames)),
+                                          branches=not clip.has_branches,
                                           sizes=target_size is not None, motion=not draft))
 
 
@@ -424,7 +425,7 @@ class _Job:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
-        if any(span.loop for span in self.clip.spans):
+        if any(clip_range.loop for clip_range in self.clip.clip_ranges):
             with Decoder(out, strict=True) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
             out.seek(0)
@@ -442,21 +443,22 @@ class _Job:
             store.add(ct.SHAPES, stream, level)
         errors = self._add_motion(store, shape, coded)
         self._add_static(store)
-        if self.clip.spans:
-            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.spans)))
+        if self.clip.clip_ranges:
+            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
                            self.segment_count, len(errors), len(errors),
                            0.0 if self.lossless else self.source.largest_bound(decided.settings.bound),
-                           self.clip.dtype == np.float64, len(self.clip.span_frames))
+                           self.clip.dtype == np.float64, len(self.clip.clip_range_frames))
         return _Result(store, header, errors)
 
     def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
-        return ct.pack_clips(self.clip.spans, [len(segments) for segments in self.source.span_segments], seam_errors)
+        segment_counts = [len(segments) for segments in self.source.clip_range_segments]
+        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
         return [self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-                for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames)]
+                for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)]
 
     @staticmethod
     def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
@@ -474,7 +476,7 @@ class _Job:
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
         """Of the loops of the file just written."""
         seams = []
-        for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames):
+        for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames):
             if clip.loop:
                 beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
                 step, *steps = (np.linalg.norm(self._step(*frames), axis=1).max()
@@ -487,7 +489,7 @@ class _Job:
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
                                                   shape.hierarchy_stream))
         store.add(ct.REST, ct.pack_rest(shape.rest_chunk))
-        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.span_frames)))
+        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
         metadata = self.clip.metadata if self.keep_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
         if metadata:

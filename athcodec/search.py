@@ -60,10 +60,10 @@ class Sample:
 
 def samples_of(source: Source) -> list[Sample]:
     """The segment in the middle of a clip; of several clips those of a few, from calm to wild, each for its like."""
-    middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
+    middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
         return [Sample(source.positions(middles[0]), source.clip.frame_count)]
-    lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
+    lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(np.argsort([_moved(source, each) for each in middles], kind="stable"),
                             min(SAMPLES, len(middles)))
     return [Sample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups]

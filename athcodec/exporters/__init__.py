@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from athcodec.errors import ClipError
 from athcodec.atomic_files import check_target
+from athcodec.errors import ClipError
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
@@ -79,9 +79,9 @@ def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, 
 
 
 def _check_clips(motion: Any, kind: Format) -> None:
-    spans = getattr(motion, "spans", ())
-    if len(spans) > 1 and not kind.holds_several:
-        names = ", ".join(span.name for span in spans)
+    clip_ranges = getattr(motion, "clip_ranges", ())
+    if len(clip_ranges) > 1 and not kind.holds_several:
+        names = ", ".join(clip_range.name for clip_range in clip_ranges)
         suffixes = " ".join(suffix for each in FORMATS if each.holds_several for suffix in each.suffixes)
         raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
                         f"athcodec.open or athcodec.split), or {suffixes}, which holds all")

@@ -17,10 +17,10 @@ from typing import Any
 import h5py
 import numpy as np
 
+from athcodec.atomic_files import PendingFile
 from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.atomic_files import PendingFile
 from athcodec.hierarchy import branch_orders
 from athcodec.joining import with_notes
 
@@ -169,7 +169,7 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
     `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata, spans and rest_dtype are written where it has them.
+    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and rest_dtype are written where it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
     rest = np.asarray(clip.rest)
