@@ -70,7 +70,7 @@ class Source:
         return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
 
     @property
-    def reach(self) -> float:
+    def extent(self) -> float:
         """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
         low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)
         high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)

@@ -24,6 +24,7 @@ from athcodec import container as ct
 from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
 from athcodec.ath import stem_maps
+from athcodec.atomic_files import is_url
 from athcodec.clip import check_stem_index
 from athcodec.container import Container, Limits
 from athcodec.errors import (
@@ -38,7 +39,6 @@ from athcodec.errors import (
     Truncated,
     error_class,
 )
-from athcodec.atomic_files import is_url
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.joining import metadata_of
 from athcodec.transform import balanced_segments

@@ -125,8 +125,8 @@ def encode(clip: MotionClip, path, *, max_error: float | None = None, rel_error:
 class Draft:
     """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
 
-    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `mark` tells
-    a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `fingerprint`
+    tells a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
     """
 
     settings: Settings
@@ -136,7 +136,7 @@ class Draft:
     found: Found | None  # branches, for a clip without
     weights: str | np.ndarray | None
     options: dict  # what _Job takes besides
-    mark: str
+    fingerprint: str
 
 
 @dataclass(frozen=True)
@@ -297,9 +297,9 @@ def _relative_bound(fraction: float | None, job: _Job) -> float:
     """A fraction (None: the default) of the diagonal; where nothing has any extent, of that with the rest pose."""
     least = 2 * qz.least_bound(job.seen.low, job.seen.high, job.clip.dtype)
     if fraction is None and job.lossless:
-        return max(LOSSLESS_REL_ERROR * job.source.reach, least, job.source.reach / qz.LARGEST_REACH)
+        return max(LOSSLESS_REL_ERROR * job.source.extent, least, job.source.extent / qz.LARGEST_EXTENT)
     fraction = fraction or DEFAULT_REL_ERROR
-    return fraction * job.seen.diagonal if job.seen.diagonal > 0 else max(fraction * job.source.reach, least)
+    return fraction * job.seen.diagonal if job.seen.diagonal > 0 else max(fraction * job.source.extent, least)
 
 
 def _survey_options(tam: Thresholds | None) -> dict:
@@ -316,7 +316,7 @@ class _Decided:
     shapes: Shapes | None
 
     @property
-    def mark(self) -> str:
+    def fingerprint(self) -> str:
         return hashlib.sha256(self.shape.hierarchy_stream + self.shape.rest_chunk.stream).hexdigest()
 
 
@@ -397,7 +397,7 @@ class _Job:
     def decide(self, bound: float) -> _Decided:
         """Searches for settings."""
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
-                       self.source.reach)
+                       self.source.extent)
         ath = self.seen.ath(self.thresholds(bound))
         return _Decided(ath, *decide(self.source, ath, bound, self.effort, self.report, self.jobs))
 
@@ -405,13 +405,13 @@ class _Job:
         options = {"tam": self.tam, "keep_static": self.keep_static, "effort": self.effort, "lossless": self.lossless,
                    "segment_frames": self.source.segment_frames, "exact_rest": self.source.exact_rest}
         return Draft(decided.settings, decided.shapes, self.seen, self.segment_count, self.found, self.weights, options,
-                     decided.mark)
+                     decided.fingerprint)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         ath = self.seen.ath(self.thresholds(draft.settings.bound))
         decided = _Decided(ath, draft.settings, Shape(self.source, ath, draft.settings), draft.shapes)
-        if decided.mark != draft.mark:
+        if decided.fingerprint != draft.fingerprint:
             raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
                             "on machines that calculate alike")
         return decided

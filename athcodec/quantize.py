@@ -21,7 +21,7 @@ LARGEST_SHAPE = 2.0**20
 SHAPE_DOUBTS = (1.0, 1.25)  # how much shapes must seem to save, to be tried for a piece
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
-LARGEST_REACH = 2.0**28  # motion over bound: what corrections alone could still express
+LARGEST_EXTENT = 2.0**28  # motion over bound: what corrections alone could still express
 REST_CAP = 1.6  # rest pose step over bound: there its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # where no vertex's can be beyond it
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
@@ -43,16 +43,16 @@ def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
     return max(2 * float(np.spacing(largest)), SMALLEST_BOUND)
 
 
-def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, reach: float) -> None:
-    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `reach`."""
+def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, extent: float) -> None:
+    """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `extent`."""
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound > least):
         reason = ("the smallest that a file can hold" if least == SMALLEST_BOUND else
                   f"twice the spacing of the source's {np.dtype(dtype).name} coordinates")
         raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
-    if reach > LARGEST_REACH * bound:
-        raise BoundError(f"max error: got {bound:.3g}; expected at least {reach / LARGEST_REACH:.3g} for positions "
-                         f"and a rest pose that are up to {reach:.3g} apart")
+    if extent > LARGEST_EXTENT * bound:
+        raise BoundError(f"max error: got {bound:.3g}; expected at least {extent / LARGEST_EXTENT:.3g} for positions "
+                         f"and a rest pose that are up to {extent:.3g} apart")
 
 
 def single(value: float) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 
 from athcodec import container as ct
-from athcodec.errors import LevelUnavailable, Truncated
 from athcodec.atomic_files import new_file
+from athcodec.errors import LevelUnavailable, Truncated
 
 
 def truncate(source, target, depth: int) -> int:

@@ -23,8 +23,8 @@ from typing import Any
 
 from athcodec import discovery
 from athcodec.ath import Thresholds
-from athcodec.errors import ClipError
 from athcodec.atomic_files import is_url
+from athcodec.errors import ClipError
 from athcodec.search import EFFORTS
 from athcodec.sources import FORMATS, format_named
 from athcodec.transform import MAX_SEGMENT, MIN_SEGMENT

@@ -19,12 +19,12 @@ from typing import Any
 import athcodec
 from athcodec import container as ct
 from athcodec import discovery, encoder
+from athcodec.atomic_files import is_url
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoder import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
-from athcodec.atomic_files import is_url
 from athcodec.transform import DEFAULT_SEGMENT, split_segments
 
 BETWEEN_REPORTS = 0.3  # seconds
@@ -224,6 +224,6 @@ def _reporter(item: Item, topic: str | None) -> Report:
         nonlocal last
         if time.monotonic() - last >= BETWEEN_REPORTS:
             last = time.monotonic()
-            worker.log_event(topic, {"clip": item.mark, "stage": stage, "fraction": fraction})
+            worker.log_event(topic, {"clip": item.fingerprint, "stage": stage, "fraction": fraction})
 
     return report

@@ -13,13 +13,13 @@ from typing import Any
 import athcodec
 from athcodec import discovery
 from athcodec.ath import Thresholds
+from athcodec.atomic_files import check_target
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder, Depth
 from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
-from athcodec.atomic_files import check_target
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.units import Length

@@ -24,8 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.atomic_files import new_file
 from athcodec.clip_view import ClipView
+from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import (
@@ -42,7 +43,6 @@ from athcodec.exporters.gltf_build import (
     takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
-from athcodec.atomic_files import new_file
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
