@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import cli, files
+from athcodec import atomic_files, cli
 from athcodec.atomic_files import PendingFile, new_file
 from athcodec.sources import sample_path
 from plants import plant
@@ -85,7 +85,7 @@ def test_a_part_whose_writer_cannot_be_asked_stays(tmp_path, monkeypatch):
     def refuse(*_):
         raise OSError(37, "No locks available")
 
-    monkeypatch.setattr(files.fcntl, "flock", refuse)
+    monkeypatch.setattr(atomic_files.fcntl, "flock", refuse)
     (tmp_path / DEAD).write_bytes(b"who knows")
     with new_file(tmp_path / "target.ath") as out:
         out.write(b"new")
