@@ -1,4 +1,4 @@
-"""Some frames of an .ath file at one depth, or all its clips, in the shape of a clip: what exporters write.
+"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip: what exporters write.
 
 It decodes nothing itself (decoder.py) and knows no file format (exporters/).
 """
@@ -17,20 +17,20 @@ from athcodec.errors import LevelUnavailable
 
 
 class ClipView:
-    """Frames `frames` of `decoder` at level `depth` (None: the deepest complete one), vertices in the source's order.
+    """Frames `frames` of `decoder` at `level` (None: the deepest complete one), vertices in the source's order.
 
     It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the view; time and
     metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
-    one after the other, as a MotionClip of several clip ranges has them. Raises LevelUnavailable where depth or
+    one after the other, as a MotionClip of several clip ranges has them. Raises LevelUnavailable where level or
     frames do not exist.
     """
 
-    def __init__(self, decoder: Decoder, depth: int | None = None, frames: range | None = None, *,
+    def __init__(self, decoder: Decoder, level: int | None = None, frames: range | None = None, *,
                  all_clips: bool = False):
         self.decoder = decoder
-        self.depth = decoder.deepest if depth is None else depth
-        if not 0 <= self.depth < decoder.level_count:
-            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {decoder.level_count - 1}")
+        self.level = decoder.deepest if level is None else level
+        if not 0 <= self.level < decoder.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
@@ -62,8 +62,8 @@ class ClipView:
 
     @property
     def max_error(self) -> float:
-        """The largest distance of any vertex in any frame of its clips at this depth from the source."""
-        return max(decoder.depths[self.depth].max_error for decoder, _ in self._runs)
+        """The largest distance of any vertex in any frame of its clips at this level from the source."""
+        return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)
 
     @property
     def time(self) -> np.ndarray:
@@ -118,20 +118,20 @@ class ClipView:
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
             if own:
-                found.append(decoder.positions(slice(own.start, own.stop), self.depth))
+                found.append(decoder.positions(slice(own.start, own.stop), self.level))
         return found[0] if len(found) == 1 else np.concatenate(found)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over all frames, one segment in memory at a time."""
         for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
-            for start, block in decoder.blocks(self.depth, frames=slice(frames.start, frames.stop)):
+            for start, block in decoder.blocks(self.level, frames=slice(frames.start, frames.stop)):
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
         """What moves as one in frame `frame` of the view; see Decoder.affines."""
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
-                return decoder.affines(frames[frame - first], self.depth)
+                return decoder.affines(frames[frame - first], self.level)
         raise IndexError(f"frame {frame}: expected 0 to {self.frame_count - 1}")
 
 

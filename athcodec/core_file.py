@@ -233,6 +233,6 @@ class File:
                                           out.ctypes.data, 12 * out.itemsize))
         return out
 
-    def depth_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
+    def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
         return lib.ath_depth_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)

@@ -1,7 +1,7 @@
-"""From an .ath file back to motion: any depth, any frames, any part that is there.
+"""From an .ath file back to motion: any level, any frames, any part that is there.
 
 `open` reads the prelude; a segment's chunks are read when one of its frames is asked for, and only those of the levels
-that the depth needs. Decoding is the C core's (core_file.py); this module feeds it bytes, says in words what it refuses,
+that the level needs. Decoding is the C core's (core_file.py); this module feeds it bytes, says in words what it refuses,
 and reads the static data. It never imports the encoder.
 """
 
@@ -49,10 +49,10 @@ TABLE_KEYS = ("epsilon", "eta", "xi", "lam")
 
 
 @dataclass(frozen=True)
-class Depth:
+class Level:
     """One level of detail: bytes of the file cut after it, errors in scene units against the source."""
 
-    depth: int
+    level: int
     nodes: int
     bytes: int
     max_error: float
@@ -140,7 +140,7 @@ class Decoder:
         self._clip = self.clips[0]
         self._damaged_from = self._first_damaged_level() if allow_partial else self.container.header.level_count
         self._lock = threading.Lock()
-        self._ready: dict[tuple[int, int], core_file.Segment] = {}  # the segment shown last, by (segment, depth)
+        self._ready: dict[tuple[int, int], core_file.Segment] = {}  # the segment shown last, by (segment, level)
 
     def _read_prelude(self) -> None:
         try:
@@ -250,7 +250,7 @@ class Decoder:
 
     @property
     def level_count(self) -> int:
-        """Stored levels: depths run from 0 to level_count - 1."""
+        """Stored levels: 0 to level_count - 1."""
         return self.container.header.level_count
 
     @property
@@ -309,18 +309,18 @@ class Decoder:
                 missing[chunk.level].add(chunk.segment)
         return {level: sorted(segments) for level, segments in missing.items()}
 
-    def available(self, depth: int) -> bool:
-        """Whether all segments of all levels up to `depth` are there and undamaged."""
-        return depth < self._damaged_from and not any(self._missing_segments[d] for d in range(depth + 1))
+    def available(self, level: int) -> bool:
+        """Whether all segments of all levels up to `level` are there and undamaged."""
+        return level < self._damaged_from and not any(self._missing_segments[d] for d in range(level + 1))
 
     @property
     def deepest(self) -> int:
         """Deepest complete level. Raises Truncated where not even level 0 is complete."""
-        depth = max((d for d in range(self.level_count) if self.available(d)), default=-1)
-        if depth < 0:
+        level = max((d for d in range(self.level_count) if self.available(d)), default=-1)
+        if level < 0:
             raise Truncated(f"level 0: got {self.container.available_length} bytes; expected at least "
                             f"{self.container.level_end(0)}")
-        return depth
+        return level
 
     @property
     def missing(self) -> str:
@@ -341,33 +341,33 @@ class Decoder:
         ends = np.append(runs["first"] + runs["count"], 0)  # -1: before the first run
         return np.flatnonzero(self.branches["first"] < ends[run])
 
-    def nodes_at(self, depth: int) -> int:
-        """Parts that the plant is made of at `depth`: exact stems, and subtrees that move as one."""
-        parts = self._player.cut(depth)
+    def nodes_at(self, level: int) -> int:
+        """Parts that the plant is made of at `level`: exact stems, and subtrees that move as one."""
+        parts = self._player.cut(level)
         return len(self._exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     @property
-    def depths(self) -> list[Depth]:
+    def levels(self) -> list[Level]:
         """The stored levels, coarse to fine."""
-        return self._depths(self._clip)
+        return self._levels(self._clip)
 
-    def _depths(self, *clips: Clip) -> list[Depth]:
+    def _levels(self, *clips: Clip) -> list[Level]:
         """With the errors of these clips."""
         segments = [segment for clip in clips for segment in clip.segments]
         bounds = [np.array(balanced_segments(clip.frame_count, clip.segment_count)) for clip in clips]
         frames = np.concatenate([stops - starts for starts, stops in (each.T for each in bounds)])
         result = []
-        for depth, errors in enumerate(self.container.errors[:, segments]):
+        for level, errors in enumerate(self.container.errors[:, segments]):
             rms = float(np.sqrt((errors[:, 1] ** 2 * frames).sum() / frames.sum()))
-            result.append(Depth(depth, self.nodes_at(depth), self.container.level_end(depth),
-                                float(errors[:, 0].max()), rms, self.available(depth)))
+            result.append(Level(level, self.nodes_at(level), self.container.level_end(level),
+                                float(errors[:, 0].max()), rms, self.available(level)))
         return result
 
-    def depth_for(self, distance: float, fov: float, height: float, pixels: float = 1.0) -> int:
+    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0) -> int:
         """The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of
         view of `fov` (radians) on a screen of `height` pixels, is at most `pixels`; the deepest where none is.
         """
-        return self._player.depth_for(self._clip.segments, distance, fov, height, pixels)
+        return self._player.level_for(self._clip.segments, distance, fov, height, pixels)
 
     def table1(self) -> dict:
         """The paper's table 1: depth, nodes, leaves and the four parameters of the ATH."""
@@ -386,13 +386,13 @@ class Decoder:
             "branches": self.branch_count, "segments": self.container.header.segment_count,
             "nodes": self._player.info.node_count, "bytes": self.file_length,
             "available_bytes": self.container.available_length, "max_error_bound": self.max_error_bound,
-            "complete": self.complete, "levels": self.level_count, "full_levels": self.full_level_count,
+            "complete": self.complete, "full_level_count": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
             "clips": [{"name": clip.name, "frames": clip.frame_count, "segments": clip.segment_count,
                        "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors),
-                       "max_errors": [depth.max_error for depth in self._depths(clip)]} for clip in self.clips],
-            "depths": [{"depth": d.depth, "nodes": d.nodes, "bytes": d.bytes, "max_error": d.max_error,
-                        "rms_error": d.rms_error, "available": d.available} for d in self._depths(*self.clips)],
+                       "max_errors": [level.max_error for level in self._levels(clip)]} for clip in self.clips],
+            "levels": [{"level": d.level, "nodes": d.nodes, "bytes": d.bytes, "max_error": d.max_error,
+                        "rms_error": d.rms_error, "available": d.available} for d in self._levels(*self.clips)],
         }
 
     # ---- static data, in the source's numbering ----
@@ -515,12 +515,12 @@ class Decoder:
 
     # ---- motion ----
 
-    def _check_depth(self, depth: int | None) -> int:
-        if depth is None:
+    def _check_level(self, level: int | None) -> int:
+        if level is None:
             return self.deepest
-        if not 0 <= depth < self.level_count:
-            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {self.level_count - 1}")
-        return depth
+        if not 0 <= level < self.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
+        return level
 
     def _check_frames(self, frames) -> tuple[int, int]:
         if frames is None:
@@ -544,36 +544,36 @@ class Decoder:
         return self._clip.first_segment + segment
 
     @contextmanager
-    def _prepared(self, segment: int, depth: int) -> Iterator[core_file.Segment]:
+    def _prepared(self, segment: int, level: int) -> Iterator[core_file.Segment]:
         """A segment of the file ready to be shown, for the caller alone. Raises a FormatError, or LevelUnavailable."""
         with self._lock:
-            ready = self._ready.pop((segment, depth), None)
+            ready = self._ready.pop((segment, level), None)
             if ready is None:
                 spare = self._ready.popitem()[1] if self._ready else None
-                ready = self._prepare(segment, depth, spare)
+                ready = self._prepare(segment, level, spare)
         try:
             yield ready
         finally:
             with self._lock:
-                self._ready = {(segment, depth): ready}
+                self._ready = {(segment, level): ready}
 
-    def _prepare(self, segment: int, depth: int, spare: core_file.Segment | None) -> core_file.Segment:
+    def _prepare(self, segment: int, level: int, spare: core_file.Segment | None) -> core_file.Segment:
         """Decodes a segment, into spare memory where that is large enough."""
-        size = self._player.segment_size(depth)
+        size = self._player.segment_size(level)
         needed, limit = size + self._player.work_size(), self.limits.memory_bytes
         if needed > limit:
-            raise LimitExceeded(f"level {depth}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
+            raise LimitExceeded(f"level {level}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
         ready = spare if spare is not None and len(spare.memory) >= size else core_file.Segment(size)
-        missing = self._player.missing(depth, segment)
+        missing = self._player.missing(level, segment)
         if any(offset + size > self.container.available_length for offset, size in missing):
-            raise LevelUnavailable(f"level {depth}, segment {segment}: not in the file; it is cut off at "
+            raise LevelUnavailable(f"level {level}, segment {segment}: not in the file; it is cut off at "
                                    f"{self.container.available_length} of {self.file_length} bytes")
         self.container.prefetch(missing)
         bytes_there = [as_bytes(self.container.read(offset, size)) for offset, size in missing]
         try:
             for (offset, _), data in zip(missing, bytes_there):
                 self._player.feed(data, offset)
-            self._player.prepare(self._work, segment, depth, ready)
+            self._player.prepare(self._work, segment, level, ready)
         except core_file.PlayError as error:
             raise self._refusal(error, f"segment {segment}") from None
         finally:
@@ -581,53 +581,53 @@ class Decoder:
                 self._player.drop(offset, size)
         return ready
 
-    def _prefetched(self, depth: int, first: int, last: int) -> range:
+    def _prefetched(self, level: int, first: int, last: int) -> range:
         """The segments that hold the frames first to last - 1; what they need is there, if they are more than one."""
         segments = self._segments_within(first, last)
         if len(segments) > 1:
             with self._lock:
-                self.container.prefetch(self._player.missing(depth, *map(self._in_file, (segments[0], segments[-1]))))
+                self.container.prefetch(self._player.missing(level, *map(self._in_file, (segments[0], segments[-1]))))
         return segments
 
-    def _show(self, segment: int, depth: int, start: int, out: np.ndarray) -> None:
+    def _show(self, segment: int, level: int, start: int, out: np.ndarray) -> None:
         """Fills `out`, (k, N, 3) float32 or float64, with the frames from `start` on, in the source's order."""
-        with self._prepared(self._in_file(segment), depth) as ready:
+        with self._prepared(self._in_file(segment), level) as ready:
             for i, frame in enumerate(out, self._clip.first_frame + start):
                 self._player.positions(ready, i, frame)
 
-    def blocks(self, depth: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
+    def blocks(self, level: int | None = None, dtype=None, frames=None) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over the segments that hold the frames, one segment in memory at a time."""
-        depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
-        for index in self._prefetched(depth, first, last):
+        level, (first, last) = self._check_level(level), self._check_frames(frames)
+        for index in self._prefetched(level, first, last):
             start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
-            yield low, self.positions(slice(low, high), depth, dtype)
+            yield low, self.positions(slice(low, high), level, dtype)
 
-    def positions(self, frames=None, depth: int | None = None, dtype=None) -> np.ndarray:
+    def positions(self, frames=None, level: int | None = None, dtype=None) -> np.ndarray:
         """Positions in the source's vertex order: (N, 3) for one frame, (T, N, 3) for a slice or None (all).
 
-        depth: level of detail, by default the deepest that is complete. Raises LevelUnavailable, or a FormatError.
+        level: of detail, by default the deepest that is complete. Raises LevelUnavailable, or a FormatError.
         """
-        depth, (first, last) = self._check_depth(depth), self._check_frames(frames)
+        level, (first, last) = self._check_level(level), self._check_frames(frames)
         dtype = np.dtype(dtype or self.dtype)
         shown = np.empty((last - first, self.vertex_count, 3), dtype if dtype in SHOWN_TYPES else self.dtype)
-        for index in self._prefetched(depth, first, last):
+        for index in self._prefetched(level, first, last):
             start, stop = self.segments[index]
             low, high = max(start, first), min(stop, last)
-            self._show(index, depth, low, shown[low - first: high - first])
+            self._show(index, level, low, shown[low - first: high - first])
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
-    def affines(self, frame: int, depth: int | None = None) -> Affines:
-        """The cut at `depth` as matrices: nodes that move as one, and the least-squares maps of exact stems.
+    def affines(self, frame: int, level: int | None = None) -> Affines:
+        """The cut at `level` as matrices: nodes that move as one, and the least-squares maps of exact stems.
 
         Matrices take absolute rest positions (self.rest) to absolute positions (paper, eq. 2). Raises as `positions`.
         """
-        depth, (frame, _) = self._check_depth(depth), self._check_frames(frame)
-        parts = self._player.cut(depth)
+        level, (frame, _) = self._check_level(level), self._check_frames(frame)
+        parts = self._player.cut(level)
         nodes, stems = parts[parts["branch"] >= 0], self._exact_branches(parts)
         positions = np.empty((self.vertex_count, 3))
-        with self._prepared(self._in_file(self._segment_of(frame)), depth) as ready:
+        with self._prepared(self._in_file(self._segment_of(frame)), level) as ready:
             in_file = self._clip.first_frame + frame
             node_matrices = self._player.matrices(ready, in_file, len(nodes))
             self._player.positions(ready, in_file, positions, core_file.FILE_ORDER)
@@ -649,12 +649,12 @@ class Decoder:
         """The segments that hold the frames from `first` on, `last` not included."""
         return range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
 
-    def residual(self, frame: int, depth: int | None = None) -> np.ndarray:
+    def residual(self, frame: int, level: int | None = None) -> np.ndarray:
         """What the matrices of `affines` leave, in the space of the rest pose (paper, eq. 3): (N, 3), source order.
 
         The matrix of a vertex's part, applied to this, gives the position at the deepest available level.
         """
-        parts = self.affines(frame, depth)
+        parts = self.affines(frame, level)
         full = self.positions(frame, self.deepest, np.float64)[self._vertex_source]
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
@@ -682,6 +682,6 @@ class Decoder:
         except ClipError as error:
             raise BadChunk(f"static data: {error}") from None
         for segment in range(self.container.header.segment_count):
-            for depth in range(self.level_count):
-                with self._prepared(segment, depth):
+            for level in range(self.level_count):
+                with self._prepared(segment, level):
                     pass

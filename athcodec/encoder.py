@@ -28,7 +28,7 @@ from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.crew import Crew, default_jobs
-from athcodec.decoder import Decoder
+from athcodec.decoder import Decoder, Level
 from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -44,17 +44,6 @@ SPOOL_BYTES = 64 << 20
 TRIAL_FRAMES = 64  # that candidates for branches are tried on
 STATIC_METADATA = ("unit", "up_axis")
 WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
-
-
-@dataclass(frozen=True)
-class LevelSummary:
-    """One level of a file just written; errors in scene units."""
-
-    depth: int
-    nodes: int
-    bytes: int
-    max_error: float
-    rms_error: float
 
 
 @dataclass(frozen=True)
@@ -79,7 +68,7 @@ class Summary:
     max_error_bound: float
     relative_bound: float
     table1: dict
-    depths: list[LevelSummary]
+    levels: list[Level]
     chunk_bytes: dict[str, int]
     choices: dict
     seams: tuple[Seam, ...] = ()
@@ -590,7 +579,6 @@ def _next_guess(low: float, high: float, sizes: dict[float, float], target: int)
 
 def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: list[ct.Chunk],
              decoder: Decoder) -> Summary:
-    depths = [LevelSummary(d.depth, d.nodes, d.bytes, d.max_error, d.rms_error) for d in decoder.depths]
     sizes: dict[str, int] = {}
     for chunk in chunks:
         name = ct.KIND_NAMES[chunk.kind]
@@ -603,5 +591,5 @@ def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: 
                "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, settings.largest_bound,
-                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices,
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), decoder.levels, sizes, choices,
                    job.seams(decoder))

@@ -9,17 +9,17 @@ from athcodec.atomic_files import new_file
 from athcodec.errors import LevelUnavailable, Truncated
 
 
-def truncate(source, target, depth: int) -> int:
-    """Writes the levels 0 to `depth` of the .ath file `source` to `target`, a complete file of its own.
+def truncate(source, target, level: int) -> int:
+    """Writes the levels 0 to `level` of the .ath file `source` to `target`, a complete file of its own.
 
-    Static data is kept; the new file promises the error of `depth`. Returns its size in bytes. Raises
+    Static data is kept; the new file promises the error of `level`. Returns its size in bytes. Raises
     LevelUnavailable, a FormatError, or OSError.
     """
     with open(os.fspath(source), "rb") as file:
         container = ct.Container(file)
-        if not 0 <= depth < container.header.level_count:
-            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {container.header.level_count - 1}")
-        front, chunks = ct.truncated_front(container, depth)
+        if not 0 <= level < container.header.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {container.header.level_count - 1}")
+        front, chunks = ct.truncated_front(container, level)
         absent = [chunk for chunk in chunks if not container.is_available(chunk)]
         if absent:
             raise Truncated(f"{absent[0]}: got a file of {container.available_length} bytes; expected at least "

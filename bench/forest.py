@@ -246,7 +246,7 @@ class Scene:
         for clip, unit in enumerate(self.units):
             with athcodec.open(unit.path) as decoder:
                 for instance in range(clip, len(levels), len(self.units)):
-                    levels[instance] = decoder.depth_for(self.distances[instance], FOV, SCREEN)
+                    levels[instance] = decoder.level_for(self.distances[instance], FOV, SCREEN)
         return levels.tolist()
 
     @cached_property

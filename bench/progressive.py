@@ -5,7 +5,7 @@ segments that have the next level already show it. Errors are measured on what a
 many bytes; those that follow from the file's own table stand beside them. The yardstick are files of their
 own, each coded for a looser bound.
 
-The cost: the same clip coded without intermediate depths, with the encoder's own stages: the same settings,
+The cost: the same clip coded without intermediate levels, with the encoder's own stages: the same settings,
 every stem's modes together in one stream per segment, no maps of nodes, a table of one level.
 """
 
@@ -108,9 +108,9 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
 
 
 def _measured(clip: athcodec.MotionClip, decoder: athcodec.Decoder, start: int, stop: int,
-              depth: int | None) -> ErrorMeter:
+              level: int | None) -> ErrorMeter:
     meter = ErrorMeter()
-    for first, frames in decoder.blocks(depth, frames=slice(start, stop)):
+    for first, frames in decoder.blocks(level, frames=slice(start, stop)):
         meter.add(clip.block(first, first + len(frames)), frames)
     return meter
 

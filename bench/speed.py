@@ -85,7 +85,7 @@ class _Case:
 
     def one_frame(self) -> None:
         with athcodec.open(self.file) as decoder:
-            decoder.positions(self.frame, depth=1)
+            decoder.positions(self.frame, level=1)
             self.frame_bytes = decoder.bytes_read
 
     def summary(self, seconds: dict[str, list[float]]) -> dict[str, float | int]:

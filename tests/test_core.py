@@ -492,7 +492,7 @@ def test_frames_are_those_of_python_bit_for_bit_in_any_order_of_play(data, playe
     (scratch / "core.ath").write_bytes(data)
     with athcodec.open(scratch / "core.ath") as decoder:
         for level in player.levels:
-            expected = decoder.positions(depth=level)
+            expected = decoder.positions(level=level)
             prepared = player.prepare_all(level)
             order = list(range(len(expected)))
             at_random = np.random.default_rng(level).permutation(len(expected))

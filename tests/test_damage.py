@@ -49,7 +49,7 @@ def medley_parts(medley_ath) -> Parts:
 def played(data) -> list[np.ndarray]:
     """Positions of every level."""
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.level_count)]
 
 
 def check(data: bytes, **options) -> None:
@@ -60,7 +60,7 @@ def use(data: bytes, **options) -> bool:
     """Asks for everything that a file may hold. Whether it answered; raises what is neither answer nor refusal."""
     asks = [lambda d: d.check(), lambda d: d.affines(0), lambda d: d.residual(0, 0), lambda d: d.info(),
             lambda d: d.rest, lambda d: d.vertex_branch, lambda d: d.stem_index]
-    asks += [lambda d, depth=depth: d.positions(depth=depth) for depth in range(3)]
+    asks += [lambda d, level=level: d.positions(level=level) for level in range(3)]
     asks += [lambda d: [d.play(clip.name).positions() for clip in d.clips[1:]]]
     asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
     with np.errstate(all="ignore"):
@@ -121,9 +121,9 @@ def test_levels_before_a_damaged_chunk_still_play(parts, data, played):
             check(broken)
         decoder = opened(broken, allow_partial=True)
         assert f"damaged from level {chunk.level}" in decoder.missing
-        assert [d.available for d in decoder.depths] == [d < chunk.level for d in range(len(played))]
-        for depth in range(chunk.level):
-            assert np.array_equal(decoder.positions(depth=depth), played[depth])
+        assert [d.available for d in decoder.levels] == [d < chunk.level for d in range(len(played))]
+        for level in range(chunk.level):
+            assert np.array_equal(decoder.positions(level=level), played[level])
         if chunk.level > 0:
             assert decoder.deepest == chunk.level - 1
             assert np.array_equal(decoder.positions(), played[chunk.level - 1])
@@ -156,11 +156,11 @@ def test_a_segment_that_was_refused_leaves_the_others_as_they_are(parts, data, p
     for kind in (ct.STEMS, ct.AFFINES, ct.CORRECTIONS):
         chunk = next(c for c, _ in parts.chunks if c.kind == kind and c.segment == 1)
         decoder = opened(flipped(data, chunk.offset + chunk.length - 1))
-        (first, stop), depth = decoder.segments[0], last if kind != ct.AFFINES else chunk.level
+        (first, stop), level = decoder.segments[0], last if kind != ct.AFFINES else chunk.level
         for _ in range(2):
-            assert np.array_equal(decoder.positions(slice(first, stop), depth), played[depth][first:stop])
+            assert np.array_equal(decoder.positions(slice(first, stop), level), played[level][first:stop])
             with pytest.raises(BadChecksum, match=f"{ct.KIND_NAMES[kind]} of level {chunk.level}, segment 1"):
-                decoder.positions(stop, depth)
+                decoder.positions(stop, level)
             assert np.array_equal(decoder.positions(0, 0), played[0][0])
 
 

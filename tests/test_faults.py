@@ -301,7 +301,7 @@ def test_a_file_that_shrinks_while_it_is_played_is_truncated_where_it_is_read(bu
     path.write_bytes(bushy_ath.read_bytes())
     with athcodec.open(path) as decoder:
         coarse = decoder.positions(0, 0)
-        os.truncate(path, decoder.depths[0].bytes)
+        os.truncate(path, decoder.levels[0].bytes)
         with pytest.raises(athcodec.errors.Truncated):
             decoder.positions(0)
         assert np.array_equal(decoder.positions(0, 0), coarse), "level 0 is still there"

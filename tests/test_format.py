@@ -98,7 +98,7 @@ def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
-            expected = np.concatenate([clip.positions(depth=level) for clip in played])
+            expected = np.concatenate([clip.positions(level=level) for clip in played])
             got = np.array(spec.decode(data, level), decoder.dtype)
             assert got.tobytes() == expected.tobytes(), f"level {level}"
         header, chunks = spec.parse_front(data)
@@ -365,7 +365,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
         data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1:]])
         for level in range(chunk.level, parts.header.level_count):
             document = outcome(spec, lambda data: spec.decode(data, level), data)
-            code = outcome(spec, lambda data: opened(data).positions(depth=level), data)
+            code = outcome(spec, lambda data: opened(data).positions(level=level), data)
             assert_same_numbers(document, code)
 
 

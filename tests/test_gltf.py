@@ -552,9 +552,9 @@ def far(a, b):
 
 def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            view = ClipView(decoder, depth)
-            path = tmp_path / f"{depth}.glb"
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level)
+            path = tmp_path / f"{level}.glb"
             write(view, path, animation="joints")
             facts = facts_of(path)["athcodec"]
             shown = view.block(0, view.frame_count)
@@ -562,7 +562,7 @@ def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tm
             worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(view.frame_count))
             assert worst == pytest.approx(facts["max_error"], rel=1e-3, abs=1e-6)
             assert worst <= 1.1 * max(view.max_error, 1e-5 * np.linalg.norm(np.ptp(view.rest, axis=0)))
-            assert facts["depth"] == depth and facts["joints"] >= decoder.depths[depth].nodes
+            assert facts["level"] == level and facts["joints"] >= decoder.levels[level].nodes
 
 
 def test_from_a_source_through_ath_and_glb_within_the_bound(leafy, leafy_ath, tmp_path):

@@ -119,8 +119,8 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(ani
                                                                              tmp_path):
     path = tmp_path / "a.glb"
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            view = ClipView(decoder, depth, range(4, 30))
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level, range(4, 30))
             write(view, path, animation=animation)
             assert_valid(node, path)
             stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]

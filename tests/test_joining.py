@@ -43,11 +43,11 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
     with athcodec.open(medley_ath) as decoder:
         for name, source in medley_clips.items():
             played, reference = decoder.play(name), source.block(0, source.frame_count)
-            for level in played.depths:
-                measured = distance(played.positions(depth=level.depth), reference)
+            for level in played.levels:
+                measured = distance(played.positions(level=level.level), reference)
                 assert level.max_error == pytest.approx(measured, rel=1e-5)
-        assert [level["max_error"] for level in decoder.info()["depths"]] == [
-            max(decoder.play(name).depths[level].max_error for name in medley_clips)
+        assert [level["max_error"] for level in decoder.info()["levels"]] == [
+            max(decoder.play(name).levels[level].max_error for name in medley_clips)
             for level in range(decoder.level_count)]
 
 
@@ -109,7 +109,7 @@ def test_a_cut_off_file_shows_all_clips_at_the_levels_that_are_left(medley_clips
     with athcodec.open(shorter, strict=True) as decoder, athcodec.open(medley_ath) as full:
         assert decoder.level_count == 2
         for name in medley_clips:
-            assert np.array_equal(decoder.play(name).positions(), full.play(name).positions(depth=1))
+            assert np.array_equal(decoder.play(name).positions(), full.play(name).positions(level=1))
             assert decoder.play(name).clip == full.play(name).clip
 
 
@@ -237,14 +237,14 @@ def test_split_gives_back_what_was_joined(medley_clips):
 def test_a_clip_view_of_all_clips_is_what_each_is(medley_clips, medley_ath):
     with athcodec.open(medley_ath) as decoder:
         view = ClipView(decoder, 1, all_clips=True)
-        frames = np.concatenate([decoder.play(name).positions(depth=1) for name in medley_clips])
+        frames = np.concatenate([decoder.play(name).positions(level=1) for name in medley_clips])
         assert view.clip_ranges == athcodec.join(medley_clips).clip_ranges
         assert np.array_equal(np.concatenate([block for _, block in view.blocks()]), frames)
         assert [start for start, _ in view.blocks()][:3] == [0, 10, 20]
         for start, stop in ((0, 90), (19, 21), (57, 58), (3, 5)):
             assert np.array_equal(view.block(start, stop), frames[start:stop])
         assert np.array_equal(view.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
-        assert view.max_error == max(decoder.play(name).depths[1].max_error for name in medley_clips)
+        assert view.max_error == max(decoder.play(name).levels[1].max_error for name in medley_clips)
         assert not ClipView(decoder, 1, range(3)).clip_ranges[0].loop, "some frames of a loop are none"
 
 
@@ -301,7 +301,7 @@ def test_files_are_joined_under_their_names_verified_and_decoded_by_name(sources
     shown = capsys.readouterr().out
     assert "quiet" in shown and "storm" in shown and "57 frames" not in shown and "48 frames" in shown
     assert main(["verify", out, "--against", sources[0], "--against", sources[1]]) == 0
-    assert "every depth is as close to" in capsys.readouterr().out
+    assert "every level is as close to" in capsys.readouterr().out
     assert main(["verify", out, "--clip", "storm", "--against", sources[1]]) == 0
     assert main(["verify", out, "--clip", "storm", "--against", sources[0]]) == 1
     assert main(["verify", out, "--against", sources[0]]) == 1

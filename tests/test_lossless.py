@@ -29,7 +29,7 @@ def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound, t
     assert bits(decoder.positions()) == bits(clip.positions) and decoder.positions().dtype == dtype
     assert bits(decoder.positions(17)) == bits(clip.positions[17])
     assert bits(decoder.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
-    assert decoder.max_error_bound == 0 and decoder.depths[-1].max_error == 0
+    assert decoder.max_error_bound == 0 and decoder.levels[-1].max_error == 0
 
 
 def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
@@ -38,8 +38,8 @@ def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True)
     with athcodec.open(tmp_path / "b.ath") as lossy:
         assert lossless.level_count == lossy.level_count + 1
-        for depth in range(lossy.level_count):
-            assert bits(lossless.positions(depth=depth)) == bits(lossy.positions(depth=depth))
+        for level in range(lossy.level_count):
+            assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -62,8 +62,8 @@ def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     deepest = opened(data).level_count - 1
     athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", deepest - 1)
     shorter = opened((tmp_path / "b.ath").read_bytes(), strict=True)
-    assert bits(shorter.positions()) == bits(opened(data).positions(depth=deepest - 1))
-    assert 0 < shorter.max_error_bound == shorter.depths[-1].max_error
+    assert bits(shorter.positions()) == bits(opened(data).positions(level=deepest - 1))
+    assert 0 < shorter.max_error_bound == shorter.levels[-1].max_error
     cut = opened(data[: opened(data).container.level_end(deepest - 1)])
     assert bits(cut.positions()) == bits(shorter.positions())
 

@@ -188,14 +188,14 @@ def test_a_long_prelude_takes_a_second_request(server, local, monkeypatch):
     assert max(stop for _, stop in server.ranges) < prelude + 1000
 
 
-def runs(decoder: athcodec.Decoder, depth: int, first: int, last: int) -> list[tuple[int, int]]:
+def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[tuple[int, int]]:
     """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are
     close."""
     joined: list[list[int]] = []
-    kinds = (16,) if depth == decoder.full_level_count - 1 else (16, 17)
+    kinds = (16,) if level == decoder.full_level_count - 1 else (16, 17)
     for chunk in decoder.container.chunks:
-        wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == depth)
-        if wanted and chunk.is_motion and chunk.level <= depth and first <= chunk.segment <= last:
+        wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == level)
+        if wanted and chunk.is_motion and chunk.level <= level and first <= chunk.segment <= last:
             start, stop = max(chunk.offset, READ_AHEAD), chunk.offset + chunk.length
             if joined and start - joined[-1][1] <= GAP:
                 joined[-1][1] = stop
@@ -205,9 +205,9 @@ def runs(decoder: athcodec.Decoder, depth: int, first: int, last: int) -> list[t
 
 
 def test_a_segment_is_one_request_for_each_run_of_its_chunks(server, local):
-    depth, segment = local.level_count - 1, len(local.segments) - 1
+    level, segment = local.level_count - 1, len(local.segments) - 1
     frame = local.segments[segment][0]
-    wanted = runs(local, depth, segment, segment)
+    wanted = runs(local, level, segment, segment)
     assert len(wanted) > 1
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(frame), local.positions(frame))
@@ -232,8 +232,8 @@ def test_the_whole_motion_takes_three_requests_at_most(server, local):
 
 def test_a_coarse_level_fetches_no_finer_ones(server, local):
     with athcodec.open(server.url) as decoder:
-        assert np.array_equal(decoder.positions(depth=1), local.positions(depth=1))
-        assert decoder.source.bytes <= max(READ_AHEAD, local.depths[1].bytes)
+        assert np.array_equal(decoder.positions(level=1), local.positions(level=1))
+        assert decoder.source.bytes <= max(READ_AHEAD, local.levels[1].bytes)
 
 
 def test_checking_fetches_every_byte_once(server):
@@ -260,12 +260,12 @@ def test_a_short_file_is_one_request_in_all(server, full_ath, full_clip):
 
 
 def test_a_prefix_on_a_server_plays_the_levels_that_are_there(server, local):
-    server.data = server.data[: local.depths[1].bytes + 10]
+    server.data = server.data[: local.levels[1].bytes + 10]
     with athcodec.open(server.url) as decoder:
         assert decoder.deepest == 1 and not decoder.complete
-        assert np.array_equal(decoder.positions(), local.positions(depth=1))
+        assert np.array_equal(decoder.positions(), local.positions(level=1))
         with pytest.raises(LevelUnavailable, match="cut off"):
-            decoder.positions(depth=2)
+            decoder.positions(level=2)
 
 
 def test_redirects_are_followed_and_counted(server, local):
@@ -501,11 +501,11 @@ def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local,
     assert err == f"athcodec: stats: 2 requests, {READ_AHEAD:,} bytes fetched of {size:,}\n"
     assert cli.main(["verify", other_url, "--stats"]) == 0
     assert f"3 requests, {size:,} bytes" in capsys.readouterr().err
-    assert cli.main(["decode", other_url, str(out), "--depth", "1", "--frames", "200:210", "--stats"]) == 0
+    assert cli.main(["decode", other_url, str(out), "--level", "1", "--frames", "200:210", "--stats"]) == 0
     requests, fetched = re.search(r"stats: (\d) requests, ([\d,]+) bytes", capsys.readouterr().err).groups()
-    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.depths[1].bytes)
+    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.levels[1].bytes)
     with athcodec.read_hdf5(out) as clip:
-        assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), depth=1))
+        assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), level=1))
 
 
 def test_requests_to_an_object_store_are_those_that_it_answers(s3, large_ath, local):

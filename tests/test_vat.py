@@ -1,5 +1,5 @@
 """Vertex animation textures: a shader that follows vat.md, or OpenVAT's layout, shows the level within the error that
-the JSON states; written at any depth and range of frames, and never half."""
+the JSON states; written at any level and range of frames, and never half."""
 
 from __future__ import annotations
 
@@ -82,16 +82,16 @@ def shown_by_positions(folder, pixels):
 @pytest.mark.parametrize("half", [True, False])
 def test_a_shader_shows_every_level_within_the_stated_error(leafy_ath, tmp_path, half):  # noqa: F811
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            view = ClipView(decoder, depth, range(3, 30))
-            folder = tmp_path / f"{depth}.vat"
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level, range(3, 30))
+            folder = tmp_path / f"{level}.vat"
             write(view, folder, half=half)
             frames, facts, _ = shown_by_matrices(folder)
             wanted, size = view.block(0, 27), float(np.linalg.norm(np.ptp(view.rest, axis=0)))
             assert far(frames, wanted) == pytest.approx(facts["max_error"], rel=0.01, abs=1e-6 * size)
             rounding = 2e-3 * np.abs(wanted - view.rest).max() if half else 1e-6 * size
             assert facts["max_error"] <= max(view.max_error, 1e-5 * size) + rounding
-            assert (facts["depth"], facts["frames"], facts["start_frame"]) == (depth, 27, 3)
+            assert (facts["level"], facts["frames"], facts["start_frame"]) == (level, 27, 3)
             assert facts["level_max_error"] == view.max_error
             assert np.allclose(facts["bounds"]["min"], frames.min(axis=(0, 1)), atol=1e-5 * size)
 

@@ -66,7 +66,7 @@ def test_verify_checks_vertex_by_vertex(twiggy, tmp_path, capsys):
     twiggy.positions = moved
     athcodec.write_hdf5(source, twiggy)
     assert main(["verify", coded, "--against", source, "--json"]) == 1
-    assert not json.loads(capsys.readouterr().out)["clips"][0]["depths"][-1]["kept"]
+    assert not json.loads(capsys.readouterr().out)["clips"][0]["levels"][-1]["kept"]
 
 
 @pytest.mark.parametrize("weights, message", [

@@ -101,11 +101,11 @@ def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: 
         with athcodec.open(summary.path, strict=True) as decoder:
             decoder.check()
     stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
-    last = summary.depths[-1]
+    last = summary.levels[-1]
     return {"done": stored | {
         "source": source, "bytes": summary.bytes, "raw_bytes": summary.raw_bytes,
         "max_error_bound": summary.max_error_bound, "relative_bound": summary.relative_bound,
-        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.depths),
+        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.levels),
         "sha256": sha256(summary.path), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
 
 

@@ -154,9 +154,9 @@ def decode(args: argparse.Namespace) -> int:
         with progress() as report:
             athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
-            say("warning", f"{args.input}: decoded to level {motion.depth}; {what_is_missing(decoder)}")
+            say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
         print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
-              f"level {motion.depth}")
+              f"level {motion.level}")
     return 0
 
 
@@ -174,7 +174,7 @@ def verify(args: argparse.Namespace) -> int:
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}
-                measured["depths"] = measure_against(played, source, clip)
+                measured["levels"] = measure_against(played, source, clip)
                 result["clips"].append(measured)
                 refuse_broken_promises(result, measured)
         result["ok"] = True
@@ -192,9 +192,9 @@ def verify(args: argparse.Namespace) -> int:
 def truncate(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     with naming(args.input):
-        athcodec.truncate(args.input, args.output, args.depth)
+        athcodec.truncate(args.input, args.output, args.level)
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
-    print(f"{args.output}: levels 0 to {args.depth}, {after:,} of {before:,} bytes")
+    print(f"{args.output}: levels 0 to {args.level}, {after:,} of {before:,} bytes")
     return 0
 
 

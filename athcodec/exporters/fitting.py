@@ -1,6 +1,6 @@
 """What of a motion moves as one, for formats that hold transforms in place of vertices.
 
-It starts from the parts that an .ath file has at a depth (nodes and stems), or from the branches of a clip, and fits to
+It starts from the parts that an .ath file has at a level (nodes and stems), or from the branches of a clip, and fits to
 each, frame by frame, what a format can do: `Placed` finds translation, rotation and three scales, `Mapped` any affine
 map. A part that this leaves further off than allowed, such as a stem that bends, is cut into shorter ones, down to
 single vertices, which a translation places exactly. It knows no file format.

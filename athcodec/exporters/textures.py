@@ -19,7 +19,7 @@ LAYOUT = "athcodec/exporters/vat.md"
 
 def facts_of(motion: Any) -> dict[str, Any]:
     """Rate, level and size of a MotionClip or ClipView."""
-    level = {"depth": motion.depth, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
+    level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}
 
 

@@ -53,7 +53,7 @@ class Place:
     def words(self, verb: str, target: Path) -> list[str]:
         """The command line of a verb that writes `target`."""
         given = str(self.source if verb == "encode" else self.encoded)
-        more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--depth", "1"]}
+        more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--level", "1"]}
         return [verb.split()[0], given, str(target), *more.get(verb, [])]
 
     def left_over(self, target: Path) -> list[str]:

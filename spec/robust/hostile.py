@@ -76,7 +76,7 @@ def _whole_clip(data: bytes) -> int:
 @cache
 def _played(data: bytes) -> list[np.ndarray]:
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.level_count)]
 
 
 def prefix_strictly(data: bytes, size: int) -> int:
