@@ -370,14 +370,15 @@ class Decoder:
         return self._player.level_for(self._clip.segments, distance, fov, height, pixels)
 
     def table1(self) -> dict:
-        """The paper's table 1: depth, nodes, leaves and the four parameters of the ATH."""
+        """The paper's table 1: depth (levels of nodes), nodes, leaves and the four parameters of the ATH."""
         branches, info = self.branches, self._player.info
         whole, inside = branches["flags"] & WHOLE > 0, np.zeros(len(branches) + 1, np.int64)
         np.add.at(inside, np.flatnonzero(whole) + 1, 1)
         np.add.at(inside, (np.arange(len(branches)) + branches["subtree"])[whole], -1)
-        leaf = (np.cumsum(inside)[:-1] == 0) & (whole | (branches["subtree"] == 1))
-        return {"depth": self.full_level_count - 1, "nodes": info.node_count, "leaves": int(leaf.sum())} | dict(
-            zip(TABLE_KEYS, self.thresholds))
+        is_node = np.cumsum(inside)[:-1] == 0
+        leaf = is_node & (whole | (branches["subtree"] == 1))
+        return {"depth": int(branches["depth"][is_node].max()) + 1, "nodes": info.node_count,
+                "leaves": int(leaf.sum())} | dict(zip(TABLE_KEYS, self.thresholds))
 
     def info(self) -> dict:
         """What `athcodec info --json` prints: of the whole file, all clips together."""

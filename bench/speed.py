@@ -60,7 +60,7 @@ class _Case:
         self.frame_bytes = 0
         with athcodec.read_hdf5(path) as clip:
             self.frame, self.vertex_frames = clip.frame_count // 2, clip.frame_count * clip.vertex_count
-            athcodec.write_hdf5(self.gzip, clip, gzip=True)
+            athcodec.write_hdf5(clip, self.gzip, gzip=True)
 
     def measure(self) -> dict[str, list[float]]:
         seconds = _in_turns({"encode": self.encode}, ENCODES)

@@ -47,7 +47,7 @@ def clips(tmp_path):
     folder = tmp_path / "in"
     (folder / "sub").mkdir(parents=True)
     for name, frames in (("a", 20), ("b", 40), ("sub/c", 20), ("long", 200)):
-        athcodec.write_hdf5(folder / f"{name}.h5", plant(seed=frames, branches=5, longest=4, frames=frames))
+        athcodec.write_hdf5(plant(seed=frames, branches=5, longest=4, frames=frames), folder / f"{name}.h5")
     return folder
 
 
@@ -496,8 +496,8 @@ def many(tmp_path):
     folder = tmp_path / "many"
     folder.mkdir()
     for seed in range(11):
-        athcodec.write_hdf5(folder / f"c{seed:02}.h5", plant(seed=seed, branches=20, longest=8, frames=48))
-    athcodec.write_hdf5(folder / "long.h5", plant(seed=99, branches=20, longest=8, frames=300))
+        athcodec.write_hdf5(plant(seed=seed, branches=20, longest=8, frames=48), folder / f"c{seed:02}.h5")
+    athcodec.write_hdf5(plant(seed=99, branches=20, longest=8, frames=300), folder / "long.h5")
     return folder
 
 

@@ -121,7 +121,7 @@ ERRORS = np.geomspace(1e-6, 1e-2, 9)
 @pytest.fixture(scope="session")
 def bushy_file(bushy_clip, tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "bushy.h5"
-    athcodec.write_hdf5(path, bushy_clip)
+    athcodec.write_hdf5(bushy_clip, path)
     return str(path)
 
 

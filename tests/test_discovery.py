@@ -177,7 +177,7 @@ def test_the_trunk_can_be_named(dressed):
 
 def test_what_was_found_is_kept_edited_and_used(dressed, tmp_path, capsys):
     source, kept, coded = (str(tmp_path / name) for name in ("a.h5", "a.json", "a.ath"))
-    athcodec.write_hdf5(source, bare(dressed))
+    athcodec.write_hdf5(bare(dressed), source)
     assert main(["hierarchy", source, "--save", kept]) == 0
     assert f"{dressed.branch_count:,} branches by components" in capsys.readouterr().out
     content = json.loads(Path(kept).read_text())

@@ -139,7 +139,7 @@ def test_the_deepest_chain_that_is_encoded_can_be_decoded(tmp_path):
 def poisoned_file(path, frame: int) -> None:
     """A clip as HDF5, which is read in blocks, with one NaN in its motion."""
     source = plant(seed=1, branches=5, longest=4, frames=60)
-    athcodec.write_hdf5(path, source)
+    athcodec.write_hdf5(source, path)
     with h5py.File(path, "r+") as file:
         file["positions"][frame, 2, 1] = np.nan
 

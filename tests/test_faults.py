@@ -58,7 +58,7 @@ def test_so_do_two_hundred(place):
 
 @pytest.mark.parametrize("write", [
     lambda path, ath: athcodec.truncate(ath, path, 1),
-    lambda path, ath: athcodec.write_hdf5(path, plant(frames=3)),
+    lambda path, ath: athcodec.write_hdf5(plant(frames=3), path),
     lambda path, ath: athcodec.encode(plant(frames=3), path, effort="fast"),
 ], ids=["truncate", "write_hdf5", "encode"])
 def test_every_writer_removes_what_a_dead_one_left_and_nothing_else(write, bushy_ath, tmp_path):
@@ -156,14 +156,14 @@ def test_a_file_that_is_replaced_keeps_its_permissions(mode, bushy_ath, tmp_path
     target.chmod(mode)
     athcodec.truncate(bushy_ath, target, 0)
     assert stat.S_IMODE(target.stat().st_mode) == mode
-    athcodec.write_hdf5(target, plant(frames=3))
+    athcodec.write_hdf5(plant(frames=3), target)
     assert stat.S_IMODE(target.stat().st_mode) == mode
 
 
 def test_a_new_file_has_the_permissions_of_any_new_file(bushy_ath, tmp_path):
     (tmp_path / "plain").touch()
     athcodec.truncate(bushy_ath, tmp_path / "new.ath", 0)
-    athcodec.write_hdf5(tmp_path / "new.h5", plant(frames=3))
+    athcodec.write_hdf5(plant(frames=3), tmp_path / "new.h5")
     assert len({stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}) == 1
 
 
@@ -208,7 +208,7 @@ def test_a_pending_file_can_be_discarded_twice(tmp_path):
 def long_source(tmp_path):
     """A clip of 200 frames in 20 vertices, as HDF5."""
     path = tmp_path / "source.h5"
-    athcodec.write_hdf5(path, plant(seed=1, branches=5, longest=4, frames=200))
+    athcodec.write_hdf5(plant(seed=1, branches=5, longest=4, frames=200), path)
     return path
 
 

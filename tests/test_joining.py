@@ -289,7 +289,7 @@ def sources(medley_clips, tmp_path_factory):
     """The motions as files, before any was made a loop."""
     folder = tmp_path_factory.mktemp("sources")
     for name in ("calm", "Böe"):
-        athcodec.write_hdf5(folder / f"{name}.h5", changed(medley_clips[name], clip_ranges=()))
+        athcodec.write_hdf5(changed(medley_clips[name], clip_ranges=()), folder / f"{name}.h5")
     return [str(folder / f"{name}.h5") for name in ("calm", "Böe")]
 
 

@@ -42,6 +42,15 @@ def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
             assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))
 
 
+def test_the_hierarchy_is_as_deep_as_that_of_the_lossy_file(tmp_path):
+    clip = plant(seed=4, branches=9, frames=40)
+    lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
+    lossy = athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4)
+    assert lossless.full_level_count == len(lossy.levels) + 1
+    assert lossless.table1() == lossy.table1 == lossless.info()["ath"]
+    assert lossy.table1["depth"] == len(lossy.levels) - 1
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_numbers_that_arithmetic_would_change_come_back(dtype, tmp_path):
     """Zeros with a sign, the smallest numbers there are, neighbours of 1."""
@@ -91,7 +100,7 @@ def test_a_level_count_that_the_hierarchy_does_not_have_is_refused(tmp_path):
 
 
 def test_the_command_line_writes_lossless_files(tmp_path):
-    athcodec.write_hdf5(tmp_path / "a.h5", plant(seed=8, branches=5, frames=20))
+    athcodec.write_hdf5(plant(seed=8, branches=5, frames=20), tmp_path / "a.h5")
     assert main(["encode", str(tmp_path / "a.h5"), str(tmp_path / "a.ath"), "--lossless"]) == 0
     assert main(["verify", str(tmp_path / "a.ath"), "--against", str(tmp_path / "a.h5")]) == 0
     assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.h5")]) == 0

@@ -57,14 +57,14 @@ def test_weights_may_be_an_array_and_are_kept(twiggy, tmp_path):
 
 def test_verify_checks_vertex_by_vertex(twiggy, tmp_path, capsys):
     source, coded = str(tmp_path / "a.h5"), str(tmp_path / "a.ath")
-    athcodec.write_hdf5(source, twiggy)
+    athcodec.write_hdf5(twiggy, source)
     assert main(["encode", source, coded, "--max-error", "0.02", "--weights", "slack"]) == 0
     assert main(["verify", coded, "--against", source]) == 0
     capsys.readouterr()
     moved = np.array(twiggy.positions)
     moved[5, 0, 0] += 0.03  # within what the file promises for all, beyond what it promises for vertex 0
     twiggy.positions = moved
-    athcodec.write_hdf5(source, twiggy)
+    athcodec.write_hdf5(twiggy, source)
     assert main(["verify", coded, "--against", source, "--json"]) == 1
     assert not json.loads(capsys.readouterr().out)["clips"][0]["levels"][-1]["kept"]
 

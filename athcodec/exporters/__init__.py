@@ -87,6 +87,6 @@ def _check_clips(motion: Any, kind: Format) -> None:
                         f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
 
 
-def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:
+def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None:
     """Write `clip` in athcodec's HDF5 schema to `path`; see exporters/hdf5.py, and `write` for the rest."""
     write(clip, path, "hdf5", gzip=gzip)

@@ -139,7 +139,7 @@ def _next_run(place: Place, target: Path) -> None:
         athcodec.truncate(place.encoded, target, 1)
     else:
         with athcodec.open(place.encoded) as decoder:
-            athcodec.write_hdf5(target, decoder)
+            athcodec.write_hdf5(decoder, target)
 
 
 # ---- full disks ----
