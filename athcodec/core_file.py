@@ -28,6 +28,7 @@ import numpy as np
 from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
+FAULT_TEXT = 256
 OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
 
@@ -74,6 +75,19 @@ class Chunk(Structure):
                 ("segment", c_uint32), ("kind", c_uint16), ("level", c_uint8), ("reserved", c_uint8)]
 
 
+class Fault(Structure):
+    """ath_fault_info."""
+
+    _fields_ = [("code", c_int32), ("field", c_int32), ("chunk", c_int32), ("kind", c_uint16), ("level", c_uint8),
+                ("reserved", c_uint8), ("segment", c_uint32), ("offset", c_uint64), ("found", c_double),
+                ("least", c_double), ("most", c_double)]
+
+    def __str__(self) -> str:
+        text = ctypes.create_string_buffer(FAULT_TEXT)
+        lib.ath_fault_text(byref(self), text, len(text))
+        return text.value.decode()
+
+
 class Range(Structure):
     """ath_range."""
 
@@ -88,12 +102,12 @@ def aligned(size: int) -> np.ndarray:
 
 
 class PlayError(Exception):
-    """A result of the core that is no success: `code` (FORMAT.md, "Errors", or above 63 about the call), and the chunk
-    at fault, or None."""
+    """A result of the core that is no success: `code` (FORMAT.md, "Errors", or above 63 about the call), and the fault
+    with the chunk that it is about, or None."""
 
-    def __init__(self, code: int, chunk: Chunk | None = None):
-        super().__init__(lib.ath_result_name(code).decode())
-        self.code, self.chunk = code, chunk
+    def __init__(self, code: int, fault: Fault | None = None):
+        super().__init__(str(fault) if fault else lib.ath_result_name(code).decode())
+        self.code, self.chunk = code, fault if fault and fault.chunk >= 0 else None
 
 
 class Segment:
@@ -119,21 +133,19 @@ class File:
 
     def __init__(self, prelude: bytes, limits: Limits):
         self._prelude = as_bytes(prelude)
-        data, front, size = self._prelude.ctypes.data, c_size_t(), c_size_t()
-        self._check(lib.ath_front(data, len(self._prelude), byref(limits), byref(front), byref(size)))
+        data, front, size, fault = self._prelude.ctypes.data, c_size_t(), c_size_t(), Fault()
+        self._check(lib.ath_front(data, len(self._prelude), byref(limits), byref(front), byref(size), byref(fault)), fault)
         self._memory = aligned(size.value)
         self._file = self._memory.ctypes.data
-        result = lib.ath_open(self._file, size.value, data, len(self._prelude), byref(limits))
-        if result != OK:
-            raise PlayError(result, self._chunk(lib.ath_fault(self._file)))
+        self._check(lib.ath_open(self._file, size.value, data, len(self._prelude), byref(limits), byref(fault)), fault)
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self._build, self._building = None, threading.Lock()
 
     @staticmethod
-    def _check(result: int) -> int:
+    def _check(result: int, fault: Fault | None = None) -> int:
         if result not in (OK, HELD):
-            raise PlayError(result)
+            raise PlayError(result, fault)
         return result
 
     def build(self) -> None:
@@ -176,8 +188,14 @@ class File:
         lib.ath_rest_wide(self._file, order, out.ctypes.data, out.strides[0])
         return out
 
-    def _chunk(self, index: int) -> Chunk | None:
-        return ctypes.cast(lib.ath_chunks(self._file), POINTER(Chunk))[index] if index >= 0 else None
+    def chunks(self) -> list[Chunk]:
+        """The chunk table, in memory of the file."""
+        return ctypes.cast(lib.ath_chunks(self._file), POINTER(Chunk))[: self.info.chunk_count]
+
+    def errors(self) -> np.ndarray:
+        """(levels, segments, 2) float32: largest and RMS error, scene units."""
+        count = 2 * self.info.level_count * self.info.segment_count
+        return self._array(lib.ath_errors(self._file), "<f4", count).reshape(self.info.level_count, -1, 2)
 
     def cut(self, level: int) -> np.ndarray:
         """(P,) of PART: what the plant is made of at a level."""
@@ -218,7 +236,9 @@ class File:
         result = lib.ath_prepare(work.memory.ctypes.data, len(work.memory), self._file, segment, level, into.pointer,
                                  len(into.memory))
         if result != OK:
-            raise PlayError(result, self._chunk(lib.ath_work_fault(work.memory.ctypes.data)))
+            fault = Fault()
+            lib.ath_work_fault(work.memory.ctypes.data, byref(fault))
+            raise PlayError(result, fault)
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""

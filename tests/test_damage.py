@@ -384,7 +384,7 @@ def both_readings(data: bytes, limits: Limits) -> str:
         assert getattr(info, name) == getattr(header, name)
     assert info.prelude_length == container.prelude_length
     names = ("kind", "level", "segment", "length", "checksum", "offset")
-    entries = [tuple(getattr(file._chunk(i), name) for name in names) for i in range(info.chunk_count)]
+    entries = [tuple(getattr(chunk, name) for name in names) for chunk in file.chunks()]
     known = [entry for entry in entries if entry[0] in ct.KIND_NAMES]
     assert known == [tuple(getattr(chunk, name) for name in names) for chunk in container.chunks]
     return "opened"
