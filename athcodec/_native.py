@@ -80,6 +80,8 @@ _PLAYING = {  # core/ath.h
     "ath_chunks": (c_void_p, [c_void_p]),
     "ath_check_chunk": (c_int, [c_void_p, c_int32, c_void_p]),
     "ath_errors": (c_void_p, [c_void_p]),
+    "ath_level_error": (None, [c_void_p, c_int32, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_work_fault": (None, [c_void_p, c_void_p]),
     "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
     "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),

@@ -78,7 +78,7 @@ class ClipView:
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
-        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.joined_metadata)
+        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
 
     @property
     def rest(self) -> np.ndarray:

@@ -28,7 +28,9 @@ from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.crew import Crew, default_jobs
-from athcodec.decoder import Decoder, Level
+from athcodec.ath_file import Level
+from athcodec.decoder import Decoder
+from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, candidates, with_branches
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -415,11 +417,11 @@ class _Job:
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
-            with Decoder(out, strict=True) as decoder:
+            with open_ath(out, strict=True) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
-        with Decoder(out, strict=True) as decoder:  # before the file gets its name
+        with open_ath(out, strict=True) as decoder:  # before the file gets its name
             summary = _summary(Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
@@ -591,5 +593,5 @@ def _summary(path: Path, job: _Job, decided: _Decided, result: _Result, chunks: 
                "shaped": 0 if settings.shaped is None else int(settings.shaped.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, settings.largest_bound,
-                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), decoder.levels, sizes, choices,
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.file.table1(), decoder.file.levels, sizes, choices,
                    job.seams(decoder))

@@ -16,7 +16,7 @@ import numpy as np
 import athcodec
 from athcodec._native import LOOSE
 from athcodec.ath import Ath, Gaps
-from athcodec.decoder import Level
+from athcodec.ath_file import Level
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
 from bench.tables import table
@@ -72,7 +72,7 @@ def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound,
                              hierarchy=result.decoder.hierarchy)
-    ours, theirs = result.decoder.table1(), ath.table1()
+    ours, theirs = result.decoder.file.table1(), ath.table1()
     if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
         raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
     return ath
@@ -141,7 +141,7 @@ class _Joints:
     @property
     def loose(self) -> int:
         """How many of the measured ones carry a translation of their own."""
-        return int((self.decoder.branches["flags"][self.measured] & LOOSE > 0).sum())
+        return int((self.decoder.file.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
         """Largest and RMS gap over these frames and all joints."""

@@ -81,7 +81,7 @@ def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
             "level 0, all frames": (lambda decoder: decoder.positions(level=0), None),
             "level 1, all frames": (lambda decoder: decoder.positions(level=1), None),
             "everything": (lambda decoder: decoder.positions(), None),
-            "verify": (lambda decoder: decoder.check(), None)}
+            "verify": (lambda decoder: decoder.file.check(), None)}
 
 
 def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any], list[str]]]:
@@ -110,7 +110,7 @@ def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
         with athcodec.open(server.address + NAME) as decoder:
             step(decoder)
             seconds.append(time.perf_counter() - start)
-            requests, size = decoder.source.requests, decoder.source.bytes
+            requests, size = decoder.file.source.requests, decoder.file.source.bytes
     return median(seconds), requests, size
 
 

@@ -81,12 +81,12 @@ class _Case:
 
     def info(self) -> None:
         with athcodec.open(self.file) as decoder:
-            decoder.info()
+            decoder.file.info()
 
     def one_frame(self) -> None:
         with athcodec.open(self.file) as decoder:
             decoder.positions(self.frame, level=1)
-            self.frame_bytes = decoder.bytes_read
+            self.frame_bytes = decoder.file.bytes_read
 
     def summary(self, seconds: dict[str, list[float]]) -> dict[str, float | int]:
         middle = {step: median(runs) for step, runs in seconds.items()}

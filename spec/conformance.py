@@ -241,10 +241,10 @@ def metadata_text(decoder) -> bytes:
     from athcodec import container
 
     _ = decoder.metadata  # refuses what is no JSON object
-    chunk = decoder.container.find(container.METADATA)
+    chunk = decoder.file.find(container.METADATA)
     if chunk is None:
         return b""
-    content = decoder.container.payload(chunk)
+    content = decoder.file.payload(chunk)
     return rd.parse_metadata(content, rd.Limits())
 
 

@@ -16,6 +16,7 @@ import athcodec
 from athcodec import container as ct
 from athcodec import entropy
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
+from athcodec.ath_file import AthFile
 from athcodec.transform import LevelStream, Plan, SegmentMotion, balanced_segments
 
 HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
@@ -33,8 +34,8 @@ class Parts:
 
     @classmethod
     def of(cls, data: bytes) -> Parts:
-        container = ct.Container(BytesIO(data), strict=True)
-        return cls(container.header, container.errors, [(c, container.payload(c)) for c in container.chunks])
+        file = AthFile(BytesIO(data), strict=True)
+        return cls(file.header, file.errors, [(chunk, file.payload(chunk)) for chunk in file.chunks])
 
     def file(self) -> bytes:
         """The bytes of a file whose table and checksums fit its chunks."""

@@ -66,7 +66,7 @@ def done_once(out: Path) -> set[str]:
     assert len({line["output"] for line in done}) == len(done)
     for line in done:
         with athcodec.open(out / line["output"], strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
         assert batch.inputs.sha256(out / line["output"]) == line["sha256"]
     return {line["output"] for line in done}
 

@@ -82,7 +82,7 @@ def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others():
 
     def ask(count: int) -> float:
         decoder = athcodec.open(BytesIO(segments_of_one_frame(count)))
-        core: core_file.File = decoder._player
+        core: core_file.File = decoder.file.core
         return seconds(lambda: [core.missing(1, segment) for segment in range(0, count, count // 250)])
 
     assert ask(32_000) < 8 * ask(250), "128 times the chunks"

@@ -54,7 +54,7 @@ def size_of(source: np.ndarray) -> float:
 
 def base_pose(decoder) -> np.ndarray:
     """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
-    return decoder._player.rest()
+    return decoder.file.core.rest()
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ def test_the_table_holds_the_errors_of_each_segment(played):
     for segment, (start, stop) in enumerate(decoder.segments):
         for level in range(decoder.level_count):
             distance = np.linalg.norm(decoder.positions(slice(start, stop), level) - source[start:stop], axis=2)
-            largest, rms = decoder.container.errors[level, segment]
+            largest, rms = decoder.file.errors[level, segment]
             assert distance.max() <= largest and np.sqrt((distance**2).mean()) == pytest.approx(rms, rel=1e-4, abs=1e-6)
 
 
@@ -130,7 +130,7 @@ def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name
         assert not np.array_equal(final, decoder.positions(level=last)[:, order])
         branch = decoder.hierarchy.vertex_branch()
         for level in range(1, last):
-            exact = np.isin(branch, Plan(decoder.branches, decoder.vertex_count).exact_branches(level))
+            exact = np.isin(branch, Plan(decoder.file.branches, decoder.vertex_count).exact_branches(level))
             shown = decoder.affines(0, level)
             assert np.array_equal(exact, np.repeat(shown.is_stem, shown.vertex_count))
             positions = decoder.positions(level=level)[:, order]
@@ -167,7 +167,7 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
-    assert not (decoder.branches["flags"] & LOOSE).any()
+    assert not (decoder.file.branches["flags"] & LOOSE).any()
     pose, hierarchy = base_pose(decoder), decoder.hierarchy
     attached = 0
     for level in range(decoder.level_count - 1):
@@ -240,27 +240,27 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         decoder = athcodec.open(file)
         if level >= decoder.level_count:
             continue
-        prelude = decoder.container.prelude_length
+        prelude = decoder.file.prelude_length
         assert all(stop <= prelude for _, stop in file.ranges), "opening reads the prelude alone"
         file.ranges.clear()
-        before = decoder.bytes_read
+        before = decoder.file.bytes_read
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
-        allowed = {c for c in decoder.container.chunks
+        allowed = {c for c in decoder.file.chunks
                        if c.is_motion and c.level <= level and (c.segment == 1 or c.kind == ct.SHAPES)}
         read = chunks_read(file, decoder)
         needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}
         assert needed and needed <= read <= allowed
-        assert decoder.bytes_read - before == sum(chunk.length for chunk in read)
+        assert decoder.file.bytes_read - before == sum(chunk.length for chunk in read)
 
 
 def chunks_read(file: Recorder, decoder) -> set:
     """Those whose bytes were all read, each once, where nothing else was read."""
-    times = np.zeros(decoder.file_length, int)
+    times = np.zeros(decoder.file.file_length, int)
     for start, stop in file.ranges:
         times[start:stop] += 1
-    read = {c for c in decoder.container.chunks if c.length and times[c.offset: c.offset + c.length].any()}
-    expected = np.zeros(decoder.file_length, int)
+    read = {c for c in decoder.file.chunks if c.length and times[c.offset: c.offset + c.length].any()}
+    expected = np.zeros(decoder.file.file_length, int)
     for chunk in read:
         expected[chunk.offset: chunk.offset + chunk.length] = 1
     assert np.array_equal(times, expected)
@@ -285,18 +285,18 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
         prepared.append((segment, level)), prepare(file, work, segment, level, into)))
     (first, stop), last = decoder.segments[1], decoder.level_count - 1
     decoder.positions(first, last)
-    before = decoder.bytes_read
+    before = decoder.file.bytes_read
     for frame in (*range(first, stop), *reversed(range(first, stop))):
         decoder.positions(frame, last)
         decoder.positions(frame, last, np.float64)
     decoder.positions(slice(first, stop), last)
     decoder.affines(first, last)
     list(decoder.blocks(last, frames=slice(first, stop)))
-    assert prepared == [(1, last)] and decoder.bytes_read == before
+    assert prepared == [(1, last)] and decoder.file.bytes_read == before
     decoder.positions(0, last)
     decoder.positions(first, 0)
     decoder.positions(stop - 1, last)
-    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.bytes_read > before
+    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.file.bytes_read > before
 
 
 def test_several_threads_at_once_see_what_one_alone_does(played):
@@ -338,7 +338,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
 
     def read(_) -> None:
         for _ in range(10):
-            decoder.check()
+            decoder.file.check()
             for name in ("attributes", "joined_metadata", "faces", "edges"):
                 vars(decoder).pop(name)   # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
@@ -364,9 +364,9 @@ def test_positions_of_another_type_are_the_files_own_in_that_type(dtype, tmp_pat
 def test_attributes_are_read_when_asked_for(full_ath):
     with athcodec.open(full_ath) as decoder:
         decoder.positions()
-        before = decoder.bytes_read
+        before = decoder.file.bytes_read
         assert set(decoder.attributes) == {"radius", "species"}
-        assert decoder.bytes_read > before
+        assert decoder.file.bytes_read > before
 
 
 @pytest.mark.parametrize("ask", [
@@ -409,8 +409,8 @@ def test_str_path_and_file_object_give_the_same(bushy_ath):
 def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
     summary = athcodec.encode(bushy_clip, tmp_path / "b.ath", rel_error=1e-3, segment_frames=16, effort="fast")
     with athcodec.open(summary.path) as decoder:
-        info = json.loads(json.dumps(decoder.info(), allow_nan=False))
-        assert decoder.table1() == summary.table1
+        info = json.loads(json.dumps(decoder.file.info(), allow_nan=False))
+        assert decoder.file.table1() == summary.table1
     assert info["vertices"] == bushy_clip.vertex_count and info["frames"] == 50 and info["segments"] == 4
     assert info["bytes"] == info["available_bytes"] == summary.bytes == summary.path.stat().st_size
     assert info["complete"] and info["max_error_bound"] == summary.max_error_bound
@@ -420,9 +420,9 @@ def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
 
 def test_the_table_of_the_ath_is_that_of_the_analysis(bushy_clip, bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        epsilon, eta, xi, lam = decoder.thresholds
+        epsilon, eta, xi, lam = decoder.file.thresholds
         expected = athcodec.build_ath(bushy_clip, epsilon, eta, xi, lam).table1()
-        assert decoder.table1() == expected
+        assert decoder.file.table1() == expected
 
 
 def test_one_frame_has_no_frame_rate(tmp_path):
@@ -442,8 +442,8 @@ def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
 def test_checking_reads_every_byte_behind_the_tables(full_ath):
     file = Recorder(full_ath.read_bytes())
     decoder = athcodec.open(file)
-    decoder.check()
-    covered = np.zeros(decoder.file_length, bool)
+    decoder.file.check()
+    covered = np.zeros(decoder.file.file_length, bool)
     for start, stop in file.ranges:
         covered[start:stop] = True
     assert covered.all()
@@ -451,9 +451,8 @@ def test_checking_reads_every_byte_behind_the_tables(full_ath):
 
 def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath):
     data = bytearray(bushy_ath.read_bytes())
-    container = athcodec.open(bushy_ath).container
-    container.file.close()
-    last = container.chunks[-1]
+    with athcodec.open(bushy_ath) as decoder:
+        last = decoder.file.chunks[-1]
     data[last.offset + last.length // 2] ^= 1
     decoder = athcodec.open(BytesIO(bytes(data)), strict=True)
     decoder.positions(level=decoder.level_count - 2)
@@ -479,7 +478,7 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
             residual = decoder.residual(17, level)[hierarchy.vertex_source]
             assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < 1e-9 * size
             branch = hierarchy.vertex_branch()[parts.first_vertex]
-            loose = decoder.branches["flags"][branch] & LOOSE > 0
+            loose = decoder.file.branches["flags"][branch] & LOOSE > 0
             hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]

@@ -206,8 +206,8 @@ def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
     summary = athcodec.encode(small, target, effort="fast", progress=look)
     assert seen == {b"older"} and list(tmp_path.iterdir()) == [target]
     with athcodec.open(target, strict=True) as decoder:
-        decoder.check()
-        assert decoder.file_length == summary.bytes
+        decoder.file.check()
+        assert decoder.file.file_length == summary.bytes
 
 
 def test_a_folder_that_does_not_exist_is_an_os_error(small, tmp_path):

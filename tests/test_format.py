@@ -309,7 +309,7 @@ def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
     """A file that plays to its end, or raises BadChunk for the one chunk that a test is about."""
     try:
         with opened(data, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
             yield decoder
     except errors.BadChunk as error:
         assert str(error).startswith(f"chunk {container.KIND_NAMES[kind]} ")
@@ -321,7 +321,7 @@ def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     with played(still_file(branches=like, hierarchy=hierarchy_chunk(stream)), container.HIERARCHY) as decoder:
         numbers = decoder.hierarchy
         assert not decoder.positions().any()
-        rows = [[int(row[name]) for name in fields] for row in decoder.branches]
+        rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
         return rows, numbers.branch_source.tolist(), numbers.vertex_source.tolist()
 
 
@@ -584,7 +584,7 @@ def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None
     with pytest.raises(spec.Invalid, match=f"^{error}$"):
         spec.decode(data, 1)
     with pytest.raises(errors.FormatError) as caught, athcodec.open(io.BytesIO(data)) as decoder:
-        decoder.check()
+        decoder.file.check()
     assert caught.value.name == error
 
 

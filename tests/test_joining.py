@@ -27,7 +27,7 @@ def changed(clip: MotionClip, **changes) -> MotionClip:
 
 def test_each_clip_is_found_by_its_name_and_keeps_the_bound(medley_clips, medley_ath):
     with athcodec.open(medley_ath, strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert [clip.name for clip in decoder.clips] == list(medley_clips)
         for name, source in medley_clips.items():
             played = decoder.play(name)
@@ -46,7 +46,7 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
             for level in played.levels:
                 measured = distance(played.positions(level=level.level), reference)
                 assert level.max_error == pytest.approx(measured, rel=1e-5)
-        assert [level["max_error"] for level in decoder.info()["levels"]] == [
+        assert [level["max_error"] for level in decoder.file.info()["levels"]] == [
             max(decoder.play(name).levels[level].max_error for name in medley_clips)
             for level in range(decoder.level_count)]
 

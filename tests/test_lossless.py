@@ -47,7 +47,7 @@ def test_the_hierarchy_is_as_deep_as_that_of_the_lossy_file(tmp_path):
     lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
     lossy = athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4)
     assert lossless.full_level_count == len(lossy.levels) + 1
-    assert lossless.table1() == lossy.table1 == lossless.info()["ath"]
+    assert lossless.file.table1() == lossy.table1 == lossless.file.info()["ath"]
     assert lossy.table1["depth"] == len(lossy.levels) - 1
 
 
@@ -73,7 +73,7 @@ def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     shorter = opened((tmp_path / "b.ath").read_bytes(), strict=True)
     assert bits(shorter.positions()) == bits(opened(data).positions(level=deepest - 1))
     assert 0 < shorter.max_error_bound == shorter.levels[-1].max_error
-    cut = opened(data[: opened(data).container.level_end(deepest - 1)])
+    cut = opened(data[: opened(data).file.levels[deepest - 1].bytes])
     assert bits(cut.positions()) == bits(shorter.positions())
 
 
@@ -83,7 +83,7 @@ def test_what_is_wrong_with_the_exact_level_is_said(tmp_path):
     last = parts.header.level_count - 1
     i = parts.index(ct.EXACT, last, 1)
     with pytest.raises(BadChunkTable, match="EXACT"):
-        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).check()
+        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).file.check()
     for payload in (parts.payload(ct.EXACT, last) + b"\x01" * 12, b"\xff" * 900):
         decoder = opened(parts.with_payload(ct.EXACT, payload, last))
         with pytest.raises(BadChunk, match="EXACT"):

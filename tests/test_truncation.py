@@ -18,9 +18,9 @@ class Whole:
     def __init__(self, path):
         self.path, self.data = path, path.read_bytes()
         with athcodec.open(path, strict=True) as decoder:
-            self.chunks, self.levels = decoder.container.chunks, decoder.levels
-            self.prelude = decoder.container.prelude_length
-            self.segments, self.header = decoder.segments, decoder.container.header
+            self.chunks, self.levels = decoder.file.chunks, decoder.levels
+            self.prelude = decoder.file.prelude_length
+            self.segments, self.header = decoder.segments, decoder.file.header
             self.positions = [decoder.positions(level=level) for level in range(decoder.level_count)]
             self.bound, self.attributes = decoder.max_error_bound, decoder.attributes
 
@@ -50,10 +50,10 @@ def full(full_ath):
 
 def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
     decoder, deepest = whole.cut(size), whole.deepest_within(size)
-    assert not decoder.complete and decoder.missing and "\n" not in decoder.missing
+    assert not decoder.file.complete and decoder.missing and "\n" not in decoder.missing
     assert [level.available for level in decoder.levels] == [d <= deepest for d in range(len(whole.levels))]
     with pytest.raises(Truncated):
-        decoder.check()
+        decoder.file.check()
     if deepest < 0:
         with pytest.raises(Truncated, match="level 0"):
             decoder.positions()
@@ -100,7 +100,7 @@ def test_every_prefix_fails_in_strict_opening(full):
     for size in range(len(full.data)):
         with pytest.raises(FormatError):
             full.cut(size, strict=True)
-    full.cut(len(full.data), strict=True).check()
+    full.cut(len(full.data), strict=True).file.check()
 
 
 def test_what_is_missing_is_named(bushy):
@@ -116,7 +116,7 @@ def test_what_is_missing_is_named(bushy):
 def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):
     size = next(c.offset for c in full.chunks if c.kind & 0x7FFF == 32) + 3
     decoder = full.cut(size)
-    assert not decoder.complete and "attributes" in decoder.missing
+    assert not decoder.file.complete and "attributes" in decoder.missing
     assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.attributes == {}
 
 
@@ -149,8 +149,8 @@ def test_truncated_files_are_whole_and_play_the_same_levels(whole, tmp_path):
         size = truncate(whole.path, target, level.level)
         assert size == target.stat().st_size
         with athcodec.open(target, strict=True) as decoder:
-            decoder.check()
-            assert decoder.complete and decoder.missing == ""
+            decoder.file.check()
+            assert decoder.file.complete and decoder.missing == ""
             assert decoder.level_count == level.level + 1 and decoder.full_level_count == len(whole.levels)
             for coarser in range(level.level + 1):
                 assert np.array_equal(decoder.positions(level=coarser), whole.positions[coarser])
@@ -205,7 +205,7 @@ def test_a_prefix_can_be_truncated_to_what_it_holds(bushy, tmp_path):
     (tmp_path / "prefix.ath").write_bytes(bushy.data[: bushy.levels[2].bytes + 5])
     truncate(tmp_path / "prefix.ath", tmp_path / "two.ath", 2)
     with athcodec.open(tmp_path / "two.ath", strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), bushy.positions[2])
 
 
@@ -255,5 +255,5 @@ def test_damage_in_a_level_that_is_left_out_does_no_harm(bushy, tmp_path):
     source.write_bytes(damaged(bushy, flip(len(bushy.data) - 5)))
     truncate(source, tmp_path / "cut.ath", 2)
     with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), bushy.positions[2])

@@ -99,7 +99,7 @@ def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, repo
 def _done(item: Item, source: dict[str, Any], summary: encoder.Summary, verify: bool, start: float) -> Result:
     if verify:
         with athcodec.open(summary.path, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
     stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
     last = summary.levels[-1]
     return {"done": stored | {

@@ -17,7 +17,8 @@ from athcodec.atomic_files import check_target
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
-from athcodec.decoder import Decoder, Level
+from athcodec.ath_file import Level
+from athcodec.decoder import Decoder
 from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
 from athcodec.joining import BLEND
@@ -223,14 +224,14 @@ def check_output(path: str, source: str) -> None:
 
 def _stats(decoder: Decoder) -> str:
     """What was read of a file, and what that asked of a server."""
-    requests = getattr(decoder.source, "requests", None)
+    requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
-        return f"{decoder.bytes_read:,} bytes read of {decoder.file_length:,}"
-    return f"{counted(requests, 'request')}, {decoder.source.bytes:,} bytes fetched of {decoder.file_length:,}"
+        return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"
+    return f"{counted(requests, 'request')}, {decoder.file.source.bytes:,} bytes fetched of {decoder.file.file_length:,}"
 
 
 def what_is_missing(decoder: Decoder) -> str:
-    if decoder.complete:
+    if decoder.file.complete:
         return decoder.missing
-    got, expected = decoder.info()["available_bytes"], decoder.file_length
+    got, expected = decoder.file.info()["available_bytes"], decoder.file.file_length
     return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.missing}"

@@ -42,12 +42,12 @@ def print_file(path: str, decoder: Decoder, as_json: bool) -> None:
 
 
 def facts_of(path: str | Path, decoder: Decoder) -> dict[str, Any]:
-    """decoder.info(), and per level what it adds to the file cut before it."""
-    facts = {"file": os.fspath(path)} | decoder.info()
+    """decoder.file.info(), and per level what it adds to the file cut before it."""
+    facts = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
-    before = decoder.container.prelude_length
+    before = decoder.file.prelude_length
     for level in facts["levels"]:
         level["added_bytes"] = level["bytes"] - before
         level["share"] = level["added_bytes"] / facts["bytes"]

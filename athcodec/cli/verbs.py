@@ -170,7 +170,7 @@ def verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
         with open_file(args.file, args.stats, strict=True, clip=args.clip) as decoder, ExitStack() as opened:
-            decoder.check()
+            decoder.file.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}

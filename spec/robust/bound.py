@@ -178,7 +178,7 @@ def broken_promises(attack: Attack, folder: Path) -> list[str]:
     except BoundError as error:
         return [] if _may_be_refused(clip, options["max_error"]) else [f"refused without reason: {error}"]
     with athcodec.open(summary.path, strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         return list(_broken(decoder, clip, options["max_error"], attack))
 
 
@@ -201,7 +201,7 @@ def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: A
         yield f"the file promises {decoder.max_error_bound}, not {bound}"
     for level in range(decoder.level_count):
         off = distances(decoder.positions(level=level), source, bound)
-        stated = decoder.container.errors[level, :, 0] / bound
+        stated = decoder.file.errors[level, :, 0] / bound
         for segment, (start, stop) in enumerate(decoder.segments):
             worst = off[start:stop].max()
             if not worst <= stated[segment] * (1 + 1e-6) + 1e-9:

@@ -82,7 +82,7 @@ def is_whole(path: Path) -> bool:
     try:
         if path.suffix == ".ath":
             with athcodec.open(path, strict=True) as decoder:
-                decoder.check()
+                decoder.file.check()
         else:
             with athcodec.read_hdf5(path) as clip:
                 clip.block(0, clip.frame_count)

@@ -263,12 +263,12 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         positions=np.float32(rest + 0.1 * np.sin(angle)[:, None, None] * rest[:, 1:2] ** 2), time=np.arange(40) / 30,
         vertex_branch=np.repeat([0, 1, 2], 4), branch_parent=[-1, 0, 0], rest=rest)
     return {
-        "info": opened(lambda decoder: decoder.info()),
+        "info": opened(lambda decoder: decoder.file.info()),
         "positions": opened(lambda decoder: decoder.positions()),
         "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
         "static": opened(lambda decoder: (decoder.attributes, decoder.metadata, decoder.edges, decoder.rest)),
-        "check": opened(lambda decoder: decoder.check()),
+        "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),
     }
