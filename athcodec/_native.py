@@ -1,6 +1,6 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/ath.h, the public API that players use (player.py), and core/encode.h, which encoding uses (transform.py,
+Mirrors core/ath.h, the public API that players use (core_file.py), and core/encode.h, which encoding uses (transform.py,
 entropy.py). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an array; they release the
 GIL, and hold no state.
 """
@@ -73,8 +73,11 @@ class Integers(ctypes.Structure):
 
 _PLAYING = {  # core/ath.h
     "ath_result_name": (c_char_p, [c_int]),
-    "ath_front": (c_int, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p]),
-    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, c_void_p]),
+    "ath_kind_name": (c_char_p, [c_int]),
+    "ath_fault_text": (c_size_t, [c_void_p, c_char_p, c_size_t]),
+    "ath_default_limits": (None, [c_void_p]),
+    "ath_front": (c_int, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p, c_void_p]),
+    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p]),
     "ath_build_size": (c_size_t, [c_void_p]),
     "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
     "ath_get_info": (None, [c_void_p, c_void_p]),
@@ -86,8 +89,11 @@ _PLAYING = {  # core/ath.h
     "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
     "ath_rest_wide": (None, [c_void_p, c_int, c_void_p, c_size_t]),
     "ath_chunks": (c_void_p, [c_void_p]),
-    "ath_fault": (c_int32, [c_void_p]),
-    "ath_work_fault": (c_int32, [c_void_p]),
+    "ath_check_chunk": (c_int, [c_void_p, c_int32, c_void_p]),
+    "ath_errors": (c_void_p, [c_void_p]),
+    "ath_level_error": (None, [c_void_p, c_int32, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_segment_start": (c_int32, [c_void_p, c_int32]),
+    "ath_work_fault": (None, [c_void_p, c_void_p]),
     "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
     "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
     "ath_ranges": (c_int32, [c_void_p, c_int32, c_int32, c_int32, c_int, c_void_p, c_int32]),

@@ -18,7 +18,7 @@ from athcodec.errors import ClipError
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
-SPANS, NAME_BYTES = 255, 255
+CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
 RESERVED_NAMES = frozenset(
     ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces")
@@ -36,7 +36,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class Span:
+class ClipRange:
     """A run of frames that is a clip of its own in the file: `name`, how many frames, and whether it is a loop, whose
     first frame follows its last."""
 
@@ -51,7 +51,7 @@ class MotionClip:
 
     positions      (T, N, 3) float32 or float64, in `metadata["unit"]`: an array, or anything that has shape
                    and dtype and is sliced by frames (an h5py.Dataset, a numpy.memmap). Never read whole.
-    time           (T,) seconds, strictly increasing (within each span); becomes float64. The steps may differ.
+    time           (T,) seconds, strictly increasing (within each clip range); becomes float64. The steps may differ.
     vertex_branch  (N,) integers, the branch of each vertex; becomes int32. None, and branch_parent too: not known,
                    see discovery.py.
     branch_parent  (B,) integers, -1 for a root (several are allowed); becomes int32.
@@ -70,8 +70,8 @@ class MotionClip:
                    them. "fps" and "start_frame": the rate and the number of the first frame in the tool that made it,
                    whose frames are then start_frame + time * fps. "part_names": the objects that the vertices belong
                    to, one after the other, their numbers of vertices in the attribute part_vertex_counts.
-    spans          where it is several clips one after the other, or a loop: tuple of Span, which make up all frames and
-                   have names of their own; joining.py makes such clips. Empty: one clip without a name.
+    clip_ranges    where it is several clips one after the other, or a loop: tuple of ClipRange, which make up all
+                   frames and have names of their own; joining.py makes such clips. Empty: one clip without a name.
     skin           the joints that moved the vertices, where a source has them; not stored, only for discovery.py.
     resource       something with close(), closed with the clip: the open file behind lazily read positions.
     unchanged      a function that tells whether what the positions are read from is as it was when the clip was made.
@@ -91,7 +91,7 @@ class MotionClip:
     metadata: dict[str, Any] = field(default_factory=dict)
     rest_pose: str = "first"
     stem_index: np.ndarray | None = None
-    spans: tuple[Span, ...] = ()
+    clip_ranges: tuple[ClipRange, ...] = ()
     resource: Any = None
     unchanged: Callable[[], bool] | None = None
     skin: Skin | None = None
@@ -147,13 +147,13 @@ class MotionClip:
     @property
     def fps(self) -> float:
         """Median frame rate in frames per second; for a single frame metadata["fps"], else 30."""
-        steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.span_frames])
+        steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.clip_range_frames])
         return float(1.0 / np.median(steps)) if len(steps) else frame_rate(self.metadata)
 
     @property
-    def span_frames(self) -> list[tuple[int, int]]:
-        """(start, stop) frames of each span; of the whole clip where it has none."""
-        return span_frames(self.spans) if self.spans else [(0, self.frame_count)]
+    def clip_range_frames(self) -> list[tuple[int, int]]:
+        """(start, stop) frames of each clip range; of the whole clip where it has none."""
+        return clip_range_frames(self.clip_ranges) if self.clip_ranges else [(0, self.frame_count)]
 
     def check(self) -> None:
         """Check the structure and bring the small arrays to their documented dtypes; raises ClipError.
@@ -161,8 +161,8 @@ class MotionClip:
         The positions themselves are not read here, except for a rest pose that was not given.
         """
         frame_count, vertex_count = self._check_positions()
-        check_spans(self.spans, frame_count)
-        self.time = check_time(self.time, frame_count, self.spans)
+        check_clip_ranges(self.clip_ranges, frame_count)
+        self.time = check_time(self.time, frame_count, self.clip_ranges)
         self._check_branches(vertex_count)
         self.edges = check_indices("edges", self.edges, vertex_count, width=2)
         self.faces = check_indices("faces", self.faces, vertex_count)
@@ -279,28 +279,29 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
                     f"{LARGEST_COORDINATE:g}")
 
 
-def span_frames(spans: Sequence[Span]) -> list[tuple[int, int]]:
+def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
     """(start, stop) frames of each."""
-    stops = np.cumsum([span.frame_count for span in spans]).tolist()
+    stops = np.cumsum([clip_range.frame_count for clip_range in clip_ranges]).tolist()
     return list(zip([0, *stops], stops))
 
 
-def check_spans(spans: Sequence[Span], frame_count: int) -> None:
+def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> None:
     """ClipError unless they make up all frames, and several of them have names that can be told apart."""
-    if not spans:
+    if not clip_ranges:
         return
-    counts, names = [span.frame_count for span in spans], [span.name for span in spans]
+    counts = [clip_range.frame_count for clip_range in clip_ranges]
+    names = [clip_range.name for clip_range in clip_ranges]
     if min(counts) < 1 or sum(counts) != frame_count:
-        raise ClipError(f"spans: got {counts} frames, expected {frame_count} in all, at least one each")
+        raise ClipError(f"clip_ranges: got {counts} frames, expected {frame_count} in all, at least one each")
     for name in names:
         size = len(name.encode("utf-8", "surrogatepass"))
-        if not (name or len(spans) == 1) or size > NAME_BYTES or not is_name(name):
+        if not (name or len(clip_ranges) == 1) or size > NAME_BYTES or not is_name(name):
             raise ClipError(f"clip names: got {name!r}, expected 1 to {NAME_BYTES} bytes of text without control "
                             f"characters")
     if len(set(names)) < len(names):
         raise ClipError(f"clip names: got {', '.join(names)}, expected each once")
-    if len(spans) > SPANS:
-        raise ClipError(f"clips: got {len(spans)}, expected at most {SPANS}")
+    if len(clip_ranges) > CLIP_RANGES:
+        raise ClipError(f"clips: got {len(clip_ranges)}, expected at most {CLIP_RANGES}")
 
 
 def is_name(text: str) -> bool:
@@ -308,8 +309,8 @@ def is_name(text: str) -> bool:
     return not any(c < " " or c == "\x7f" or "\ud800" <= c <= "\udfff" for c in text)
 
 
-def check_time(time: Any, frame_count: int, spans: Sequence[Span] = ()) -> np.ndarray:
-    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each span and one per frame."""
+def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
+    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip range and one per frame."""
     time = np.asarray(time)
     if time.shape != (frame_count,):
         raise ClipError(f"time: got shape {time.shape}, expected ({frame_count},), one time per frame")
@@ -319,7 +320,7 @@ def check_time(time: Any, frame_count: int, spans: Sequence[Span] = ()) -> np.nd
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise ClipError(f"time: frame {bad[0]} is at {time[bad[0]]}, expected a finite number of seconds")
-    starts = [start for start, _ in span_frames(spans)[1:]]
+    starts = [start for start, _ in clip_range_frames(clip_ranges)[1:]]
     late = np.setdiff1d(np.flatnonzero(np.diff(time) <= 0), np.array(starts, int) - 1)
     if late.size:
         frame = late[0] + 1

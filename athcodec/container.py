@@ -1,8 +1,9 @@
-"""The .ath file: the only module that knows byte offsets, checksums and limits (FORMAT.md, "File").
+"""Writing an .ath file (FORMAT.md, "File"), and its static data, both ways.
 
 A file is a header, a chunk table and an error table, then the chunks in table order without gaps, so that offsets are
 never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
-other attributes last. This module packs and parses; what the streams inside mean is the business of entropy.py.
+other attributes last. What the streams inside mean is the business of entropy.py. The C core parses files; only static
+arrays and metadata, which it hands over as stored, are parsed here.
 """
 
 from __future__ import annotations
@@ -13,33 +14,25 @@ import re
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from typing import BinaryIO
+from dataclasses import dataclass, field, replace
+from typing import Any, BinaryIO
 
 import numpy as np
 import zstandard
 
-from athcodec._native import SEGMENT_FRAMES, crc32c
-from athcodec.clip import Span
+from athcodec._native import crc32c
+from athcodec.clip import ClipRange
 from athcodec.errors import (
-    BadChecksum,
     BadChunk,
-    BadChunkTable,
-    BadHeader,
     ClipError,
     FormatError,
     LimitExceeded,
-    NotAnAthFile,
-    TrailingBytes,
-    Truncated,
-    UnknownChunk,
-    UnsupportedVersion,
 )
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 4
 NO_LEVEL = 255
-OPTIONAL = 0x8000
+OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
@@ -86,15 +79,26 @@ class Header:
     level_count: int
     full_level_count: int
     max_error: float
-    wide: bool = False
+    is_float64: bool = False
     clip_count: int = 1
     chunk_count: int = 0
     file_length: int = 0
 
 
+def is_prelude(kind: Any) -> Any:
+    """Whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
+    return (kind & KIND_ID) < 16
+
+
+def is_motion(kind: Any) -> Any:
+    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known ones, and those reserved."""
+    return (kind & KIND_ID) // 16 == 1
+
+
 @dataclass(frozen=True)
 class Chunk:
-    """One entry of the chunk table, with the offset that follows from those before it."""
+    """One entry of the chunk table, with the offset that follows from those before it, and its index in the table of a
+    file that is read."""
 
     kind: int
     level: int
@@ -102,11 +106,12 @@ class Chunk:
     length: int
     checksum: int
     offset: int = 0
+    index: int = -1
 
     @property
     def is_motion(self) -> bool:
-        """Whether the kind belongs to a level and a segment: known ones, and those reserved for it."""
-        return 16 <= self.kind & ~OPTIONAL < 32
+        """Whether the chunk is of a level and a segment."""
+        return bool(is_motion(self.kind))
 
     def __str__(self) -> str:
         name = KIND_NAMES.get(self.kind, f"kind {self.kind:#06x}")
@@ -117,7 +122,7 @@ class Chunk:
 def _pack_header(header: Header, checksum: int) -> bytes:
     return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
                         header.branch_count, header.frame_count, header.segment_count, header.level_count,
-                        header.full_level_count, header.clip_count, int(header.wide), header.max_error, 0)
+                        header.full_level_count, header.clip_count, int(header.is_float64), header.max_error, 0)
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
@@ -147,12 +152,10 @@ def _round_up(values: np.ndarray) -> np.ndarray:
     return np.where(single < values, np.nextafter(single, np.float32(np.inf)), single)
 
 
-def _order(chunk: Chunk) -> tuple:
+def _order(chunk: Chunk) -> tuple[int, ...]:
     if chunk.is_motion:
         return (1, chunk.level, chunk.segment, chunk.kind)
-    if chunk.kind & ~OPTIONAL < 16:
-        return (0, chunk.kind & ~OPTIONAL)
-    return (2, chunk.kind & ~OPTIONAL)
+    return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
 
 
 @dataclass
@@ -182,205 +185,10 @@ class ChunkStore:
         out.write(pack_front(header, [chunk for chunk, _ in entries], errors))
         chunks = []
         for chunk, place in entries:
-            chunks.append(_at(chunk, out.tell()))
+            chunks.append(replace(chunk, offset=out.tell()))
             self.spool.seek(place)
             out.write(self.spool.read(chunk.length))
         return chunks
-
-
-def _at(chunk: Chunk, offset: int) -> Chunk:
-    return Chunk(chunk.kind, chunk.level, chunk.segment, chunk.length, chunk.checksum, offset)
-
-
-class Container:
-    """An opened .ath file: header, chunks, errors, and the bytes of any chunk that is there.
-
-    `strict` refuses a file that is shorter or longer than its header says; otherwise what is missing is known
-    (`available_length`) and only a file cut inside its prelude is refused. Counts bytes in `bytes_read`.
-    """
-
-    def __init__(self, file: BinaryIO, *, strict: bool = False, limits: Limits | None = None):
-        self.file, self.limits = file, limits or Limits()
-        self.bytes_read = 0
-        self.available_length = file.seek(0, 2)
-        self.header, front = self._read_header()
-        self.chunks, self.errors = self._read_tables(front)
-        self._places = {(chunk.kind, chunk.level, chunk.segment): chunk for chunk in reversed(self.chunks)}
-        self._check_length(strict)
-
-    def _read_some(self, offset: int, length: int) -> bytes:
-        """`length` bytes, or what there is of them: a file may give fewer at a time than it was asked for."""
-        self.file.seek(offset)
-        parts, got = [], 0
-        while got < length and (part := self.file.read(length - got)):
-            parts.append(part)
-            got += len(part)
-        self.bytes_read += got
-        return parts[0] if len(parts) == 1 else b"".join(parts)
-
-    def _read(self, offset: int, length: int, what: str) -> bytes:
-        data = self._read_some(offset, length)
-        if len(data) < length:
-            raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
-        return data
-
-    def _read_header(self) -> tuple[Header, bytes]:
-        front = self._read_some(0, _HEADER.size)
-        if front[:8] != MAGIC[: len(front)] or not front:
-            raise NotAnAthFile(f"file: got {front[:8]!r} at byte 0; expected {MAGIC!r}")
-        if len(front) >= 12:
-            major, minor = struct.unpack_from("<HH", front, 8)
-            if (major, minor) != (MAJOR, MINOR):
-                raise UnsupportedVersion(f"file: got format version {major}.{minor}; expected {MAJOR}.{MINOR}")
-        if len(front) < _HEADER.size:
-            raise Truncated(f"header: got {len(front)} bytes; expected {_HEADER.size}")
-        (_, _, _, self._checksum, length, chunk_count, vertices, branches, frames, segments, levels, full_levels, clips,
-         flags, max_error, reserved) = _HEADER.unpack(front)
-        header = Header(vertices, branches, frames, segments, levels, full_levels, max_error, bool(flags & 1),
-                        clips, chunk_count, length)
-        self._check_header(header, flags, reserved)
-        return header, front
-
-    def _check_header(self, header: Header, flags: int, reserved: int) -> None:
-        limits = self.limits
-        for name, value, limit in (("Vertex_Count", header.vertex_count, limits.vertices),
-                                   ("Branch_Count", header.branch_count, limits.branches),
-                                   ("Frame_Count", header.frame_count, limits.frames),
-                                   ("Segment_Count", header.segment_count, limits.frames),
-                                   ("Chunk_Count", header.chunk_count, limits.chunks)):
-            if value < 1:
-                raise BadHeader(f"header: got {name} 0; expected at least 1")
-            if value > limit:
-                raise LimitExceeded(f"header: got {name} {value}; the limit is {limit}")
-        checks = [
-            (header.branch_count <= header.vertex_count, "Branch_Count", header.branch_count, "at most Vertex_Count"),
-            (header.segment_count <= header.frame_count <= SEGMENT_FRAMES * header.segment_count, "Segment_Count",
-             header.segment_count, f"segments of 1 to {SEGMENT_FRAMES} frames"),
-            (2 <= header.full_level_count <= 32, "Full_Level_Count", header.full_level_count, "2 to 32"),
-            (1 <= header.level_count <= header.full_level_count, "Level_Count", header.level_count,
-             "1 to Full_Level_Count"),
-            (header.clip_count >= 1, "Clip_Count", header.clip_count, "at least 1"),
-            (flags < 2, "Flags", flags, "reserved bits 0"),
-            (reserved == 0, "Reserved", reserved, "0"),
-            (math.isfinite(header.max_error) and header.max_error >= 0, "Max_Error", header.max_error,
-             "a finite length"),
-        ]
-        for valid, name, value, expected in checks:
-            if not valid:
-                raise BadHeader(f"header: got {name} {value}; expected {expected}")
-
-    def _read_tables(self, front: bytes) -> tuple[list[Chunk], np.ndarray]:
-        header = self.header
-        table_size = header.chunk_count * _CHUNK.size
-        size = _tables_size(header, header.chunk_count)
-        if size > self.limits.table_bytes:
-            raise LimitExceeded(f"chunk table: got {size} bytes; the limit is {self.limits.table_bytes}")
-        table = self._read(_HEADER.size, size, "chunk table")
-        blank = front[:_CHECKSUM_AT] + b"\0\0\0\0" + front[_CHECKSUM_AT + 4:]
-        if crc32c(blank + table) != self._checksum:
-            raise BadChecksum(f"header and chunk table: got checksum {crc32c(blank + table):#010x}; "
-                              f"expected {self._checksum:#010x}")
-        self._front = front + table
-        errors = np.frombuffer(table, "<f4", offset=table_size).reshape(header.level_count, header.segment_count, 2)
-        if not np.isfinite(errors).all() or (errors < 0).any():
-            raise BadChunkTable("error table: got a value that is negative or not finite")
-        return self._parse_chunks(table, _HEADER.size + size), errors.astype(np.float64)
-
-    def _parse_chunks(self, table: bytes, offset: int) -> list[Chunk]:
-        chunks = []
-        for i in range(self.header.chunk_count):
-            kind, reserved, level, segment, length, checksum = _CHUNK.unpack_from(table, i * _CHUNK.size)
-            chunk = Chunk(kind, level, segment, length, checksum, offset)
-            self._check_chunk(chunk, reserved)
-            if chunks and self._misplaced(chunks[-1], chunk):
-                raise BadChunkTable(f"chunk table: {chunk}: expected after {chunks[-1]} in file order, each once")
-            chunks.append(chunk)
-            offset += length
-        if offset != self.header.file_length:
-            raise BadChunkTable(f"chunk table: chunks end at byte {offset}; expected {self.header.file_length}")
-        return [chunk for chunk in chunks if chunk.kind in KIND_NAMES]
-
-    @staticmethod
-    def _misplaced(before: Chunk, chunk: Chunk) -> bool:
-        repeatable = chunk.kind & OPTIONAL and chunk.kind & ~OPTIONAL >= 32
-        return _order(chunk) < _order(before) or (_order(chunk) == _order(before) and not repeatable)
-
-    def _check_chunk(self, chunk: Chunk, reserved: int) -> None:
-        if chunk.kind not in KIND_NAMES and (not chunk.kind & OPTIONAL or chunk.kind ^ OPTIONAL in KIND_NAMES):
-            raise UnknownChunk(f"{chunk}: got a required kind that this decoder does not know")
-        if chunk.length > self.limits.chunk_bytes:
-            raise LimitExceeded(f"{chunk}: got {chunk.length} bytes; the limit is {self.limits.chunk_bytes}")
-        level_valid = chunk.level < self.header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
-        segment_valid = chunk.segment < (self.header.segment_count if chunk.is_motion else 1)
-        if reserved != 0 or not level_valid or not segment_valid:
-            raise BadChunkTable(f"{chunk}: got level {chunk.level}, segment {chunk.segment}, reserved {reserved}; "
-                                f"expected what the header announces, and 0")
-
-    def _check_length(self, strict: bool) -> None:
-        expected, got = self.header.file_length, self.available_length
-        if got < self.prelude_length:
-            raise Truncated(f"prelude: got {got} bytes; expected {self.prelude_length}")
-        if strict and got < expected:
-            raise Truncated(f"file: got {got} bytes; expected {expected}")
-        if got > expected and strict:
-            raise TrailingBytes(f"file: got {got} bytes; expected {expected}")
-
-    @property
-    def prelude_length(self) -> int:
-        """Bytes before the first motion chunk."""
-        motion = [chunk.offset for chunk in self.chunks if _order(chunk)[0] > 0]
-        return min(motion, default=self.header.file_length)
-
-    def is_available(self, chunk: Chunk) -> bool:
-        return chunk.offset + chunk.length <= self.available_length
-
-    def find(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> Chunk | None:
-        return self._places.get((kind, level, segment))
-
-    def level_end(self, level: int) -> int:
-        """Bytes of the file cut after `level`."""
-        ends = [c.offset + c.length for c in self.chunks if _order(c)[0] == 0 or (c.is_motion and c.level <= level)]
-        return max(ends)
-
-    def payload(self, chunk: Chunk) -> bytes:
-        """A chunk's bytes. Raises Truncated, BadChecksum."""
-        data = self._read(chunk.offset, chunk.length, str(chunk))
-        if crc32c(data) != chunk.checksum:
-            doubt = getattr(self.file, "doubt", "")
-            raise BadChecksum(f"{chunk}: got checksum {crc32c(data):#010x}; expected {chunk.checksum:#010x}{doubt}")
-        return data
-
-    def prefetch(self, ranges: list[tuple[int, int]]) -> None:
-        """Tells a file that is far away which (offset, size) are read next."""
-        if hasattr(self.file, "prefetch"):
-            self.file.prefetch(ranges)
-
-    def read(self, offset: int, length: int) -> bytes:
-        """Bytes of the file as they are. Raises Truncated."""
-        return self._read(offset, length, f"bytes from {offset} on")
-
-    def prelude(self) -> bytes:
-        """Everything in front of the first motion chunk. Raises Truncated."""
-        return self._front + self._read(len(self._front), self.prelude_length - len(self._front), "prelude")
-
-    def required(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> bytes:
-        """The bytes of a chunk that must be there. Raises BadChunkTable where the table has none."""
-        chunk = self.find(kind, level, segment)
-        if chunk is None:
-            place = "" if level == NO_LEVEL else f" of level {level}, segment {segment}"
-            raise BadChunkTable(f"chunk table: got no {KIND_NAMES[kind]}{place}; expected one")
-        return self.payload(chunk)
-
-
-def truncated_front(container: Container, level: int) -> tuple[bytes, list[Chunk]]:
-    """Front of a file that stores the levels up to `level`, and the chunks to copy behind it."""
-    header = container.header
-    chunks = [c for c in container.chunks if not c.is_motion or c.level <= level]
-    errors = container.errors[: level + 1]
-    promise = header.max_error if level + 1 == header.full_level_count else float(errors[level, :, 0].max())
-    shorter = Header(header.vertex_count, header.branch_count, header.frame_count, header.segment_count, level + 1,
-                     header.full_level_count, promise, header.wide, header.clip_count)
-    return pack_front(shorter, chunks, errors), chunks
 
 
 # ---- heads of the chunks ----------------------------------------------------------------------------------------
@@ -396,22 +204,10 @@ _CORRECTIONS = struct.Struct("<f")
 _ARRAY = struct.Struct("<H")
 
 
-def _head(form: struct.Struct, data: bytes, what: str) -> tuple:
-    if len(data) < form.size:
-        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {form.size}")
-    return form.unpack_from(data)
-
-
 def brief(value: object) -> str:
     """What a file holds, as an error message shows it."""
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."
-
-
-def _positive(value: float, what: str) -> float:
-    if not (math.isfinite(value) and value > 0):
-        raise BadChunk(f"{what}: got {value}; expected a finite number above 0")
-    return value
 
 
 def pack_hierarchy(thresholds, stream: bytes) -> bytes:
@@ -433,8 +229,8 @@ class Rest:
 
 
 def pack_rest(rest: Rest) -> bytes:
-    wide = rest.source_dtype == np.float64
-    return _REST.pack(int(rest.exact), int(wide), 0, *rest.origin, rest.step) + rest.stream
+    is_float64 = rest.source_dtype == np.float64
+    return _REST.pack(int(rest.exact), int(is_float64), 0, *rest.origin, rest.step) + rest.stream
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:
@@ -459,13 +255,14 @@ def _steady_step(method: int, time: np.ndarray) -> float | None:
         return next(fit, None)
 
 
-def pack_clips(spans: Sequence[Span], segment_counts: Sequence[int], seams: Sequence[Sequence[float] | None]) -> bytes:
+def pack_clips(clip_ranges: Sequence[ClipRange], segment_counts: Sequence[int],
+               seams: Sequence[Sequence[float] | None]) -> bytes:
     """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32."""
     entries = []
-    for span, segments, errors in zip(spans, segment_counts, seams):
-        name = span.name.encode()
-        entries.append(_CLIP.pack(span.frame_count, segments, int(span.loop), len(name)) + name)
-        if span.loop:
+    for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
+        name = clip_range.name.encode()
+        entries.append(_CLIP.pack(clip_range.frame_count, segments, int(clip_range.loop), len(name)) + name)
+        if clip_range.loop:
             entries.append(_round_up(errors).astype("<f4").tobytes())
     return b"".join(entries)
 
@@ -611,7 +408,9 @@ def _refusals(what: str) -> Iterator[None]:
 
 
 def _array_head(data: bytes, what: str) -> tuple[dict, bytes]:
-    (length,) = _head(_ARRAY, data, what)
+    if len(data) < _ARRAY.size:
+        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {_ARRAY.size}")
+    (length,) = _ARRAY.unpack_from(data)
     if length > len(data) - _ARRAY.size:
         raise BadChunk(f"{what}: got a head of {length} bytes; expected at most what the chunk holds")
     return _parse_json(data[_ARRAY.size: _ARRAY.size + length], what), data[_ARRAY.size + length:]

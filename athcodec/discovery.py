@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.files import new_file
 from athcodec.hierarchy import branch_orders, branches_from_edges
 
 METHODS = ("attributes", "skeleton", "edges", "components", "motion")

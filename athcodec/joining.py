@@ -1,7 +1,7 @@
 """Several clips of one plant as one, for one file; and clips that repeat without a jump.
 
 A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such
-clips one after the other; the encoder sees one long clip whose spans it codes apart. `split` is its inverse. `looped`
+clips one after the other; the encoder sees one long clip whose ranges it codes apart. `split` is its inverse. `looped`
 makes a clip that can be played over and over. All read frames only when they are asked for.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import MotionClip, Span, check_spans, span_frames
+from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
 
 BLEND = "loop_blend"  # metadata: frames that were blended
@@ -35,7 +35,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     parts, first = list(clips.values()), next(iter(clips.values()))
     for name, part in clips.items():
         _check_alike(name, part, next(iter(clips)), first)
-    spans = tuple(dataclasses.replace(_only_span(name, part), name=name) for name, part in clips.items())
+    clip_ranges = tuple(dataclasses.replace(_only_clip_range(name, part), name=name) for name, part in clips.items())
     rest = _common_rest(clips)
     closing = ExitStack()
     for part in parts:
@@ -43,16 +43,17 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     return MotionClip(
         _Joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
         first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
-        stem_index=first.stem_index, spans=spans, resource=closing, unchanged=_all_unchanged(parts), skin=first.skin)
+        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts),
+        skin=first.skin)
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
     """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
-    if len(clip.spans) < 2:
-        return {_only_span("", clip).name: clip}
-    return {span.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
-                                 spans=(span,), metadata=metadata_of(clip.metadata, span.name))
-            for span, (start, stop) in zip(clip.spans, clip.span_frames)}
+    if len(clip.clip_ranges) < 2:
+        return {_only_clip_range("", clip).name: clip}
+    return {clip_range.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
+                                       clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
+            for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)}
 
 
 def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -70,43 +71,43 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     at its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a
     third of the frames. Raises ClipError.
     """
-    span = _only_span("", clip)
+    clip_range = _only_clip_range("", clip)
     if not 0 <= blend <= clip.frame_count // 3:
         raise ClipError(f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the "
                         "clip")
     frames = clip.frame_count - blend
-    spans = (dataclasses.replace(span, frame_count=frames, loop=True),)
+    clip_ranges = (dataclasses.replace(clip_range, frame_count=frames, loop=True),)
     if not blend:
-        return _replaced(clip, spans=spans)
-    return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], spans=spans,
+        return _replaced(clip, clip_ranges=clip_ranges)
+    return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
                      metadata=clip.metadata | {BLEND: blend})
 
 
-def with_notes(motion: Any) -> dict[str, Any]:
-    """Metadata of a clip or an Excerpt, as far as it has any, with its name and that it is a loop."""
-    span = next(iter(getattr(motion, "spans", ())), Span("", 0))
+def with_clip_metadata(motion: Any) -> dict[str, Any]:
+    """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
+    clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
-    return metadata | ({NAME: span.name} if span.name else {}) | ({LOOP: True} if span.loop else {})
+    return metadata | ({NAME: clip_range.name} if clip_range.name else {}) | ({LOOP: True} if clip_range.loop else {})
 
 
-def take_notes(clip: MotionClip) -> None:
+def read_clip_metadata(clip: MotionClip) -> None:
     """Takes name and loop out of the metadata of a clip, and gives them to it. Raises ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:
         clip.metadata = {key: value for key, value in clip.metadata.items() if key not in (NAME, LOOP)}
-        clip.spans = (Span(name, clip.frame_count, loop),)
-        check_spans(clip.spans, clip.frame_count)
+        clip.clip_ranges = (ClipRange(name, clip.frame_count, loop),)
+        check_clip_ranges(clip.clip_ranges, clip.frame_count)
 
 
 def _replaced(clip: MotionClip, **changes: Any) -> MotionClip:
     return dataclasses.replace(clip, rest=clip.rest.astype(clip.rest_dtype), **changes)
 
 
-def _only_span(name: str, clip: MotionClip) -> Span:
-    if len(clip.spans) > 1:
-        raise ClipError(f"{name or 'clip'}: got {len(clip.spans)} clips in one, expected a single one")
-    return clip.spans[0] if clip.spans else Span(name, clip.frame_count)
+def _only_clip_range(name: str, clip: MotionClip) -> ClipRange:
+    if len(clip.clip_ranges) > 1:
+        raise ClipError(f"{name or 'clip'}: got {len(clip.clip_ranges)} clips in one, expected a single one")
+    return clip.clip_ranges[0] if clip.clip_ranges else ClipRange(name, clip.frame_count)
 
 
 def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip) -> None:
@@ -159,7 +160,7 @@ class _Joined:
 
     def __init__(self, parts: Sequence[Any]):
         self._parts = parts
-        self._frames = span_frames([Span("", part.shape[0]) for part in parts])
+        self._frames = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
         self.dtype = np.result_type(*(part.dtype for part in parts))
         self.shape = (self._frames[-1][1], *parts[0].shape[1:])
 

@@ -3,29 +3,56 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 from athcodec import container as ct
+from athcodec.ath_file import AthFile
+from athcodec.atomic_files import new_file
 from athcodec.errors import LevelUnavailable, Truncated
-from athcodec.files import new_file
 
 
-def truncate(source, target, depth: int) -> int:
-    """Writes the levels 0 to `depth` of the .ath file `source` to `target`, a complete file of its own.
+def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], level: int) -> int:
+    """Writes the levels 0 to `level` of an .ath file as a complete file of its own, which promises the error of `level`.
 
-    Static data is kept; the new file promises the error of `depth`. Returns its size in bytes. Raises
-    LevelUnavailable, a FormatError, or OSError.
+    Static data is kept. Nothing is decoded.
+
+    Parameters
+    ----------
+    source : str or path-like
+        The file to shorten.
+    target : str or path-like
+        The file to write; it appears when it is complete.
+    level : int
+        The last level to keep.
+
+    Returns
+    -------
+    int
+        Size of the new file, bytes.
+
+    Raises
+    ------
+    LevelUnavailable
+        Where the source has no such level.
+    FormatError
+        Where the source is damaged, or was cut off before that level.
+    OSError
+        Where a file cannot be read or written.
     """
-    with open(os.fspath(source), "rb") as file:
-        container = ct.Container(file)
-        if not 0 <= depth < container.header.level_count:
-            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {container.header.level_count - 1}")
-        front, chunks = ct.truncated_front(container, depth)
-        absent = [chunk for chunk in chunks if not container.is_available(chunk)]
-        if absent:
-            raise Truncated(f"{absent[0]}: got a file of {container.available_length} bytes; expected at least "
-                            f"{absent[0].offset + absent[0].length}")
+    with open(os.fspath(source), "rb") as opened, AthFile(opened) as file:
+        if not 0 <= level < file.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
+        chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
+        for chunk in chunks:
+            if not file.is_available(chunk):
+                raise Truncated(f"{chunk}: got a file of {file.available_length} bytes; expected at least "
+                                f"{chunk.offset + chunk.length}")
+        errors = file.errors[: level + 1]
+        whole = level + 1 == file.full_level_count
+        header = replace(file.header, level_count=level + 1,
+                         max_error=file.max_error_bound if whole else float(errors[level, :, 0].max()))
         with new_file(target) as out:
-            out.write(front)
+            out.write(ct.pack_front(header, chunks, errors))
             for chunk in chunks:
-                out.write(container.payload(chunk))
+                out.write(file.payload(chunk))
             return out.tell()

@@ -92,7 +92,7 @@ def make_clips(args: argparse.Namespace, folder: Path) -> int:
             window = athcodec.MotionClip(
                 clip.block(start, start + frames), clip.time[:frames], clip.vertex_branch, clip.branch_parent,
                 clip.rest.astype(clip.rest_dtype), stem_index=clip.stem_index, metadata=clip.metadata)
-            athcodec.write_hdf5(folder / f"clip_{number:04}.h5", window)
+            athcodec.write_hdf5(window, folder / f"clip_{number:04}.h5")
         return clip.vertex_count
 
 

@@ -49,10 +49,10 @@ def encoded(path: Path, rel_error: float, effort: str = "default") -> Iterator[E
             yield Encoded(clip, summary, decoder)
 
 
-def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, depth: int | None = None) -> ErrorMeter:
-    """Errors of the positions decoded at a depth (default: the deepest), in the file's own float type."""
+def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None) -> ErrorMeter:
+    """Errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
     meter = ErrorMeter(clip.rest)
-    for start, frames in decoder.blocks(depth):
+    for start, frames in decoder.blocks(level):
         meter.add(clip.block(start, start + len(frames)), frames)
     return meter
 

@@ -174,7 +174,7 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
         if source:
             source.close()
     clip.metadata["recipe"] = recipe_text(name)
-    athcodec.write_hdf5(path, clip)
+    athcodec.write_hdf5(clip, path)
     return time.perf_counter() - start
 
 

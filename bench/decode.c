@@ -75,9 +75,10 @@ static void open_and_build(opened *clip)
 {
     size_t front;
     double start = now_ms();
-    expect_ok("ath_front", ath_front(clip->bytes, clip->size, 0, &front, &clip->open_bytes));
+    ath_fault_info fault;
+    expect_no_fault("ath_front", ath_front(clip->bytes, clip->size, 0, &front, &clip->open_bytes, &fault), &fault);
     clip->file = (ath_file *)memory_of(clip->open_bytes);
-    expect_ok("ath_open", ath_open(clip->file, clip->open_bytes, clip->bytes, clip->size, 0));
+    expect_no_fault("ath_open", ath_open(clip->file, clip->open_bytes, clip->bytes, clip->size, 0, &fault), &fault);
     double middle = now_ms();
     clip->build_bytes = ath_build_size(clip->file);
     expect_ok("ath_build", ath_build(clip->file, memory_of(clip->build_bytes), clip->build_bytes));

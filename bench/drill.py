@@ -157,7 +157,7 @@ class _Drill:
 def _is_whole(path: Path) -> bool:
     try:
         with athcodec.open(path, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
     except athcodec.errors.AthError:
         return False
     return True

@@ -96,10 +96,11 @@ static void read_file(const char *path, clip *clip)
 static void open_clip(const char *path, clip *clip)
 {
     size_t front, size;
+    ath_fault_info fault;
     read_file(path, clip);
-    expect_ok(path, ath_front(clip->bytes, clip->size, 0, &front, &size));
+    expect_no_fault(path, ath_front(clip->bytes, clip->size, 0, &front, &size, &fault), &fault);
     clip->file = (ath_file *)memory_of(size);
-    expect_ok(path, ath_open(clip->file, size, clip->bytes, front, 0));
+    expect_no_fault(path, ath_open(clip->file, size, clip->bytes, front, 0, &fault), &fault);
     size_t bases = ath_build_size(clip->file);
     expect_ok(path, ath_build(clip->file, memory_of(bases), bases));
     ath_get_info(clip->file, &clip->info);

@@ -96,9 +96,9 @@ class Unit:
     @cached_property
     def facts(self) -> dict[str, Any]:
         with athcodec.open(self.path) as decoder:
-            chunks = [chunk for chunk in decoder.container.chunks if chunk.is_motion]
+            chunks = [chunk for chunk in decoder.file.chunks if chunk.is_motion]
             return {"seconds": decoder.frame_count / decoder.fps, "segments": len(decoder.segments),
-                    "vertices": decoder.vertex_count, "prelude": decoder.container.prelude_length,
+                    "vertices": decoder.vertex_count, "prelude": decoder.file.prelude_length,
                     "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks]}
 
     @property
@@ -247,7 +247,7 @@ class Scene:
         for clip, unit in enumerate(self.units):
             with athcodec.open(unit.path) as decoder:
                 for instance in range(clip, len(levels), len(self.units)):
-                    levels[instance] = decoder.depth_for(self.distances[instance], FOV, SCREEN)
+                    levels[instance] = decoder.level_for(self.distances[instance], FOV, SCREEN)
         return levels.tolist()
 
     @cached_property

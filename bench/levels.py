@@ -16,7 +16,7 @@ import numpy as np
 import athcodec
 from athcodec._native import LOOSE
 from athcodec.ath import Ath, Gaps
-from athcodec.decoder import Depth
+from athcodec.ath_file import Level
 from athcodec.metrics import ErrorMeter
 from bench.clips import Encoded, add_clips, add_rel_error, encoded, measure
 from bench.tables import table
@@ -53,15 +53,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for path in args.clips:
         with encoded(path, args.rel_error) as result:
             ath = _same_nodes(result)
-            for stored in result.decoder.depths:
-                case = {"clip": path.stem, "level": stored.depth}
-                has_nodes = stored.depth <= ath.height
-                ours = measure(result.clip, result.decoder, stored.depth)
-                paper = _measure_paper(result.clip, ath, stored.depth) if has_nodes else None
+            for stored in result.decoder.levels:
+                case = {"clip": path.stem, "level": stored.level}
+                has_nodes = stored.level <= ath.height
+                ours = measure(result.clip, result.decoder, stored.level)
+                paper = _measure_paper(result.clip, ath, stored.level) if has_nodes else None
                 levels.append(case | _level_row(stored, ours, paper))
                 broken += _broken_lines(path, stored, ours, result.decoder)
                 if has_nodes:
-                    gaps.append(case | _gap_row(result, ath, stored.depth, ours.diagonal))
+                    gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
     return {"tables": [
         table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
         table(f"Gaps at the attach points, {GAP_FRAMES} frames", gaps, GAPS_NOTE),
@@ -72,7 +72,7 @@ def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound,
                              hierarchy=result.decoder.hierarchy)
-    ours, theirs = result.decoder.table1(), ath.table1()
+    ours, theirs = result.decoder.file.table1(), ath.table1()
     if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
         raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
     return ath
@@ -85,7 +85,7 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
     return meter
 
 
-def _level_row(stored: Depth, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
+def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
     diagonal = ours.diagonal
     return {
         "nodes": stored.nodes, "bytes": stored.bytes,
@@ -95,25 +95,25 @@ def _level_row(stored: Depth, ours: ErrorMeter, paper: ErrorMeter | None) -> dic
     }
 
 
-def _broken_lines(path: Path, stored: Depth, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
+def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
     """What the file says of this level's error, and promises of its last, that decoding does not bear out."""
-    is_last = stored.depth == decoder.level_count - 1
+    is_last = stored.level == decoder.level_count - 1
     promised = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
     if ours.max_error <= promised:
         return []
-    return [f"{path.name}, level {stored.depth}: got an error of {ours.max_error:.9g}; "
+    return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; "
             f"expected at most {promised:.9g}"]
 
 
 # ---- gaps ----
 
 
-def _gap_row(result: Encoded, ath: Ath, depth: int, diagonal: float) -> dict[str, Any]:
+def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str, Any]:
     clip = result.clip
     frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
-    paper = ath.attachment_gaps(source, depth)
-    joints = _Joints(result.decoder, depth)
+    paper = ath.attachment_gaps(source, level)
+    joints = _Joints(result.decoder, level)
     ours = joints.gaps(frames)
     return {
         "joints": len(joints.branch), "measured": len(joints.measured), "loose": joints.loose,
@@ -125,9 +125,9 @@ def _gap_row(result: Encoded, ath: Ath, depth: int, diagonal: float) -> dict[str
 class _Joints:
     """The attach points between two pieces of a level, by the branches that hang there, in file order."""
 
-    def __init__(self, decoder: athcodec.Decoder, depth: int) -> None:
-        self.decoder, self.depth = decoder, depth
-        hierarchy, parts = decoder.hierarchy, decoder.affines(0, depth)
+    def __init__(self, decoder: athcodec.Decoder, level: int) -> None:
+        self.decoder, self.level = decoder, level
+        hierarchy, parts = decoder.hierarchy, decoder.affines(0, level)
         part_of_branch = np.searchsorted(parts.first_vertex, hierarchy.first_vertex, side="right") - 1
         part_of_attach = np.searchsorted(parts.first_vertex, hierarchy.attach, side="right") - 1
         is_joint = (hierarchy.attach >= 0) & (part_of_branch != part_of_attach)
@@ -136,12 +136,12 @@ class _Joints:
         self._part = part_of_branch[self.measured]
         self._attach = hierarchy.vertex_source[hierarchy.attach[self.measured]]
         if not parts.is_stem[part_of_attach[self.measured]].all():
-            raise RuntimeError(f"level {depth}: got a node on a node; expected exact stems above nodes")
+            raise RuntimeError(f"level {level}: got a node on a node; expected exact stems above nodes")
 
     @property
     def loose(self) -> int:
         """How many of the measured ones carry a translation of their own."""
-        return int((self.decoder.branches["flags"][self.measured] & LOOSE > 0).sum())
+        return int((self.decoder.file.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
         """Largest and RMS gap over these frames and all joints."""
@@ -152,8 +152,8 @@ class _Joints:
                     float(np.sqrt(squares.sum() / (len(frames) * len(self.branch)))))
 
     def _squares(self, frame: int) -> np.ndarray:
-        matrices = self.decoder.affines(frame, self.depth).matrices[self._part]
+        matrices = self.decoder.affines(frame, self.level).matrices[self._part]
         rest = self.decoder.rest[self._attach].astype(np.float64)
         by_child = (matrices[:, :, :3] @ rest[:, :, None])[..., 0] + matrices[:, :, 3]
-        by_parent = self.decoder.positions(frame, self.depth, np.float64)[self._attach]
+        by_parent = self.decoder.positions(frame, self.level, np.float64)[self._attach]
         return ((by_child - by_parent) ** 2).sum(axis=1)

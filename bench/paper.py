@@ -88,7 +88,7 @@ def _row(name: str, clip: athcodec.MotionClip, thresholds: Thresholds, rel_error
     file = folder / "clip.ath"
     summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", tam=thresholds)
     with athcodec.open(file, strict=True) as decoder:
-        meter, nodes = measure(clip, decoder), decoder.table1()
+        meter, nodes = measure(clip, decoder), decoder.file.table1()
     figures = Case(file, folder, rel_error, program).program("all", ROUNDS, 1, 1)
     deep, coarse, root = figures["levels"][-1], figures["levels"][1], figures["levels"][0]
     [memory] = [row for row in memory_rows(figures)[-2:] if row["prepared"] == 1]

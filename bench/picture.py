@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     with encoded(args.clips[0], args.rel_error) as result:
         frame = _furthest_frame(result) if args.frame is None else args.frame
         args.out.write_text(_svg(result, frame))
-        levels = len(result.decoder.depths)
+        levels = len(result.decoder.levels)
         rows = [{"clip": args.clips[0].stem, "frame": frame, "levels": levels, "file": args.out.name}]
     return {"tables": [table("picture", rows, "")], "broken": []}
 
@@ -53,7 +53,7 @@ def _chains(result: Encoded) -> list[np.ndarray]:
 
 def _svg(result: Encoded, frame: int) -> str:
     chains, original = _chains(result), np.asarray(result.clip.block(frame, frame + 1)[0], float)
-    shown = [result.decoder.positions(frame, level.depth) for level in result.decoder.depths]
+    shown = [result.decoder.positions(frame, level.level) for level in result.decoder.levels]
     low = np.min([points.min(axis=0) for points in (original, *shown)], axis=0)
     high = np.max([points.max(axis=0) for points in (original, *shown)], axis=0)
     up = "xyz".index(result.clip.metadata.get("up_axis", "y"))
@@ -69,12 +69,12 @@ def _svg(result: Encoded, frame: int) -> str:
 
     worst = max(np.linalg.norm(points - original, axis=1).max() for points in shown)
     panels = []
-    for i, (level, points) in enumerate(zip(result.decoder.depths, shown)):
+    for i, (level, points) in enumerate(zip(result.decoder.levels, shown)):
         error = np.linalg.norm(points - original, axis=1)
         behind = "".join(path(original, chain) for chain in chains)
         lines = "".join(f'<path d="{path(points, chain)}" stroke="{_colour(error[chain].max() / worst)}"/>'
                         for chain in chains)
-        caption = f"level {level.depth} &#183; {level.bytes / 1000:.1f} kB"
+        caption = f"level {level.level} &#183; {level.bytes / 1000:.1f} kB"
         furthest = _length(level.max_error, result.clip.metadata.get("unit", ""))
         detail = f"{level.nodes} part{'s' * (level.nodes > 1)} &#183; max error {furthest}"
         left = MARGIN + i * (panel + MARGIN) + (panel - width) / 2

@@ -25,6 +25,16 @@ static void expect_ok(const char *what, int result)
     exit(1);
 }
 
+/* For files, which may be refused. */
+static void expect_no_fault(const char *what, int result, const ath_fault_info *fault)
+{
+    char text[ATH_FAULT_TEXT];
+    if (result == ATH_OK) return;
+    ath_fault_text(fault, text, sizeof text);
+    fprintf(stderr, "%s: %s: %s\n", what, ath_result_name(result), text);
+    exit(1);
+}
+
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;

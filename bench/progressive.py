@@ -5,7 +5,7 @@ segments that have the next level already show it. Errors are measured on what a
 many bytes; those that follow from the file's own table stand beside them. The yardstick are files of their
 own, each coded for a looser bound.
 
-The cost: the same clip coded without intermediate depths, with the encoder's own stages: the same settings,
+The cost: the same clip coded without intermediate levels, with the encoder's own stages: the same settings,
 every stem's modes together in one stream per segment, no maps of nodes, a table of one level.
 """
 
@@ -96,10 +96,10 @@ def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
 def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
     """(level, segment, bytes of the file until both are complete), in file order."""
     ends: dict[tuple[int, int], int] = {}
-    for chunk in decoder.container.chunks:
+    for chunk in decoder.file.chunks:
         if chunk.is_motion:
             ends[chunk.level, chunk.segment] = chunk.offset + chunk.length
-    before, found = decoder.container.prelude_length, []
+    before, found = decoder.file.prelude_length, []
     for level in range(decoder.level_count):
         for segment in range(len(decoder.segments)):
             before = ends.get((level, segment), before)
@@ -108,9 +108,9 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
 
 
 def _measured(clip: athcodec.MotionClip, decoder: athcodec.Decoder, start: int, stop: int,
-              depth: int | None) -> ErrorMeter:
+              level: int | None) -> ErrorMeter:
     meter = ErrorMeter()
-    for first, frames in decoder.blocks(depth, frames=slice(start, stop)):
+    for first, frames in decoder.blocks(level, frames=slice(start, stop)):
         meter.add(clip.block(first, first + len(frames)), frames)
     return meter
 
@@ -122,7 +122,7 @@ def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagona
 
 
 def _from_table(level_of: dict[int, int], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
-    errors = decoder.container.errors
+    errors = decoder.file.errors
     parts = [(*map(float, errors[level_of[segment], segment]), stop - start)
              for segment, (start, stop) in enumerate(decoder.segments)]
     return dict(zip(("table max", "table rms"), _pooled(parts, diagonal), strict=True))
@@ -142,7 +142,7 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
 def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
     """One row: bytes of a file, what each thing that serves its levels takes, and bytes without them."""
     with encoded(clip_path, rel_error) as result:
-        chunks, sizes = result.decoder.container.chunks, result.summary.chunk_bytes
+        chunks, sizes = result.decoder.file.chunks, result.summary.chunk_bytes
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
     with athcodec.read_hdf5(clip_path) as clip:
         return _cost(_Again(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)

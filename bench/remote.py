@@ -77,12 +77,12 @@ def _make(stand, folder: Path, plants: int, args: argparse.Namespace) -> Path:
 def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
     """What is done with an opened file, and how many requests it may take."""
     return {"open": (lambda decoder: None, None),
-            f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, depth=1), TARGET),
+            f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, level=1), TARGET),
             f"frame {frame} in full": (lambda decoder: decoder.positions(frame), None),
-            "level 0, all frames": (lambda decoder: decoder.positions(depth=0), None),
-            "level 1, all frames": (lambda decoder: decoder.positions(depth=1), None),
+            "level 0, all frames": (lambda decoder: decoder.positions(level=0), None),
+            "level 1, all frames": (lambda decoder: decoder.positions(level=1), None),
             "everything": (lambda decoder: decoder.positions(), None),
-            "verify": (lambda decoder: decoder.check(), None)}
+            "verify": (lambda decoder: decoder.file.check(), None)}
 
 
 def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any], list[str]]]:
@@ -111,7 +111,7 @@ def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
         with athcodec.open(server.address + NAME) as decoder:
             step(decoder)
             seconds.append(time.perf_counter() - start)
-            requests, size = decoder.source.requests, decoder.source.bytes
+            requests, size = decoder.file.source.requests, decoder.file.source.bytes
     return median(seconds), requests, size
 
 

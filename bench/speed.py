@@ -60,7 +60,7 @@ class _Case:
         self.frame_bytes = 0
         with athcodec.read_hdf5(path) as clip:
             self.frame, self.vertex_frames = clip.frame_count // 2, clip.frame_count * clip.vertex_count
-            athcodec.write_hdf5(self.gzip, clip, gzip=True)
+            athcodec.write_hdf5(clip, self.gzip, gzip=True)
 
     def measure(self) -> dict[str, list[float]]:
         seconds = _in_turns({"encode": self.encode}, ENCODES)
@@ -81,12 +81,12 @@ class _Case:
 
     def info(self) -> None:
         with athcodec.open(self.file) as decoder:
-            decoder.info()
+            decoder.file.info()
 
     def one_frame(self) -> None:
         with athcodec.open(self.file) as decoder:
-            decoder.positions(self.frame, depth=1)
-            self.frame_bytes = decoder.bytes_read
+            decoder.positions(self.frame, level=1)
+            self.frame_bytes = decoder.file.bytes_read
 
     def summary(self, seconds: dict[str, list[float]]) -> dict[str, float | int]:
         middle = {step: median(runs) for step, runs in seconds.items()}

@@ -226,7 +226,7 @@ def ask_package(decoder, item: str) -> bytes:
         return b"".join(clip_entry(clip) for clip in decoder.clips)
     if item != "static":
         played = (decoder.play(clip.name) for clip in decoder.clips)
-        return b"".join((clip.time if item == "time" else clip.positions(depth=int(item))).tobytes()
+        return b"".join((clip.time if item == "time" else clip.positions(level=int(item))).tobytes()
                         for clip in played)
     arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
     return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
@@ -241,10 +241,10 @@ def metadata_text(decoder) -> bytes:
     from athcodec import container
 
     _ = decoder.metadata  # refuses what is no JSON object
-    chunk = decoder.container.find(container.METADATA)
+    chunk = decoder.file.find(container.METADATA)
     if chunk is None:
         return b""
-    content = decoder.container.payload(chunk)
+    content = decoder.file.payload(chunk)
     return rd.parse_metadata(content, rd.Limits())
 
 

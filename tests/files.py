@@ -15,6 +15,7 @@ import numpy as np
 import athcodec
 from athcodec import container as ct
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
+from athcodec.ath_file import AthFile
 from athcodec.encoding import streams
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.segmentation import balanced_segments
@@ -34,8 +35,8 @@ class Parts:
 
     @classmethod
     def of(cls, data: bytes) -> Parts:
-        container = ct.Container(BytesIO(data), strict=True)
-        return cls(container.header, container.errors, [(c, container.payload(c)) for c in container.chunks])
+        file = AthFile(BytesIO(data), strict=True)
+        return cls(file.header, file.errors, [(chunk, file.payload(chunk)) for chunk in file.chunks])
 
     def file(self) -> bytes:
         """The bytes of a file whose table and checksums fit its chunks."""

@@ -139,7 +139,7 @@ def test_from_alembic_to_ath_and_back_within_the_bound(tmp_path):
                                        rest=clip.rest.astype(clip.rest_dtype))
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
-            athcodec.write(athcodec.Excerpt(decoder, frames=range(2, 9)), tmp_path / "b.abc")
+            athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.abc")
             bound = decoder.max_error_bound
         with athcodec.read(tmp_path / "b.abc") as again:
             error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()

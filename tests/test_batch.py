@@ -21,13 +21,13 @@ import distributed
 import fsspec
 import psutil
 import pytest
+from plants import plant
 
 import athcodec
 from athcodec import batch, cli
 from athcodec.batch import manifest, runs
 from athcodec.batch.manifest import Manifest, ManifestError
 from athcodec.errors import ClipError, MissingExtra
-from plants import plant
 
 FAST = {"effort": "fast", "segment_frames": 16}
 BATCH = [sys.executable, "-m", "athcodec", "batch"]
@@ -47,7 +47,7 @@ def clips(tmp_path):
     folder = tmp_path / "in"
     (folder / "sub").mkdir(parents=True)
     for name, frames in (("a", 20), ("b", 40), ("sub/c", 20), ("long", 200)):
-        athcodec.write_hdf5(folder / f"{name}.h5", plant(seed=frames, branches=5, longest=4, frames=frames))
+        athcodec.write_hdf5(plant(seed=frames, branches=5, longest=4, frames=frames), folder / f"{name}.h5")
     return folder
 
 
@@ -66,7 +66,7 @@ def done_once(out: Path) -> set[str]:
     assert len({line["output"] for line in done}) == len(done)
     for line in done:
         with athcodec.open(out / line["output"], strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
         assert batch.inputs.sha256(out / line["output"]) == line["sha256"]
     return {line["output"] for line in done}
 
@@ -496,8 +496,8 @@ def many(tmp_path):
     folder = tmp_path / "many"
     folder.mkdir()
     for seed in range(11):
-        athcodec.write_hdf5(folder / f"c{seed:02}.h5", plant(seed=seed, branches=20, longest=8, frames=48))
-    athcodec.write_hdf5(folder / "long.h5", plant(seed=99, branches=20, longest=8, frames=300))
+        athcodec.write_hdf5(plant(seed=seed, branches=20, longest=8, frames=48), folder / f"c{seed:02}.h5")
+    athcodec.write_hdf5(plant(seed=99, branches=20, longest=8, frames=300), folder / "long.h5")
     return folder
 
 

@@ -101,7 +101,7 @@ def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_
     targets, whole, levels, memory, instances = tables_of(result)
     with athcodec.open(sample_ath) as decoder:
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
-        assert [row["level"] for row in levels] == [depth.depth for depth in decoder.depths]
+        assert [row["level"] for row in levels] == [level.level for level in decoder.levels]
     assert levels[-1]["CRC-32C"] == f"{crc:08x}" and result["broken"] == []
     assert len({row["CRC-32C"] for row in levels}) == len(levels)
     size = sample_ath.stat().st_size
@@ -121,7 +121,7 @@ ERRORS = np.geomspace(1e-6, 1e-2, 9)
 @pytest.fixture(scope="session")
 def bushy_file(bushy_clip, tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "bushy.h5"
-    athcodec.write_hdf5(path, bushy_clip)
+    athcodec.write_hdf5(bushy_clip, path)
     return str(path)
 
 

@@ -16,7 +16,7 @@ UP_IS_Z = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)  # in the sam
 PLAY = """
 fresh()
 scene = bpy.context.scene
-assert bpy.ops.import_scene.ath(filepath=args["ath"], depth=args["depth"], loop=args["loop"]) == {"FINISHED"}
+assert bpy.ops.import_scene.ath(filepath=args["ath"], level=args["level"], loop=args["loop"]) == {"FINISHED"}
 obj = bpy.context.active_object
 shown = []
 for frame in args["frames"]:
@@ -31,18 +31,18 @@ save(shown=np.array(shown), world=world(obj.name), rate=scene.render.fps / scene
 
 
 @pytest.mark.programs
-@pytest.mark.parametrize("depth", [-1, 2, 0])
-def test_the_sample_plays_as_the_decoder_has_it(extended_blender, sample_ath, depth):
+@pytest.mark.parametrize("level", [-1, 2, 0])
+def test_the_sample_plays_as_the_decoder_has_it(extended_blender, sample_ath, level):
     frames = [1, 50, 119, 40, 7, 7.25]
-    shown = extended_blender.run(PLAY, ath=sample_ath, depth=depth, loop=False, frames=frames)
+    shown = extended_blender.run(PLAY, ath=sample_ath, level=level, loop=False, frames=frames)
     with athcodec.open(sample_ath) as decoder:
-        level = None if depth < 0 else depth
-        first = decoder.positions(0, level)
+        shown_level = None if level < 0 else level
+        first = decoder.positions(0, shown_level)
         start = int(shown["range"][0])
         for frame, positions in zip(frames, shown["shown"]):
             place = frame - start
-            low = decoder.positions(int(place), level)
-            high = decoder.positions(int(place) + 1, level) if place > int(place) else low
+            low = decoder.positions(int(place), shown_level)
+            high = decoder.positions(int(place) + 1, shown_level) if place > int(place) else low
             expected = low + np.float32(place - int(place)) * (high - low)
             assert np.allclose(positions, expected, rtol=0, atol=1e-6)
         assert not np.array_equal(shown["shown"][1], first)
@@ -55,7 +55,7 @@ def test_the_sample_plays_as_the_decoder_has_it(extended_blender, sample_ath, de
 @pytest.mark.programs
 def test_speed_offset_and_loop(extended_blender, sample_ath):
     script = PLAY.replace("shown = []", "shown = []\nobj.ath.speed = 2\nobj.ath.frame_offset = 11")
-    shown = extended_blender.run(script, ath=sample_ath, depth=-1, loop=True, frames=[11, 16, 71, 10])["shown"]
+    shown = extended_blender.run(script, ath=sample_ath, level=-1, loop=True, frames=[11, 16, 71, 10])["shown"]
     with athcodec.open(sample_ath) as decoder:
         for positions, frame in zip(shown, (0, 10, 0, 118)):
             assert np.allclose(positions, decoder.positions(frame), rtol=0, atol=1e-6)
@@ -120,7 +120,7 @@ def test_it_plays_in_a_saved_blend_that_has_moved(extended_blender, sample_ath, 
         (folder / "tree.ath").write_bytes(Path(sample_ath).read_bytes())
     extended_blender.run("""
 fresh()
-bpy.ops.import_scene.ath(filepath=args["here"] + "/tree.ath", depth=3)
+bpy.ops.import_scene.ath(filepath=args["here"] + "/tree.ath", level=3)
 bpy.ops.wm.save_as_mainfile(filepath=args["here"] + "/scene.blend")
 assert bpy.context.active_object.ath.filepath == "//tree.ath", bpy.context.active_object.ath.filepath
 bpy.ops.wm.save_as_mainfile(filepath=args["there"] + "/scene.blend")
@@ -133,9 +133,9 @@ fresh()
 bpy.ops.wm.open_mainfile(filepath=args["blend"])
 obj = next(each for each in bpy.data.objects if each.ath.filepath)
 bpy.context.scene.frame_set(33)
-save(shown=world(obj.name), depth=obj.ath.depth, start=obj.ath.frame_offset)
+save(shown=world(obj.name), level=obj.ath.level, start=obj.ath.frame_offset)
 """, blend=there / "scene.blend")
-    assert shown["depth"] == 3
+    assert shown["level"] == 3
     with athcodec.open(sample_ath) as decoder:
         positions = decoder.positions(33 - int(shown["start"]), 3)
         assert np.allclose(shown["shown"], positions @ UP_IS_Z, atol=1e-5)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-import athcodec
-from athcodec.excerpt import Excerpt
 from moving_meshes import assert_same_mesh, coded, quad_clip
 from programs import blender_python, run_script
+
+import athcodec
+from athcodec.clip_view import ClipView
 
 pytestmark = pytest.mark.programs
 
@@ -67,7 +67,7 @@ np.save(folder + "/corners.npy", np.array([v for face in ball.data.polygons for 
 def test_blender_moves_as_the_file_decodes(tmp_path, kind, how):
     clip = quad_clip()
     with athcodec.open(coded(clip, tmp_path)) as decoder:
-        athcodec.write(Excerpt(decoder), tmp_path / f"tree.{kind.lower()}")
+        athcodec.write(ClipView(decoder), tmp_path / f"tree.{kind.lower()}")
         decoded, bound = decoder.positions(slice(0, 6)), decoder.max_error_bound
     run_script(blender_python(), MOVED_BY_CACHE, tmp_path, kind, how)
     moved = np.load(tmp_path / "moved.npy")

@@ -69,8 +69,8 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
     """One vertex moved by two bounds in one frame, then a table that states less than what is measured."""
     attack, positions = Attack(actions=("walk",)), athcodec.Decoder.positions
 
-    def moved(decoder, frames=None, depth=None, dtype=None):
-        shown = positions(decoder, frames, depth, dtype).copy()
+    def moved(decoder, frames=None, level=None, dtype=None):
+        shown = positions(decoder, frames, level, dtype).copy()
         if shown.ndim == 3:
             shown[7, 1, 2] += 2 * decoder.max_error_bound
         return shown

@@ -81,16 +81,16 @@ def test_info_says_as_json_what_programs_need(facts, encoded):
     assert facts["fps"] == pytest.approx(30) and facts["nodes"] == 99
     assert facts["bytes"] == encoded.stat().st_size and facts["complete"] is True
     assert facts["max_error_bound"] == 0.001
-    assert [level["depth"] for level in facts["depths"]] == [0, 1, 2, 3]
-    for level in facts["depths"]:
-        assert {"depth", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
-    assert facts["depths"][-1]["max_error"] <= 0.001
+    assert [level["level"] for level in facts["levels"]] == [0, 1, 2, 3]
+    for level in facts["levels"]:
+        assert {"level", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
+    assert facts["levels"][-1]["max_error"] <= 0.001
 
 
 def test_the_shares_of_the_levels_are_those_of_the_files_bytes(facts, encoded):
-    sizes = [level["bytes"] for level in facts["depths"]]
-    assert [level["added_bytes"] for level in facts["depths"]][1:] == np.diff(sizes).tolist()
-    assert all(level["share"] == level["added_bytes"] / facts["bytes"] for level in facts["depths"])
+    sizes = [level["bytes"] for level in facts["levels"]]
+    assert [level["added_bytes"] for level in facts["levels"]][1:] == np.diff(sizes).tolist()
+    assert all(level["share"] == level["added_bytes"] / facts["bytes"] for level in facts["levels"])
     assert facts["ratio"] == 1001 * 120 * 12 / facts["bytes"]
 
 
@@ -107,8 +107,8 @@ def test_info_prints_the_papers_table_and_one_row_per_level(encoded, facts, caps
     assert run("info", encoded) == 0
     out = capsys.readouterr().out
     assert "ATH: depth 3, 99 nodes, " in out and "lambda 0" in out
-    for level in facts["depths"]:
-        cells = (level["depth"], level["nodes"], f"{level['added_bytes']:,}", f"{level['share']:.1%}")
+    for level in facts["levels"]:
+        cells = (level["level"], level["nodes"], f"{level['added_bytes']:,}", f"{level['share']:.1%}")
         assert re.search(r"^ *" + r" +".join(map(re.escape, map(str, cells))), out, re.MULTILINE)
 
 
@@ -144,20 +144,20 @@ def test_thresholds_of_the_paper_are_taken_in_the_units_given(tmp_path, capsys):
 
 
 def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path):
-    assert run("decode", encoded, tmp_path / "a.h5", "--depth", 1, "--frames", "20:70", "--gzip") == 0
+    assert run("decode", encoded, tmp_path / "a.h5", "--level", 1, "--frames", "20:70", "--gzip") == 0
     with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as part:
-        assert np.array_equal(part.block(0, 50), decoder.positions(depth=1)[20:70])
+        assert np.array_equal(part.block(0, 50), decoder.positions(level=1)[20:70])
         assert np.array_equal(part.time, decoder.time[20:70])
 
 
 def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, capsys):
     shorter = tmp_path / "a.ath"
-    assert run("truncate", encoded, shorter, "--depth", 1) == 0
+    assert run("truncate", encoded, shorter, "--level", 1) == 0
     assert shorter.stat().st_size < encoded.stat().st_size
     assert run("verify", shorter, "--against", SAMPLE) == 0
     with athcodec.open(encoded) as whole, athcodec.open(shorter, strict=True) as decoder:
         assert decoder.level_count == 2
-        assert np.array_equal(decoder.positions(30), whole.positions(30, depth=1))
+        assert np.array_equal(decoder.positions(30), whole.positions(30, level=1))
 
 
 def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_where_told(tmp_path, capsys):
@@ -177,16 +177,16 @@ def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_where_told(tmp
 
 
 def test_a_cut_off_file_decodes_to_its_deepest_level_with_one_warning(encoded, facts, tmp_path, capsys):
-    part = cut(encoded, tmp_path / "cut.ath", facts["depths"][1]["bytes"] + 3000)
+    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][1]["bytes"] + 3000)
     assert run("decode", part, tmp_path / "a.h5") == 0
     warning = r"athcodec: warning: .*cut\.ath: decoded to level 1; cut off .* missing .*level 3.*\n"
     assert re.fullmatch(warning, capsys.readouterr().err)
     with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as clip:
-        assert np.array_equal(clip.block(0, 120), decoder.positions(depth=1))
+        assert np.array_equal(clip.block(0, 120), decoder.positions(level=1))
 
 
 def test_every_cut_behind_level_0_decodes(encoded, facts, tmp_path, capsys):
-    first = facts["depths"][0]["bytes"]
+    first = facts["levels"][0]["bytes"]
     for size in np.linspace(first, facts["bytes"] - 1, 12).astype(int):
         part = cut(encoded, tmp_path / "cut.ath", size)
         assert run("decode", part, tmp_path / "a.h5", "--frames", ":1") == 0
@@ -194,11 +194,11 @@ def test_every_cut_behind_level_0_decodes(encoded, facts, tmp_path, capsys):
 
 
 def test_info_of_a_cut_off_file_says_what_is_missing(encoded, facts, tmp_path, capsys):
-    part = cut(encoded, tmp_path / "cut.ath", facts["depths"][2]["bytes"])
+    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
     assert run("info", part, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["complete"] is False and "level 3" in found["missing"]
-    assert [level["available"] for level in found["depths"]] == [True, True, True, False]
+    assert [level["available"] for level in found["levels"]] == [True, True, True, False]
 
 
 def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
@@ -207,11 +207,11 @@ def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
     capsys.readouterr()
     assert run("verify", encoded, "--against", SAMPLE, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["ok"] is True and all(level["kept"] for level in found["clips"][0]["depths"])
+    assert found["ok"] is True and all(level["kept"] for level in found["clips"][0]["levels"])
     with athcodec.open(encoded) as decoder, read_hdf5(SAMPLE) as clip:
-        distance = np.linalg.norm(decoder.positions(depth=2) - clip.block(0, 120).astype(float), axis=2)
-    assert found["clips"][0]["depths"][2]["max_error"] == pytest.approx(distance.max())
-    assert found["clips"][0]["depths"][2]["rms_error"] == pytest.approx(np.sqrt((distance**2).mean()))
+        distance = np.linalg.norm(decoder.positions(level=2) - clip.block(0, 120).astype(float), axis=2)
+    assert found["clips"][0]["levels"][2]["max_error"] == pytest.approx(distance.max())
+    assert found["clips"][0]["levels"][2]["rms_error"] == pytest.approx(np.sqrt((distance**2).mean()))
 
 
 @pytest.mark.parametrize("place", [0.0, 0.01, 0.1, 0.5, 0.9, 0.9999])
@@ -241,7 +241,7 @@ def test_verify_fails_where_the_source_is_further_off_than_promised(encoded, tmp
 
 
 def test_a_damaged_level_is_an_error_unless_less_is_allowed(encoded, facts, tmp_path, capsys):
-    damaged = with_flipped_byte(encoded, tmp_path / "bad.ath", facts["depths"][2]["bytes"] - 10)
+    damaged = with_flipped_byte(encoded, tmp_path / "bad.ath", facts["levels"][2]["bytes"] - 10)
     assert run("decode", damaged, tmp_path / "a.h5") == 1
     assert not (tmp_path / "a.h5").exists() and "checksum" in capsys.readouterr().err
     assert run("decode", damaged, tmp_path / "a.h5", "--allow-partial") == 0
@@ -263,7 +263,7 @@ USAGE = {
     "three thresholds": "encode a.h5 b.ath --tam 1,2,3",
     "negative threshold": "encode a.h5 b.ath --tam 1,-2,3,4",
     "no range": "decode a.ath b.h5 --frames 5",
-    "negative level": "decode a.ath b.h5 --depth -1",
+    "negative level": "decode a.ath b.h5 --level -1",
     "no level": "truncate a.ath b.ath",
 }
 
@@ -282,16 +282,16 @@ FAILURES = {
     "nothing to look at": ("info nowhere.ath", "nowhere.ath: No such file"),
     "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
     "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
-    "nothing to truncate": ("truncate nowhere.ath OUT --depth 0", "nowhere.ath: No such file"),
+    "nothing to truncate": ("truncate nowhere.ath OUT --level 0", "nowhere.ath: No such file"),
     "no HDF5": ("encode FILE OUT", "FILE: .*got an unknown format, expected one of .h5.*"),
     "no .ath": ("info SOURCE", "SOURCE: .*expected"),
     "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
     "a folder": ("decode FILE .", "got a directory, expected a file name"),
-    "onto itself": ("truncate FILE FILE --depth 0", "FILE: is the input"),
+    "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
     "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
     "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
-    "beyond the levels": ("decode FILE OUT --depth 4", "FILE: .*got 4.*0 to 3"),
-    "truncate beyond the levels": ("truncate FILE OUT --depth 4", "FILE: .*got 4.*0 to 3"),
+    "beyond the levels": ("decode FILE OUT --level 4", "FILE: .*got 4.*0 to 3"),
+    "truncate beyond the levels": ("truncate FILE OUT --level 4", "FILE: .*got 4.*0 to 3"),
     "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
     "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),
 }

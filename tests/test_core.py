@@ -8,8 +8,21 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from ctypes import (POINTER, byref, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint8, c_uint16,
-                    c_uint32, c_uint64, c_void_p)
+from ctypes import (
+    POINTER,
+    byref,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int,
+    c_int32,
+    c_size_t,
+    c_uint8,
+    c_uint16,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
 
 import numpy as np
 import pytest
@@ -58,6 +71,12 @@ class Chunk(ctypes.Structure):
                 ("segment", c_uint32), ("kind", c_uint16), ("level", c_uint8), ("reserved", c_uint8)]
 
 
+class Fault(ctypes.Structure):
+    _fields_ = [("code", c_int32), ("field", c_int32), ("chunk", c_int32), ("kind", c_uint16), ("level", c_uint8),
+                ("reserved", c_uint8), ("segment", c_uint32), ("offset", c_uint64), ("found", c_double),
+                ("least", c_double), ("most", c_double)]
+
+
 class Blend(ctypes.Structure):
     _fields_ = [("frame", c_int32 * 2), ("segment", c_int32 * 2), ("weight", c_double)]
 
@@ -66,8 +85,9 @@ _SHOW = [c_void_p, POINTER(c_void_p), c_int32, c_double]
 _SIGNATURES = {
     "ath_result_name": (c_char_p, [c_int]),
     "ath_default_limits": (None, [POINTER(Limits)]),
-    "ath_front": (c_int, [c_void_p, c_size_t, POINTER(Limits), POINTER(c_size_t), POINTER(c_size_t)]),
-    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(Limits)]),
+    "ath_front": (c_int, [c_void_p, c_size_t, POINTER(Limits), POINTER(c_size_t), POINTER(c_size_t), POINTER(Fault)]),
+    "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(Limits), POINTER(Fault)]),
+    "ath_fault_text": (c_size_t, [POINTER(Fault), c_char_p, c_size_t]),
     "ath_build_size": (c_size_t, [c_void_p]),
     "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
     "ath_get_info": (None, [c_void_p, POINTER(Info)]),
@@ -81,7 +101,7 @@ _SIGNATURES = {
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_segment_of": (c_int32, [c_void_p, c_int32]),
     "ath_chunks": (POINTER(Chunk), [c_void_p]),
-    "ath_work_fault": (c_int32, [c_void_p]),
+    "ath_work_fault": (None, [c_void_p, POINTER(Fault)]),
     "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
     "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
     "ath_ranges": (c_int32, [c_void_p, c_int32, c_int32, c_int32, c_int, c_void_p, c_int32]),
@@ -142,7 +162,7 @@ class Memory:
 def front(data: bytes, limits: Limits | None = None) -> tuple[int, int, int]:
     """Result, bytes that are needed, memory that ath_open needs."""
     needed, memory = c_size_t(), c_size_t()
-    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory))
+    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory), None)
     return result, needed.value, memory.value
 
 
@@ -158,7 +178,7 @@ class Player:
         self.memory = self.file = Memory(size)
         fed = data if whole else self.prelude
         self.kept.append(fed)
-        assert core.ath_open(self.memory.address, size, fed, len(fed), None) == OK
+        assert core.ath_open(self.memory.address, size, fed, len(fed), None, None) == OK
         self.info = Info()
         core.ath_get_info(self.address, byref(self.info))
         if build:
@@ -294,7 +314,7 @@ def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data
     }
     built, work, segment = Memory(sizes["build"]), Memory(sizes["work"]), Memory(sizes["segment"])
     for address, size in too_little(sizes["open"]):
-        assert core.ath_open(address, size, data, len(data), None) == NO_MEMORY
+        assert core.ath_open(address, size, data, len(data), None, None) == NO_MEMORY
     for address, size in too_little(sizes["build"]):
         assert core.ath_build(player.address, address, size) == NO_MEMORY
     assert core.ath_build(player.address, built.address, built.size) == OK
@@ -341,8 +361,8 @@ def test_a_prefix_that_is_too_short_says_how_many_bytes_to_come_back_with(data, 
     assert answer == front(data) == (OK, prelude, player.memory.size) and size == prelude and asked <= 4
     memory = Memory(player.memory.size)
     for size in (0, 1, 100, prelude - 1):
-        assert core.ath_open(memory.address, memory.size, data[:size], size, None) == MISSING
-    assert core.ath_open(memory.address, memory.size, data[:prelude], prelude, None) == OK
+        assert core.ath_open(memory.address, memory.size, data[:size], size, None, None) == MISSING
+    assert core.ath_open(memory.address, memory.size, data[:prelude], prelude, None, None) == OK
 
 
 def test_the_ranges_of_a_level_are_what_it_needs_fed_in_any_order(data, player):
@@ -426,7 +446,9 @@ def test_a_damaged_chunk_is_named_and_its_segment_is_not_prepared(data, player):
     broken = Player(data[: offset + size - 1] + bytes([data[offset + size - 1] ^ 1]) + data[offset + size:])
     work, segment = broken.work(), broken.room(level)
     assert broken.try_to_prepare(0, level, work, segment) == BAD_CHECKSUM
-    chunk = core.ath_chunks(broken.address)[core.ath_work_fault(work.address)]
+    fault = Fault()
+    core.ath_work_fault(work.address, byref(fault))
+    chunk = core.ath_chunks(broken.address)[fault.chunk]
     assert (chunk.offset + chunk.length, chunk.segment) == (offset + size, 0)
     assert core.ath_segment_index(segment.address) == core.ath_segment_level(segment.address) == -1
     assert broken.show([segment], 0)[0] == NOT_PREPARED
@@ -492,7 +514,7 @@ def test_frames_are_those_of_python_bit_for_bit_in_any_order_of_play(data, playe
     (scratch / "core.ath").write_bytes(data)
     with athcodec.open(scratch / "core.ath") as decoder:
         for level in player.levels:
-            expected = decoder.positions(depth=level)
+            expected = decoder.positions(level=level)
             prepared = player.prepare_all(level)
             order = list(range(len(expected)))
             at_random = np.random.default_rng(level).permutation(len(expected))

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-import athcodec
-from athcodec import player
 from fuzz import targets
 from hostile_files import colliding_gaps, random_gaps, segments_of_one_frame, stems_with_gaps
 from test_damage import use
+
+import athcodec
+from athcodec import core_file
 
 CORPUS = Path(__file__).resolve().parent / "corpus"
 TESTED = {"colliding_gaps.ath", "integers_not_yet_written.prelude"}
@@ -82,7 +82,7 @@ def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others():
 
     def ask(count: int) -> float:
         decoder = athcodec.open(BytesIO(segments_of_one_frame(count)))
-        core: player.File = decoder._player
+        core: core_file.File = decoder.file.core
         return seconds(lambda: [core.missing(1, segment) for segment in range(0, count, count // 250)])
 
     assert ask(32_000) < 8 * ask(250), "128 times the chunks"

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from plants import STEADY, awkward_plants, chain_plant, plant, tube
 
 import athcodec
-from athcodec import Thresholds, player
+from athcodec import Thresholds, core_file
 from athcodec import container as ct
 from athcodec._native import LOOSE
 from athcodec.encoding import streams
@@ -24,7 +24,7 @@ from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
 
 @pytest.fixture(scope="module")
 def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, tmp_path_factory):
-    """{name: (file, source positions)} of several segments and depths."""
+    """{name: (file, source positions)} of several segments and levels."""
     folder = tmp_path_factory.mktemp("plants")
     made = {"sample": (sample_ath, sample_positions), "bushy": (bushy_ath, bushy_clip.positions)}
     for name, clip, more in (
@@ -55,7 +55,7 @@ def size_of(source: np.ndarray) -> float:
 
 def base_pose(decoder) -> np.ndarray:
     """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
-    return decoder._player.rest()
+    return decoder.file.core.rest()
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -72,10 +72,10 @@ def shown_frames(decoder) -> list[int]:
 
 def test_the_errors_in_the_table_are_those_of_stopping_there(played):
     decoder, source = played
-    assert len(decoder.segments) > 1 and len(decoder.depths) == decoder.level_count
+    assert len(decoder.segments) > 1 and len(decoder.levels) == decoder.level_count
     rounding = 1e-6 * size_of(source)
-    for level in decoder.depths:
-        distance = np.linalg.norm(decoder.positions(depth=level.depth) - source, axis=2)
+    for level in decoder.levels:
+        distance = np.linalg.norm(decoder.positions(level=level.level) - source, axis=2)
         assert distance.max() <= level.max_error, "an announced error is never too small"
         assert distance.max() >= level.max_error * (1 - 1e-6) - rounding
         assert np.sqrt((distance**2).mean()) == pytest.approx(level.rms_error, rel=1e-5, abs=rounding)
@@ -84,22 +84,22 @@ def test_the_errors_in_the_table_are_those_of_stopping_there(played):
 def test_the_table_holds_the_errors_of_each_segment(played):
     decoder, source = played
     for segment, (start, stop) in enumerate(decoder.segments):
-        for depth in range(decoder.level_count):
-            distance = np.linalg.norm(decoder.positions(slice(start, stop), depth) - source[start:stop], axis=2)
-            largest, rms = decoder.container.errors[depth, segment]
+        for level in range(decoder.level_count):
+            distance = np.linalg.norm(decoder.positions(slice(start, stop), level) - source[start:stop], axis=2)
+            largest, rms = decoder.file.errors[level, segment]
             assert distance.max() <= largest and np.sqrt((distance**2).mean()) == pytest.approx(rms, rel=1e-4, abs=1e-6)
 
 
 def test_the_deepest_level_keeps_the_promise_of_the_file(played):
     decoder, source = played
-    assert decoder.depths[-1].max_error <= decoder.max_error_bound * (1 + 1e-6)
+    assert decoder.levels[-1].max_error <= decoder.max_error_bound * (1 + 1e-6)
     assert np.linalg.norm(decoder.positions() - source, axis=2).max() <= decoder.max_error_bound
 
 
 @pytest.mark.parametrize("name", ["sample", "bushy", "half accepted"])
 def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name, plants):
     with athcodec.open(plants[name][0]) as decoder:
-        levels = decoder.depths
+        levels = decoder.levels
     assert len(levels) >= 3
     for coarse, fine in zip(levels, levels[1:]):
         assert fine.bytes > coarse.bytes and fine.nodes >= coarse.nodes
@@ -112,7 +112,7 @@ def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants
     path, source = plants[name]
     with athcodec.open(path) as decoder:
         pose = base_pose(decoder)[np.argsort(decoder.hierarchy.vertex_source)]
-        assert decoder.depths[0].nodes == 1
+        assert decoder.levels[0].nodes == 1
         for frame in shown_frames(decoder):
             shown = decoder.positions(frame, 0).astype(np.float64)
             homogeneous = np.column_stack([pose - pose.mean(axis=0), np.ones(len(pose))])
@@ -126,15 +126,15 @@ def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name
     bare = opened(parts.without(ct.CORRECTIONS), strict=True)
     with athcodec.open(plants[name][0]) as decoder:
         last, order = decoder.level_count - 1, decoder.hierarchy.vertex_source
-        final = bare.positions(depth=last)[:, order]
+        final = bare.positions(level=last)[:, order]
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
-        assert not np.array_equal(final, decoder.positions(depth=last)[:, order])
+        assert not np.array_equal(final, decoder.positions(level=last)[:, order])
         branch = decoder.hierarchy.vertex_branch()
-        for depth in range(1, last):
-            exact = np.isin(branch, Plan(decoder.branches, decoder.vertex_count).exact_branches(depth))
-            shown = decoder.affines(0, depth)
+        for level in range(1, last):
+            exact = np.isin(branch, Plan(decoder.file.branches, decoder.vertex_count).exact_branches(level))
+            shown = decoder.affines(0, level)
             assert np.array_equal(exact, np.repeat(shown.is_stem, shown.vertex_count))
-            positions = decoder.positions(depth=depth)[:, order]
+            positions = decoder.positions(level=level)[:, order]
             assert exact.any() and np.array_equal(positions[:, exact], final[:, exact])
 
 
@@ -143,8 +143,8 @@ def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name
 
 def test_the_parts_of_a_level_share_out_the_vertices(played):
     decoder, _ = played
-    for level in decoder.depths:
-        parts = decoder.affines(0, level.depth)
+    for level in decoder.levels:
+        parts = decoder.affines(0, level.level)
         assert len(parts.matrices) == len(parts.branch) == level.nodes
         stops = parts.first_vertex + parts.vertex_count
         assert parts.first_vertex[0] == 0 and stops[-1] == decoder.vertex_count
@@ -157,10 +157,10 @@ def test_the_parts_of_a_level_share_out_the_vertices(played):
 def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
     decoder, source = played
     pose = base_pose(decoder)
-    for depth in range(decoder.level_count - 1):
+    for level in range(decoder.level_count - 1):
         for frame in shown_frames(decoder):
-            parts = decoder.affines(frame, depth)
-            shown = decoder.positions(frame, depth, np.float64)[decoder.hierarchy.vertex_source]
+            parts = decoder.affines(frame, level)
+            shown = decoder.positions(frame, level, np.float64)[decoder.hierarchy.vertex_source]
             moved = applied(np.repeat(parts.matrices, parts.vertex_count, axis=0), pose[:, None])[:, 0]
             as_one = np.repeat(~parts.is_stem, parts.vertex_count)
             assert as_one.any() and np.abs(moved - shown)[as_one].max() < 1e-6 * size_of(source)
@@ -168,13 +168,13 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
-    assert not (decoder.branches["flags"] & LOOSE).any()
+    assert not (decoder.file.branches["flags"] & LOOSE).any()
     pose, hierarchy = base_pose(decoder), decoder.hierarchy
     attached = 0
-    for depth in range(decoder.level_count - 1):
+    for level in range(decoder.level_count - 1):
         for frame in shown_frames(decoder):
-            parts = decoder.affines(frame, depth)
-            shown = decoder.positions(frame, depth, np.float64)[hierarchy.vertex_source]
+            parts = decoder.affines(frame, level)
+            shown = decoder.positions(frame, level, np.float64)[hierarchy.vertex_source]
             branch = hierarchy.vertex_branch()[parts.first_vertex]
             attach = hierarchy.attach[branch]
             children = np.flatnonzero(~parts.is_stem & (attach >= 0))
@@ -187,9 +187,9 @@ def test_every_subtree_stays_attached_to_its_parents_stem(played):
 def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
     decoder, source = played
     order = decoder.hierarchy.vertex_source
-    for depth in range(decoder.level_count):
+    for level in range(decoder.level_count):
         for frame in shown_frames(decoder)[:2]:
-            parts, residual = decoder.affines(frame, depth), decoder.residual(frame, depth)
+            parts, residual = decoder.affines(frame, level), decoder.residual(frame, level)
             full = decoder.positions(frame, dtype=np.float64)[order]
             matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
             restored = applied(matrices, residual[order][:, None])[:, 0]
@@ -202,20 +202,20 @@ def test_a_map_applied_to_its_residual_gives_the_full_positions(played):
 def test_any_frames_alone_equal_those_of_the_whole(played):
     decoder, _ = played
     count = decoder.frame_count
-    for depth in (0, decoder.level_count - 1):
-        whole = decoder.positions(depth=depth)
+    for level in (0, decoder.level_count - 1):
+        whole = decoder.positions(level=level)
         boundary = decoder.segments[1][0]
         for chosen in (slice(boundary - 2, boundary + 3), slice(boundary, None), slice(-3, None), slice(5, 5)):
-            assert np.array_equal(decoder.positions(chosen, depth), whole[chosen])
+            assert np.array_equal(decoder.positions(chosen, level), whole[chosen])
         for frame in (0, boundary - 1, boundary, count - 1, -1, -count, np.int64(3)):
-            assert np.array_equal(decoder.positions(frame, depth), whole[frame])
+            assert np.array_equal(decoder.positions(frame, level), whole[frame])
 
 
 def test_blocks_are_the_motion_in_order(bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        blocks = list(decoder.blocks(depth=2))
+        blocks = list(decoder.blocks(level=2))
         assert [start for start, _ in blocks] == [start for start, _ in decoder.segments]
-        assert np.array_equal(np.concatenate([block for _, block in blocks]), decoder.positions(depth=2))
+        assert np.array_equal(np.concatenate([block for _, block in blocks]), decoder.positions(level=2))
         start, block = next(decoder.blocks(frames=slice(14, 20)))
         assert start == 14 and np.array_equal(block, decoder.positions(slice(14, 20)))
 
@@ -241,27 +241,27 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         decoder = athcodec.open(file)
         if level >= decoder.level_count:
             continue
-        prelude = decoder.container.prelude_length
+        prelude = decoder.file.prelude_length
         assert all(stop <= prelude for _, stop in file.ranges), "opening reads the prelude alone"
         file.ranges.clear()
-        before = decoder.bytes_read
+        before = decoder.file.bytes_read
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
-        allowed = {c for c in decoder.container.chunks
+        allowed = {c for c in decoder.file.chunks
                        if c.is_motion and c.level <= level and (c.segment == 1 or c.kind == ct.SHAPES)}
         read = chunks_read(file, decoder)
         needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}
         assert needed and needed <= read <= allowed
-        assert decoder.bytes_read - before == sum(chunk.length for chunk in read)
+        assert decoder.file.bytes_read - before == sum(chunk.length for chunk in read)
 
 
 def chunks_read(file: Recorder, decoder) -> set:
     """Those whose bytes were all read, each once, where nothing else was read."""
-    times = np.zeros(decoder.file_length, int)
+    times = np.zeros(decoder.file.file_length, int)
     for start, stop in file.ranges:
         times[start:stop] += 1
-    read = {c for c in decoder.container.chunks if c.length and times[c.offset: c.offset + c.length].any()}
-    expected = np.zeros(decoder.file_length, int)
+    read = {c for c in decoder.file.chunks if c.length and times[c.offset: c.offset + c.length].any()}
+    expected = np.zeros(decoder.file.file_length, int)
     for chunk in read:
         expected[chunk.offset: chunk.offset + chunk.length] = 1
     assert np.array_equal(times, expected)
@@ -281,39 +281,39 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     """Forwards, backwards, as maps, in any type of numbers; another segment, or level, is prepared anew."""
     decoder, _ = played
     prepared = []
-    prepare = player.File.prepare
-    monkeypatch.setattr(player.File, "prepare", lambda file, work, segment, level, into: (
+    prepare = core_file.File.prepare
+    monkeypatch.setattr(core_file.File, "prepare", lambda file, work, segment, level, into: (
         prepared.append((segment, level)), prepare(file, work, segment, level, into)))
     (first, stop), last = decoder.segments[1], decoder.level_count - 1
     decoder.positions(first, last)
-    before = decoder.bytes_read
+    before = decoder.file.bytes_read
     for frame in (*range(first, stop), *reversed(range(first, stop))):
         decoder.positions(frame, last)
         decoder.positions(frame, last, np.float64)
     decoder.positions(slice(first, stop), last)
     decoder.affines(first, last)
     list(decoder.blocks(last, frames=slice(first, stop)))
-    assert prepared == [(1, last)] and decoder.bytes_read == before
+    assert prepared == [(1, last)] and decoder.file.bytes_read == before
     decoder.positions(0, last)
     decoder.positions(first, 0)
     decoder.positions(stop - 1, last)
-    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.bytes_read > before
+    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.file.bytes_read > before
 
 
 def test_several_threads_at_once_see_what_one_alone_does(played):
     decoder, _ = played
-    alone = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
-    maps = [decoder.affines(5, depth).matrices for depth in range(decoder.level_count)]
+    alone = [decoder.positions(level=level) for level in range(decoder.level_count)]
+    maps = [decoder.affines(5, level).matrices for level in range(decoder.level_count)]
 
     def watch(seed: int) -> int:
         """Frames, runs of frames and maps of any level, at random; how many were looked at."""
         rng = np.random.default_rng(seed)
         for _ in range(40):
-            depth, frame = int(rng.integers(decoder.level_count)), int(rng.integers(decoder.frame_count))
+            level, frame = int(rng.integers(decoder.level_count)), int(rng.integers(decoder.frame_count))
             run = slice(frame, frame + int(rng.integers(1, 20)))
-            assert np.array_equal(decoder.positions(frame, depth), alone[depth][frame])
-            assert np.array_equal(decoder.positions(run, depth), alone[depth][run])
-            assert np.array_equal(decoder.affines(5, depth).matrices, maps[depth])
+            assert np.array_equal(decoder.positions(frame, level), alone[level][frame])
+            assert np.array_equal(decoder.positions(run, level), alone[level][run])
+            assert np.array_equal(decoder.affines(5, level).matrices, maps[level])
         return 40
 
     with ThreadPoolExecutor(6) as threads:
@@ -339,7 +339,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
 
     def read(_) -> None:
         for _ in range(10):
-            decoder.check()
+            decoder.file.check()
             for name in ("attributes", "joined_metadata", "faces", "edges"):
                 vars(decoder).pop(name)   # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
@@ -354,20 +354,20 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
 def test_positions_of_another_type_are_the_files_own_in_that_type(dtype, tmp_path):
     athcodec.encode(plant(seed=3, branches=8, frames=12, dtype=dtype), tmp_path / "p.ath", effort="fast")
     with athcodec.open(tmp_path / "p.ath") as decoder:
-        for depth in range(decoder.level_count):
-            own = decoder.positions(depth=depth)
+        for level in range(decoder.level_count):
+            own = decoder.positions(level=level)
             assert own.dtype == decoder.dtype == dtype
             for other in (np.float16, np.float32, np.float64, ">f4", ">f8"):
-                shown = decoder.positions(depth=depth, dtype=other)
+                shown = decoder.positions(level=level, dtype=other)
                 assert shown.dtype == np.dtype(other) and np.array_equal(shown, own.astype(other))
 
 
 def test_attributes_are_read_when_asked_for(full_ath):
     with athcodec.open(full_ath) as decoder:
         decoder.positions()
-        before = decoder.bytes_read
+        before = decoder.file.bytes_read
         assert set(decoder.attributes) == {"radius", "species"}
-        assert decoder.bytes_read > before
+        assert decoder.file.bytes_read > before
 
 
 @pytest.mark.parametrize("ask", [
@@ -410,20 +410,20 @@ def test_str_path_and_file_object_give_the_same(bushy_ath):
 def test_info_is_json_and_agrees_with_the_summary(bushy_clip, tmp_path):
     summary = athcodec.encode(bushy_clip, tmp_path / "b.ath", rel_error=1e-3, segment_frames=16, effort="fast")
     with athcodec.open(summary.path) as decoder:
-        info = json.loads(json.dumps(decoder.info(), allow_nan=False))
-        assert decoder.table1() == summary.table1
+        info = json.loads(json.dumps(decoder.file.info(), allow_nan=False))
+        assert decoder.file.table1() == summary.table1
     assert info["vertices"] == bushy_clip.vertex_count and info["frames"] == 50 and info["segments"] == 4
     assert info["bytes"] == info["available_bytes"] == summary.bytes == summary.path.stat().st_size
     assert info["complete"] and info["max_error_bound"] == summary.max_error_bound
-    assert [d["bytes"] for d in info["depths"]] == [d.bytes for d in summary.depths]
+    assert [d["bytes"] for d in info["levels"]] == [d.bytes for d in summary.levels]
     assert sum(summary.chunk_bytes.values()) == summary.bytes
 
 
 def test_the_table_of_the_ath_is_that_of_the_analysis(bushy_clip, bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        epsilon, eta, xi, lam = decoder.thresholds
+        epsilon, eta, xi, lam = decoder.file.thresholds
         expected = athcodec.build_ath(bushy_clip, epsilon, eta, xi, lam).table1()
-        assert decoder.table1() == expected
+        assert decoder.file.table1() == expected
 
 
 def test_one_frame_has_no_frame_rate(tmp_path):
@@ -443,8 +443,8 @@ def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
 def test_checking_reads_every_byte_behind_the_tables(full_ath):
     file = Recorder(full_ath.read_bytes())
     decoder = athcodec.open(file)
-    decoder.check()
-    covered = np.zeros(decoder.file_length, bool)
+    decoder.file.check()
+    covered = np.zeros(decoder.file.file_length, bool)
     for start, stop in file.ranges:
         covered[start:stop] = True
     assert covered.all()
@@ -452,12 +452,11 @@ def test_checking_reads_every_byte_behind_the_tables(full_ath):
 
 def test_a_wrong_byte_in_a_chunk_is_met_when_it_is_read_and_not_before(bushy_ath):
     data = bytearray(bushy_ath.read_bytes())
-    container = athcodec.open(bushy_ath).container
-    container.file.close()
-    last = container.chunks[-1]
+    with athcodec.open(bushy_ath) as decoder:
+        last = decoder.file.chunks[-1]
     data[last.offset + last.length // 2] ^= 1
     decoder = athcodec.open(BytesIO(bytes(data)), strict=True)
-    decoder.positions(depth=decoder.level_count - 2)
+    decoder.positions(level=decoder.level_count - 2)
     with pytest.raises(BadChecksum, match="CORRECTIONS of level 5, segment 3"):
         decoder.positions()
 
@@ -470,17 +469,17 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     with athcodec.open(scratch / "maps.ath") as decoder:
         hierarchy, pose = decoder.hierarchy, base_pose(decoder)
         full = decoder.positions(17)[hierarchy.vertex_source]
-        for depth in range(decoder.level_count):
-            parts = decoder.affines(17, depth)
-            assert len(parts.branch) == decoder.depths[depth].nodes
+        for level in range(decoder.level_count):
+            parts = decoder.affines(17, level)
+            assert len(parts.branch) == decoder.levels[level].nodes
             matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
             as_one = np.repeat(~parts.is_stem, parts.vertex_count)
-            shown = decoder.positions(17, depth)[hierarchy.vertex_source]
+            shown = decoder.positions(17, level)[hierarchy.vertex_source]
             assert np.abs(applied(matrices, pose[:, None])[:, 0] - shown)[as_one].max(initial=0) < 1e-9 * size
-            residual = decoder.residual(17, depth)[hierarchy.vertex_source]
+            residual = decoder.residual(17, level)[hierarchy.vertex_source]
             assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < 1e-9 * size
             branch = hierarchy.vertex_branch()[parts.first_vertex]
-            loose = decoder.branches["flags"][branch] & LOOSE > 0
+            loose = decoder.file.branches["flags"][branch] & LOOSE > 0
             hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]

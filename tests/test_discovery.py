@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plants import plant
 
 import athcodec
 from athcodec import MotionClip, discovery
@@ -20,7 +21,6 @@ from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders
 from bench.trees.mesh import dress
 from bench.trees.wind import Wind
-from plants import plant
 
 FRAMES = 24
 
@@ -180,7 +180,7 @@ def test_the_trunk_can_be_named(dressed):
 
 def test_what_was_found_is_kept_edited_and_used(dressed, tmp_path, capsys):
     source, kept, coded = (str(tmp_path / name) for name in ("a.h5", "a.json", "a.ath"))
-    athcodec.write_hdf5(source, bare(dressed))
+    athcodec.write_hdf5(bare(dressed), source)
     assert main(["hierarchy", source, "--save", kept]) == 0
     assert f"{dressed.branch_count:,} branches by components" in capsys.readouterr().out
     content = json.loads(Path(kept).read_text())

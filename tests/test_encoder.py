@@ -140,7 +140,7 @@ def test_the_deepest_chain_that_is_encoded_can_be_decoded(tmp_path):
 def poisoned_file(path, frame: int) -> None:
     """A clip as HDF5, which is read in blocks, with one NaN in its motion."""
     source = plant(seed=1, branches=5, longest=4, frames=60)
-    athcodec.write_hdf5(path, source)
+    athcodec.write_hdf5(source, path)
     with h5py.File(path, "r+") as file:
         file["positions"][frame, 2, 1] = np.nan
 
@@ -207,8 +207,8 @@ def test_an_existing_file_is_there_until_the_new_one_is_whole(small, tmp_path):
     summary = athcodec.encode(small, target, effort="fast", progress=look)
     assert seen == {b"older"} and list(tmp_path.iterdir()) == [target]
     with athcodec.open(target, strict=True) as decoder:
-        decoder.check()
-        assert decoder.file_length == summary.bytes
+        decoder.file.check()
+        assert decoder.file.file_length == summary.bytes
 
 
 def test_a_folder_that_does_not_exist_is_an_os_error(small, tmp_path):

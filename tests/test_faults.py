@@ -17,12 +17,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from plants import plant
 
 import athcodec
-from athcodec import cli, files
-from athcodec.files import Part, new_file
+from athcodec import atomic_files, cli
+from athcodec.atomic_files import PendingFile, new_file
 from athcodec.sources import sample_path
-from plants import plant
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for spec, which is not installed; athcodec stays the installed one
@@ -58,7 +58,7 @@ def test_so_do_two_hundred(place):
 
 @pytest.mark.parametrize("write", [
     lambda path, ath: athcodec.truncate(ath, path, 1),
-    lambda path, ath: athcodec.write_hdf5(path, plant(frames=3)),
+    lambda path, ath: athcodec.write_hdf5(plant(frames=3), path),
     lambda path, ath: athcodec.encode(plant(frames=3), path, effort="fast"),
 ], ids=["truncate", "write_hdf5", "encode"])
 def test_every_writer_removes_what_a_dead_one_left_and_nothing_else(write, bushy_ath, tmp_path):
@@ -85,7 +85,7 @@ def test_a_part_whose_writer_cannot_be_asked_stays(tmp_path, monkeypatch):
     def refuse(*_):
         raise OSError(37, "No locks available")
 
-    monkeypatch.setattr(files.fcntl, "flock", refuse)
+    monkeypatch.setattr(atomic_files.fcntl, "flock", refuse)
     (tmp_path / DEAD).write_bytes(b"who knows")
     with new_file(tmp_path / "target.ath") as out:
         out.write(b"new")
@@ -156,14 +156,14 @@ def test_a_file_that_is_replaced_keeps_its_permissions(mode, bushy_ath, tmp_path
     target.chmod(mode)
     athcodec.truncate(bushy_ath, target, 0)
     assert stat.S_IMODE(target.stat().st_mode) == mode
-    athcodec.write_hdf5(target, plant(frames=3))
+    athcodec.write_hdf5(plant(frames=3), target)
     assert stat.S_IMODE(target.stat().st_mode) == mode
 
 
 def test_a_new_file_has_the_permissions_of_any_new_file(bushy_ath, tmp_path):
     (tmp_path / "plain").touch()
     athcodec.truncate(bushy_ath, tmp_path / "new.ath", 0)
-    athcodec.write_hdf5(tmp_path / "new.h5", plant(frames=3))
+    athcodec.write_hdf5(plant(frames=3), tmp_path / "new.h5")
     assert len({stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}) == 1
 
 
@@ -194,10 +194,10 @@ def test_the_input_is_not_replaced_by_the_output_under_another_name_either(verb,
     assert "is the input" in capsys.readouterr().err and source.read_bytes() == before
 
 
-def test_a_part_can_be_given_up_twice(tmp_path):
-    part = Part(tmp_path / "a.ath")
-    part.discard()
-    part.discard()
+def test_a_pending_file_can_be_discarded_twice(tmp_path):
+    pending = PendingFile(tmp_path / "a.ath")
+    pending.discard()
+    pending.discard()
     assert names(tmp_path) == set()
 
 
@@ -208,7 +208,7 @@ def test_a_part_can_be_given_up_twice(tmp_path):
 def long_source(tmp_path):
     """A clip of 200 frames in 20 vertices, as HDF5."""
     path = tmp_path / "source.h5"
-    athcodec.write_hdf5(path, plant(seed=1, branches=5, longest=4, frames=200))
+    athcodec.write_hdf5(plant(seed=1, branches=5, longest=4, frames=200), path)
     return path
 
 
@@ -301,7 +301,7 @@ def test_a_file_that_shrinks_while_it_is_played_is_truncated_where_it_is_read(bu
     path.write_bytes(bushy_ath.read_bytes())
     with athcodec.open(path) as decoder:
         coarse = decoder.positions(0, 0)
-        os.truncate(path, decoder.depths[0].bytes)
+        os.truncate(path, decoder.levels[0].bytes)
         with pytest.raises(athcodec.errors.Truncated):
             decoder.positions(0)
         assert np.array_equal(decoder.positions(0, 0), coarse), "level 0 is still there"

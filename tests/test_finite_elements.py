@@ -9,11 +9,6 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-
-import athcodec
-from athcodec.clip import MotionClip
-from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from moving_meshes import (
     POINTS,
     assert_same_mesh,
@@ -24,6 +19,11 @@ from moving_meshes import (
     survives_damage,
     swaying,
 )
+
+import athcodec
+from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
+from athcodec.errors import ClipError
 
 TIMES = np.arange(5) / 24
 CUBE = np.array([[x, y, z] for z in (0, 1, 2) for y in (0, 1) for x in (0, 1)], float)
@@ -169,10 +169,10 @@ def test_meshio_reads_what_is_written(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.pvd"])
-def test_an_excerpt_keeps_times_frames_and_the_bound(tmp_path, name):
+def test_a_clip_view_keeps_times_frames_and_the_bound(tmp_path, name):
     clip = quad_clip(frames=40)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
-        athcodec.write(Excerpt(decoder, frames=range(10, 30)), tmp_path / name)
+        athcodec.write(ClipView(decoder, frames=range(10, 30)), tmp_path / name)
         bound = decoder.max_error_bound
     with athcodec.read(tmp_path / name) as part:
         assert part.metadata["start_frame"] == 11 and part.frame_count == 20

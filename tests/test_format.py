@@ -107,7 +107,7 @@ def assert_same_bits(spec: SimpleNamespace, data: bytes) -> None:
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
-            expected = np.concatenate([clip.positions(depth=level) for clip in played])
+            expected = np.concatenate([clip.positions(level=level) for clip in played])
             got = np.array(spec.decode(data, level), decoder.dtype)
             assert got.tobytes() == expected.tobytes(), f"level {level}"
         header, chunks = spec.parse_front(data)
@@ -318,7 +318,7 @@ def played(data: bytes, kind: int) -> Iterator[athcodec.Decoder]:
     """A file that plays to its end, or raises BadChunk for the one chunk that a test is about."""
     try:
         with opened(data, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
             yield decoder
     except errors.BadChunk as error:
         assert str(error).startswith(f"chunk {container.KIND_NAMES[kind]} ")
@@ -330,7 +330,7 @@ def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     with played(still_file(branches=like, hierarchy=hierarchy_chunk(stream)), container.HIERARCHY) as decoder:
         numbers = decoder.hierarchy
         assert not decoder.positions().any()
-        rows = [[int(row[name]) for name in fields] for row in decoder.branches]
+        rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
         return rows, numbers.branch_source.tolist(), numbers.vertex_source.tolist()
 
 
@@ -374,7 +374,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
         data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1:]])
         for level in range(chunk.level, parts.header.level_count):
             document = outcome(spec, lambda data: spec.decode(data, level), data)
-            code = outcome(spec, lambda data: opened(data).positions(depth=level), data)
+            code = outcome(spec, lambda data: opened(data).positions(level=level), data)
             assert_same_numbers(document, code)
 
 
@@ -593,7 +593,7 @@ def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None
     with pytest.raises(spec.Invalid, match=f"^{error}$"):
         spec.decode(data, 1)
     with pytest.raises(errors.FormatError) as caught, athcodec.open(io.BytesIO(data)) as decoder:
-        decoder.check()
+        decoder.file.check()
     assert caught.value.name == error
 
 

@@ -11,9 +11,9 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
+from fuzz import coverage, seeds, targets
 
 import athcodec
-from fuzz import coverage, seeds, targets
 
 SECONDS = 1
 SEED = 1
@@ -48,7 +48,7 @@ def test_every_seed_is_a_valid_file_and_small():
     for data in files.values():
         assert len(data) <= seeds.LARGEST
         with athcodec.open(BytesIO(data), strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
 
 
 @pytest.mark.slow

@@ -12,16 +12,16 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from plants import plant
 
 import athcodec
 from athcodec.cli import main
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.excerpt import Excerpt
 from athcodec.exporters import gltf as gltf_exporter
 from athcodec.exporters import write
 from athcodec.sources import read
-from plants import plant
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -308,7 +308,7 @@ def with_takes(path):
 def test_takes_are_clips_of_their_own(tmp_path):
     path = with_takes(tmp_path / "a.glb")
     with read(path, fps=2, takes="all") as clip:
-        assert [(span.name, span.frame_count, span.loop) for span in clip.spans] == [
+        assert [(clip_range.name, clip_range.frame_count, clip_range.loop) for clip_range in clip.clip_ranges] == [
             ("walk", 3, False), ("walk.1", 5, False), ("animation 2", 3, False), ("turn", 4, True)]
         found = {name: each.block(0, each.frame_count) for name, each in athcodec.split(clip).items()}
         assert np.array_equal(clip.block(0, 15), np.concatenate(list(found.values())))
@@ -316,9 +316,9 @@ def test_takes_are_clips_of_their_own(tmp_path):
         assert np.allclose(found["turn"][1], CUBE @ about([0, 1, 0], np.pi / 2)[1].T, atol=1e-6)
     for takes in (["turn"], ["tu*"], "turn"):
         with read(path, fps=2, takes=takes) as clip:
-            assert np.array_equal(clip.block(0, 4), found["turn"]) and clip.spans[0].name == "turn"
+            assert np.array_equal(clip.block(0, 4), found["turn"]) and clip.clip_ranges[0].name == "turn"
     with read(path, fps=2) as clip:
-        assert np.array_equal(clip.block(0, 3), found["walk"]) and clip.spans == ()
+        assert np.array_equal(clip.block(0, 3), found["walk"]) and clip.clip_ranges == ()
         assert clip.metadata["other_animations"] == ["walk.1", "animation 2", "turn"]
     with pytest.raises(ClipError, match="takes: got run, expected one of .*turn"):
         read(path, takes=["run"])
@@ -338,12 +338,12 @@ def test_a_loop_ends_before_its_first_frame_comes_again(tmp_path):
     path = with_takes(tmp_path / "a.glb")
     for fps, frames, rate in ((2, 4, 2), (8, 16, 8), (0.8, 2, 1)):
         with read(path, fps=fps, takes="turn") as clip:
-            assert (clip.frame_count, clip.fps, clip.spans[0].loop) == (frames, rate, True)
+            assert (clip.frame_count, clip.fps, clip.clip_ranges[0].loop) == (frames, rate, True)
     gltf = pygltflib.GLTF2().load(str(path))
     gltf.animations[0].extras = {"loop": True}
     gltf.save(str(path))
     with read(path, fps=2) as clip:
-        assert (clip.frame_count, clip.spans[0].loop) == (3, True)
+        assert (clip.frame_count, clip.clip_ranges[0].loop) == (3, True)
 
 
 @pytest.mark.parametrize("name", ["a.glb", "bin.gltf", "data.gltf"])
@@ -552,24 +552,24 @@ def far(a, b):
 
 def test_joints_keep_the_error_that_the_file_states_at_every_level(leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            excerpt = Excerpt(decoder, depth)
-            path = tmp_path / f"{depth}.glb"
-            write(excerpt, path, animation="joints")
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level)
+            path = tmp_path / f"{level}.glb"
+            write(view, path, animation="joints")
             facts = facts_of(path)["athcodec"]
-            shown = excerpt.block(0, excerpt.frame_count)
+            shown = view.block(0, view.frame_count)
             gltf = pygltflib.GLTF2().load(str(path))
-            worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(excerpt.frame_count))
+            worst = max(far(skinned_by_hand(gltf, i), shown[i]) for i in range(view.frame_count))
             assert worst == pytest.approx(facts["max_error"], rel=1e-3, abs=1e-6)
-            assert worst <= 1.1 * max(excerpt.max_error, 1e-5 * np.linalg.norm(np.ptp(excerpt.rest, axis=0)))
-            assert facts["depth"] == depth and facts["joints"] >= decoder.depths[depth].nodes
+            assert worst <= 1.1 * max(view.max_error, 1e-5 * np.linalg.norm(np.ptp(view.rest, axis=0)))
+            assert facts["level"] == level and facts["joints"] >= decoder.levels[level].nodes
 
 
 def test_from_a_source_through_ath_and_glb_within_the_bound(leafy, leafy_ath, tmp_path):
     with athcodec.open(leafy_ath) as decoder:
         bound = decoder.max_error_bound
         for animation, more in (("joints", 1.1 * bound), ("morphs", 1e-6), ("auto", 1.1 * bound)):
-            write(Excerpt(decoder), tmp_path / "a.glb", animation=animation)
+            write(ClipView(decoder), tmp_path / "a.glb", animation=animation)
             positions, clip = frames_of(tmp_path / "a.glb")
             assert far(positions, leafy.block(0, 40)) <= bound + more
             assert clip.time == pytest.approx(leafy.time - leafy.time[0], abs=1e-9)
@@ -700,7 +700,7 @@ def same_clips(path, wanted, error):
         found = athcodec.split(clip)
         assert list(found) == list(wanted)
         for name, each in wanted.items():
-            assert found[name].spans[0].loop == (name == "calm")
+            assert found[name].clip_ranges[0].loop == (name == "calm")
             assert far(found[name].block(0, found[name].frame_count), each.block(0, each.frame_count)) <= error
             assert found[name].time == pytest.approx(each.time, abs=1e-6)
             for key in ("fps", "start_frame"):
@@ -722,7 +722,7 @@ def test_clips_keep_names_loops_and_motion_from_glb_through_ath_to_glb(seasons, 
 
 def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path):
     with athcodec.open(seasons_ath) as decoder:
-        write(Excerpt(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
+        write(ClipView(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
     gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
     moved = [{(channel.target.node, channel.target.path) for channel in each.channels} for each in gltf.animations]
     assert len(gltf.skins) == 1 and len(moved) == 4 and all(each == moved[0] for each in moved)
@@ -736,7 +736,7 @@ def test_clips_that_all_stand_still_are_animations_too(seasons, tmp_path):
                                 rest=held.rest.astype(np.float32))
     write(athcodec.join({"a": still, "b": still}), tmp_path / "a.glb", animation="joints")
     with read(tmp_path / "a.glb", takes="all") as clip:
-        assert [(span.name, span.frame_count) for span in clip.spans] == [("a", 5), ("b", 5)]
+        assert [(clip_range.name, clip_range.frame_count) for clip_range in clip.clip_ranges] == [("a", 5), ("b", 5)]
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])

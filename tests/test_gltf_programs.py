@@ -20,7 +20,7 @@ from test_vat import exr
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.exporters import write
 from athcodec.exporters.fitting import quaternions
 from athcodec.sources import read
@@ -119,13 +119,13 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(ani
                                                                              tmp_path):
     path = tmp_path / "a.glb"
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            excerpt = Excerpt(decoder, depth, range(4, 30))
-            write(excerpt, path, animation=animation)
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level, range(4, 30))
+            write(view, path, animation=animation)
             assert_valid(node, path)
             stated = json.loads(structure(path))["asset"]["extras"]["athcodec"]["max_error"]
-            shown = played(path, excerpt.time - excerpt.time[0])
-            assert far(shown, excerpt.block(0, 26)) <= stated + 1e-5
+            shown = played(path, view.time - view.time[0])
+            assert far(shown, view.block(0, 26)) <= stated + 1e-5
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
@@ -133,7 +133,7 @@ def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(animat
                                                                           node, played, tmp_path):
     path = tmp_path / "a.glb"
     with athcodec.open(seasons_ath) as decoder:
-        write(Excerpt(decoder, all_clips=True), path, animation=animation)
+        write(ClipView(decoder, all_clips=True), path, animation=animation)
         assert_valid(node, path)
         (tmp_path / "none.json").write_text("[]")
         listed = json.loads(node("play.mjs", path, tmp_path / "none.json", tmp_path / "none.bin"))["animations"]
@@ -155,7 +155,7 @@ def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, 
         athcodec.encode(flat, tmp_path / "a.ath", rel_error=1e-4)
     before = played(three_file, np.arange(25) / 24)
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        write(Excerpt(decoder), tmp_path / "b.glb", animation="morphs")
+        write(ClipView(decoder), tmp_path / "b.glb", animation="morphs")
         assert_valid(node, tmp_path / "b.glb")
         assert far(played(tmp_path / "b.glb", np.arange(25) / 24), before) <= decoder.max_error_bound + 1e-5
 
@@ -186,8 +186,8 @@ def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path): 
 @pytest.mark.parametrize("half", [True, False])
 def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath, node, tmp_path, half):  # noqa: F811
     with athcodec.open(leafy_ath) as decoder:
-        write(Excerpt(decoder), tmp_path / "a.vat", half=half)
-        write(Excerpt(decoder), tmp_path / "a.openvat")
+        write(ClipView(decoder), tmp_path / "a.vat", half=half)
+        write(ClipView(decoder), tmp_path / "a.openvat")
     for glb in (tmp_path / "a.vat" / "a.glb", tmp_path / "a.openvat" / "a_vat.glb"):
         assert_valid(node, glb)
     for name in ("a_matrices_0.exr", "a_pivots.exr"):
@@ -227,7 +227,7 @@ def test_an_animal_goes_through_ath_and_is_played_within_the_bound(panda, node, 
         wanted, times = clip.block(0, clip.frame_count), clip.time
     with athcodec.open(tmp_path / "a.ath") as decoder:
         for animation in ("joints", "morphs"):
-            write(Excerpt(decoder), tmp_path / "b.glb", animation=animation)
+            write(ClipView(decoder), tmp_path / "b.glb", animation=animation)
             assert_valid(node, tmp_path / "b.glb")
             stated = json.loads(structure(tmp_path / "b.glb"))["asset"]["extras"]["athcodec"]["max_error"]
             shown = played(tmp_path / "b.glb", times[::10])

@@ -7,11 +7,11 @@ import re
 
 import numpy as np
 import pytest
+from plants import tube
 
 import athcodec
-from athcodec import Excerpt, MotionClip
+from athcodec import ClipView, MotionClip
 from athcodec.errors import ClipError
-from plants import tube
 
 RATE = 24000 / 1001
 FORMATS = {
@@ -98,7 +98,7 @@ def test_static_arrays_come_back_unchanged(clip, tmp_path, name):
 def test_a_decoded_file_is_within_its_bound_in_every_format(clip, tmp_path, name):
     summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3)
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        with there_and_back(Excerpt(decoder, frames=range(2, 7)), tmp_path, name) as again:
+        with there_and_back(ClipView(decoder, frames=range(2, 7)), tmp_path, name) as again:
             assert again.metadata["start_frame"] + again.time[0] * RATE == pytest.approx(1003)
             expected = clip.block(2, 7).astype(np.float64)
             if name in METRES:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import athcodec
 from athcodec import clip as clip_module
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
@@ -50,10 +51,16 @@ def assert_same_array(a, b):
         assert a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
+@pytest.mark.parametrize("write, name", [(athcodec.encode, "a.ath"), (athcodec.write, "a.h5"), (write_hdf5, "a.h5")])
+def test_whatever_writes_a_clip_takes_the_clip_and_then_the_path(write, name, forked_clip, tmp_path):
+    write(forked_clip, tmp_path / name)
+    assert (tmp_path / name).stat().st_size > 0
+
+
 @pytest.mark.parametrize("gzip", [False, True])
 def test_the_sample_survives_unchanged(sample_clip, sample_file, tmp_path, gzip):
     copy = tmp_path / "copy.h5"
-    write_hdf5(copy, sample_clip, gzip=gzip)
+    write_hdf5(sample_clip, copy, gzip=gzip)
     with read_hdf5(copy) as again:
         assert_same_clip(sample_clip, again)
     with h5py.File(sample_file) as a, h5py.File(copy) as b:
@@ -86,7 +93,7 @@ def test_static_arrays_and_metadata_survive(forked, tmp_path, dtypes, shape, met
     more = {"attributes": arrays, "metadata": metadata, "faces": np.array([[0, 1, 4]], "u1")}
     more["positions"] = forked["positions"].astype(precision)
     clip = MotionClip(**(forked | more))
-    write_hdf5(tmp_path / "clip.h5", clip, gzip=gzip)
+    write_hdf5(clip, tmp_path / "clip.h5", gzip=gzip)
     with read_hdf5(tmp_path / "clip.h5") as again:
         assert_same_clip(clip, again)
 
@@ -154,7 +161,7 @@ def test_branches_are_derived_from_edges_along_the_up_axis(forked, tmp_path):
 def test_derived_branches_survive_where_stems_run_against_the_numbering(forked, tmp_path):
     path = write_source(tmp_path / "a.h5", forked, ["vertex_branch", "branch_parent"])
     with read_hdf5(path, root=3) as clip:
-        write_hdf5(tmp_path / "b.h5", clip)
+        write_hdf5(clip, tmp_path / "b.h5")
         with read_hdf5(tmp_path / "b.h5") as again:
             assert_same_clip(clip, again)
             assert hierarchy_of(again).vertex_source.tolist() == [3, 2, 1, 0, 4, 5]
@@ -164,7 +171,7 @@ def test_branch_order_is_kept_only_where_it_is_not_the_depth(forked, tmp_path):
     for order, kept in (([0, 1], False), ([1, 2], True)):
         with read_hdf5(write_source(tmp_path / "a.h5", forked, branch_order=np.array(order, "i2"))) as clip:
             assert ("branch_order" in clip.attributes) == kept
-            write_hdf5(tmp_path / "b.h5", clip)
+            write_hdf5(clip, tmp_path / "b.h5")
         with h5py.File(tmp_path / "b.h5") as file:
             assert file["branch_order"][()].tolist() == order
 
@@ -246,20 +253,20 @@ def test_a_failed_write_leaves_what_was_there_before(forked, tmp_path, blocks, m
 def test_nothing_is_left_where_the_source_breaks_or_cannot_be_stored(forked, forked_clip, tmp_path):
     forked["positions"][4, 0, 0] = np.nan
     with pytest.raises(ClipError, match="frame 4, vertex 0"):
-        write_hdf5(tmp_path / "a.h5", MotionClip(**forked))
+        write_hdf5(MotionClip(**forked), tmp_path / "a.h5")
     with pytest.raises(ClipError, match="name 'time'"):
         Hdf5Writer(tmp_path / "a.h5", **writer_arguments(forked), attributes={"time": np.zeros(3)})
     with pytest.raises(TypeError):
         Hdf5Writer(tmp_path / "a.h5", **writer_arguments(forked), metadata={"a": object()})
     with pytest.raises(FileNotFoundError, match="does not exist"):
-        write_hdf5(tmp_path / "none" / "a.h5", forked_clip)
+        write_hdf5(forked_clip, tmp_path / "none" / "a.h5")
     assert os.listdir(tmp_path) == []
 
 
 def test_a_clip_can_be_written_over_the_file_that_it_is_read_from(forked, tmp_path):
     path = write_source(tmp_path / "a.h5", forked)
     with read_hdf5(path) as clip:
-        write_hdf5(path, clip, gzip=True)
+        write_hdf5(clip, path, gzip=True)
     with read_hdf5(path) as clip:
         assert np.array_equal(clip.block(0, 5), forked["positions"])
 
@@ -271,6 +278,6 @@ def test_anything_with_frame_blocks_can_be_written(forked, tmp_path):
         dtype=np.dtype("f4"),
         blocks=lambda: ((i, positions[i : i + 1]) for i in range(5)),
     )
-    write_hdf5(tmp_path / "a.h5", decoded)
+    write_hdf5(decoded, tmp_path / "a.h5")
     with read_hdf5(tmp_path / "a.h5") as clip:
         assert np.array_equal(clip.block(0, 5), positions) and clip.rest_dtype == np.float32

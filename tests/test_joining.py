@@ -11,10 +11,10 @@ import pytest
 import athcodec
 from athcodec import exporters
 from athcodec.cli import main
-from athcodec.clip import MotionClip, Span
+from athcodec.clip import ClipRange, MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
-from athcodec.excerpt import Excerpt
 
 
 def distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -27,13 +27,13 @@ def changed(clip: MotionClip, **changes) -> MotionClip:
 
 def test_each_clip_is_found_by_its_name_and_keeps_the_bound(medley_clips, medley_ath):
     with athcodec.open(medley_ath, strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert [clip.name for clip in decoder.clips] == list(medley_clips)
         for name, source in medley_clips.items():
             played = decoder.play(name)
             assert played.frame_count == source.frame_count and np.array_equal(played.time, source.time)
             assert distance(played.positions(), source.block(0, source.frame_count)) <= decoder.max_error_bound
-            assert played.clip.loop == any(span.loop for span in source.spans)
+            assert played.clip.loop == any(clip_range.loop for clip_range in source.clip_ranges)
             assert played.metadata["from"] == source.metadata["from"] and played.metadata["unit"] == "m"
             with athcodec.open(medley_ath, clip=name) as alone:
                 assert np.array_equal(alone.positions(-1), played.positions(source.frame_count - 1))
@@ -43,11 +43,11 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
     with athcodec.open(medley_ath) as decoder:
         for name, source in medley_clips.items():
             played, reference = decoder.play(name), source.block(0, source.frame_count)
-            for level in played.depths:
-                measured = distance(played.positions(depth=level.depth), reference)
+            for level in played.levels:
+                measured = distance(played.positions(level=level.level), reference)
                 assert level.max_error == pytest.approx(measured, rel=1e-5)
-        assert [level["max_error"] for level in decoder.info()["depths"]] == [
-            max(decoder.play(name).depths[level].max_error for name in medley_clips)
+        assert [level["max_error"] for level in decoder.file.info()["levels"]] == [
+            max(decoder.play(name).levels[level].max_error for name in medley_clips)
             for level in range(decoder.level_count)]
 
 
@@ -109,7 +109,7 @@ def test_a_cut_off_file_shows_all_clips_at_the_levels_that_are_left(medley_clips
     with athcodec.open(shorter, strict=True) as decoder, athcodec.open(medley_ath) as full:
         assert decoder.level_count == 2
         for name in medley_clips:
-            assert np.array_equal(decoder.play(name).positions(), full.play(name).positions(depth=1))
+            assert np.array_equal(decoder.play(name).positions(), full.play(name).positions(level=1))
             assert decoder.play(name).clip == full.play(name).clip
 
 
@@ -128,7 +128,7 @@ def test_the_error_at_the_seam_is_how_far_off_the_step_over_it_is(medley_clips, 
 def test_a_blended_loop_goes_on_where_its_last_frame_ends(sample_clip):
     loop = athcodec.looped(sample_clip, 20)
     source, frames = sample_clip.block(0, 120), loop.block(0, 100)
-    assert loop.frame_count == 100 and loop.spans[0].loop and loop.metadata["loop_blend"] == 20
+    assert loop.frame_count == 100 and loop.clip_ranges[0].loop and loop.metadata["loop_blend"] == 20
     assert np.array_equal(frames[20:], source[20:100]), "what is not blended is the source's"
     assert np.array_equal(frames[0], source[100]), "the first frame is what followed the last"
     steps = np.linalg.norm(np.diff(source.astype(np.float64), axis=0), axis=2).max()
@@ -177,13 +177,14 @@ def test_clips_of_other_plants_are_refused_by_what_differs(medley_clips):
     calm = medley_clips["calm"]
     other = {
         "vertices": ({"positions": calm.block(0, 9)[:, :-1], "time": calm.time[:9], "rest": calm.rest[:-1],
-                      "spans": (), "vertex_branch": None, "branch_parent": None, "stem_index": None},
+                      "clip_ranges": (), "vertex_branch": None, "branch_parent": None, "stem_index": None},
                      "b: got .* vertices, expected"),
         "rest": ({"rest": calm.rest + 1}, "b: got another rest pose than a .vertex"),
         "faces": ({"faces": np.array([[0, 1, 2]])}, "b: got other faces than a"),
         "attributes": ({"attributes": {"radius": np.ones(3)}}, "b: got another attribute radius than a"),
         "branches": ({"branch_parent": None, "vertex_branch": None, "stem_index": None}, "b: got other vertex_branch"),
-        "spans": ({"spans": (Span("x", 10), Span("y", 10))}, "b: got 2 clips in one, expected a single one"),
+        "clip_ranges": ({"clip_ranges": (ClipRange("x", 10), ClipRange("y", 10))},
+                        "b: got 2 clips in one, expected a single one"),
     }
     for changes, message in other.values():
         with pytest.raises(ClipError, match=message):
@@ -225,25 +226,26 @@ def test_split_gives_back_what_was_joined(medley_clips):
         source = medley_clips[name]
         assert np.array_equal(clip.block(0, clip.frame_count), source.block(0, source.frame_count))
         assert np.array_equal(clip.time, source.time) and clip.metadata == source.metadata
-        assert clip.spans[0].name == name and clip.spans[0].loop == any(span.loop for span in source.spans)
+        assert clip.clip_ranges[0].name == name
+        assert clip.clip_ranges[0].loop == any(clip_range.loop for clip_range in source.clip_ranges)
     again = athcodec.join(athcodec.split(joined))
-    assert again.spans == joined.spans and again.metadata == joined.metadata
+    assert again.clip_ranges == joined.clip_ranges and again.metadata == joined.metadata
     assert np.array_equal(again.block(15, 70), joined.block(15, 70))
     assert athcodec.split(medley_clips["still"]) == {"": medley_clips["still"]}
 
 
-def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
+def test_a_clip_view_of_all_clips_is_what_each_is(medley_clips, medley_ath):
     with athcodec.open(medley_ath) as decoder:
-        excerpt = Excerpt(decoder, 1, all_clips=True)
-        frames = np.concatenate([decoder.play(name).positions(depth=1) for name in medley_clips])
-        assert excerpt.spans == athcodec.join(medley_clips).spans
-        assert np.array_equal(np.concatenate([block for _, block in excerpt.blocks()]), frames)
-        assert [start for start, _ in excerpt.blocks()][:3] == [0, 10, 20]
+        view = ClipView(decoder, 1, all_clips=True)
+        frames = np.concatenate([decoder.play(name).positions(level=1) for name in medley_clips])
+        assert view.clip_ranges == athcodec.join(medley_clips).clip_ranges
+        assert np.array_equal(np.concatenate([block for _, block in view.blocks()]), frames)
+        assert [start for start, _ in view.blocks()][:3] == [0, 10, 20]
         for start, stop in ((0, 90), (19, 21), (57, 58), (3, 5)):
-            assert np.array_equal(excerpt.block(start, stop), frames[start:stop])
-        assert np.array_equal(excerpt.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
-        assert excerpt.max_error == max(decoder.play(name).depths[1].max_error for name in medley_clips)
-        assert not Excerpt(decoder, 1, range(3)).spans[0].loop, "some frames of a loop are none"
+            assert np.array_equal(view.block(start, stop), frames[start:stop])
+        assert np.array_equal(view.affines(25).matrices, decoder.play("Böe").affines(5, 1).matrices)
+        assert view.max_error == max(decoder.play(name).levels[1].max_error for name in medley_clips)
+        assert not ClipView(decoder, 1, range(3)).clip_ranges[0].loop, "some frames of a loop are none"
 
 
 @pytest.mark.parametrize("kind", [each for each in exporters.FORMATS if not each.holds_several],
@@ -251,12 +253,12 @@ def test_an_excerpt_of_all_clips_is_what_each_is(medley_clips, medley_ath):
 def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
     path = tmp_path / f"a{kind.suffixes[0]}"
     with athcodec.open(medley_ath) as decoder:
-        for several in (athcodec.join(medley_clips), Excerpt(decoder, all_clips=True)):
+        for several in (athcodec.join(medley_clips), ClipView(decoder, all_clips=True)):
             with pytest.raises(ClipError, match="several clips, calm, Böe, still, round; expected one .*--clip.*glb"):
                 athcodec.write(several, path)
         assert list(tmp_path.iterdir()) == []
         athcodec.write(medley_clips["calm"], path)
-        athcodec.write(Excerpt(decoder), path.with_stem("b"))
+        athcodec.write(ClipView(decoder), path.with_stem("b"))
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".npz"])
@@ -264,9 +266,10 @@ def test_name_and_loop_of_a_clip_go_through_a_file_of_the_schema(suffix, medley_
     path = tmp_path / f"a{suffix}"
     for name, loop in (("calm", True), ("Böe", False)):
         with athcodec.open(medley_ath, clip=name) as decoder:
-            athcodec.write(Excerpt(decoder), path)
+            athcodec.write(ClipView(decoder), path)
             with athcodec.read(path) as clip:
-                assert clip.spans == (Span(name, decoder.frame_count, loop),) and clip.metadata == decoder.metadata
+                assert clip.clip_ranges == (ClipRange(name, decoder.frame_count, loop),)
+                assert clip.metadata == decoder.metadata
     assert main(["encode", str(path), str(tmp_path / "a.ath")]) == 0
     with athcodec.open(tmp_path / "a.ath", clip="Böe") as decoder:
         assert "clip_name" not in decoder.metadata
@@ -286,7 +289,7 @@ def sources(medley_clips, tmp_path_factory):
     """The motions as files, before any was made a loop."""
     folder = tmp_path_factory.mktemp("sources")
     for name in ("calm", "Böe"):
-        athcodec.write_hdf5(folder / f"{name}.h5", changed(medley_clips[name], spans=()))
+        athcodec.write_hdf5(changed(medley_clips[name], clip_ranges=()), folder / f"{name}.h5")
     return [str(folder / f"{name}.h5") for name in ("calm", "Böe")]
 
 
@@ -298,7 +301,7 @@ def test_files_are_joined_under_their_names_verified_and_decoded_by_name(sources
     shown = capsys.readouterr().out
     assert "quiet" in shown and "storm" in shown and "57 frames" not in shown and "48 frames" in shown
     assert main(["verify", out, "--against", sources[0], "--against", sources[1]]) == 0
-    assert "every depth is as close to" in capsys.readouterr().out
+    assert "every level is as close to" in capsys.readouterr().out
     assert main(["verify", out, "--clip", "storm", "--against", sources[1]]) == 0
     assert main(["verify", out, "--clip", "storm", "--against", sources[0]]) == 1
     assert main(["verify", out, "--against", sources[0]]) == 1

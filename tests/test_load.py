@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import player
+from athcodec import core_file
 from athcodec.container import Limits
 from athcodec.errors import LimitExceeded
 
@@ -102,8 +102,8 @@ class Scarce:
     """The binding's one source of memory for the core, whose n-th request from `fail` on fails."""
 
     def __init__(self, monkeypatch):
-        self.left, aligned = -1, player.aligned
-        monkeypatch.setattr(player, "aligned", lambda size: self.take() or aligned(size))
+        self.left, aligned = -1, core_file.aligned
+        monkeypatch.setattr(core_file, "aligned", lambda size: self.take() or aligned(size))
 
     def take(self) -> None:
         self.left -= 1
@@ -119,8 +119,8 @@ def test_memory_that_fails_for_the_core_leaves_a_decoder_that_goes_on(sample_ath
         scarce.left = failures + 1
         try:
             with athcodec.open(sample_ath) as decoder:
-                for depth in (0, decoder.level_count - 1):
-                    decoder.positions(0, depth)
+                for level in (0, decoder.level_count - 1):
+                    decoder.positions(0, level)
             done = True
         except MemoryError:
             failures += 1

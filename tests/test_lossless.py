@@ -29,7 +29,7 @@ def test_the_last_level_has_every_bit_of_positions_and_rest_pose(dtype, bound, t
     assert bits(decoder.positions()) == bits(clip.positions) and decoder.positions().dtype == dtype
     assert bits(decoder.positions(17)) == bits(clip.positions[17])
     assert bits(decoder.rest.astype(clip.rest_dtype)) == bits(clip.rest.astype(clip.rest_dtype))
-    assert decoder.max_error_bound == 0 and decoder.depths[-1].max_error == 0
+    assert decoder.max_error_bound == 0 and decoder.levels[-1].max_error == 0
 
 
 def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
@@ -38,8 +38,17 @@ def test_the_level_before_keeps_the_bound_and_plays_as_without(tmp_path):
     athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4, exact_rest=True)
     with athcodec.open(tmp_path / "b.ath") as lossy:
         assert lossless.level_count == lossy.level_count + 1
-        for depth in range(lossy.level_count):
-            assert bits(lossless.positions(depth=depth)) == bits(lossy.positions(depth=depth))
+        for level in range(lossy.level_count):
+            assert bits(lossless.positions(level=level)) == bits(lossy.positions(level=level))
+
+
+def test_the_hierarchy_is_as_deep_as_that_of_the_lossy_file(tmp_path):
+    clip = plant(seed=4, branches=9, frames=40)
+    lossless = opened(encoded(clip, path=tmp_path / "a.ath", rel_error=1e-4))
+    lossy = athcodec.encode(clip, tmp_path / "b.ath", rel_error=1e-4)
+    assert lossless.full_level_count == len(lossy.levels) + 1
+    assert lossless.file.table1() == lossy.table1 == lossless.file.info()["ath"]
+    assert lossy.table1["depth"] == len(lossy.levels) - 1
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -62,9 +71,9 @@ def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     deepest = opened(data).level_count - 1
     athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", deepest - 1)
     shorter = opened((tmp_path / "b.ath").read_bytes(), strict=True)
-    assert bits(shorter.positions()) == bits(opened(data).positions(depth=deepest - 1))
-    assert 0 < shorter.max_error_bound == shorter.depths[-1].max_error
-    cut = opened(data[: opened(data).container.level_end(deepest - 1)])
+    assert bits(shorter.positions()) == bits(opened(data).positions(level=deepest - 1))
+    assert 0 < shorter.max_error_bound == shorter.levels[-1].max_error
+    cut = opened(data[: opened(data).file.levels[deepest - 1].bytes])
     assert bits(cut.positions()) == bits(shorter.positions())
 
 
@@ -74,7 +83,7 @@ def test_what_is_wrong_with_the_exact_level_is_said(tmp_path):
     last = parts.header.level_count - 1
     i = parts.index(ct.EXACT, last, 1)
     with pytest.raises(BadChunkTable, match="EXACT"):
-        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).check()
+        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).file.check()
     for payload in (parts.payload(ct.EXACT, last) + b"\x01" * 12, b"\xff" * 900):
         decoder = opened(parts.with_payload(ct.EXACT, payload, last))
         with pytest.raises(BadChunk, match="EXACT"):
@@ -100,7 +109,7 @@ def test_the_command_line_makes_lossless_files_as_small_as_the_api_does(tmp_path
 
 
 def test_the_command_line_writes_lossless_files(tmp_path):
-    athcodec.write_hdf5(tmp_path / "a.h5", plant(seed=8, branches=5, frames=20))
+    athcodec.write_hdf5(plant(seed=8, branches=5, frames=20), tmp_path / "a.h5")
     assert main(["encode", str(tmp_path / "a.h5"), str(tmp_path / "a.ath"), "--lossless"]) == 0
     assert main(["verify", str(tmp_path / "a.ath"), "--against", str(tmp_path / "a.h5")]) == 0
     assert main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "b.h5")]) == 0

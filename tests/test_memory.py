@@ -15,10 +15,10 @@ VERTICES, FRAMES, TIMES = 12_000, 96, 5
 EXPORT = """
 import resource, sys
 import athcodec
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 
 with athcodec.open(sys.argv[1]) as decoder:
-    athcodec.write(Excerpt(decoder), sys.argv[2], sys.argv[3], animation="morphs")
+    athcodec.write(ClipView(decoder), sys.argv[2], sys.argv[3], animation="morphs")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 STREAMING = [kind for kind in FORMATS if kind.name in ("hdf5", "npz", "pc2", "mdd", "xdmf", "vtk", "sequence", "usd",

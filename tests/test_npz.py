@@ -8,14 +8,14 @@ import zipfile
 
 import numpy as np
 import pytest
+from moving_meshes import coded, mixed_clip, quad_clip, survives_damage
+from test_hdf5 import assert_same_clip
 
 import athcodec
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from athcodec.sources import npz, raw
-from moving_meshes import coded, mixed_clip, quad_clip, survives_damage
-from test_hdf5 import assert_same_clip
 
 
 @pytest.mark.parametrize("gzip", [False, True])
@@ -105,7 +105,7 @@ def test_branches_are_derived_from_edges_as_in_hdf5(forked, tmp_path):
 def test_end_to_end_the_bound_holds(tmp_path):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
-        athcodec.write(Excerpt(decoder, frames=range(4, 20)), tmp_path / "a.npz")
+        athcodec.write(ClipView(decoder, frames=range(4, 20)), tmp_path / "a.npz")
         bound = decoder.max_error_bound
     with athcodec.read(tmp_path / "a.npz") as again:
         off = np.linalg.norm(again.block(0, 16).astype(float) - clip.block(4, 20), axis=2)

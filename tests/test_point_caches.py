@@ -7,13 +7,13 @@ import struct
 
 import numpy as np
 import pytest
+from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 import athcodec
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from athcodec.sources import raw
-from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 MOTION = np.arange(4 * 5 * 3, dtype=np.float32).reshape(4, 5, 3) / 7
 
@@ -86,10 +86,10 @@ def test_cache_and_mesh_come_back_as_they_were(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".pc2", ".mdd"])
-def test_an_excerpt_keeps_its_frame_numbers(tmp_path, suffix):
+def test_a_clip_view_keeps_its_frame_numbers(tmp_path, suffix):
     path = coded(quad_clip(frames=40), tmp_path)
     with athcodec.open(path) as decoder:
-        athcodec.write(Excerpt(decoder, frames=range(10, 30)), tmp_path / f"part{suffix}")
+        athcodec.write(ClipView(decoder, frames=range(10, 30)), tmp_path / f"part{suffix}")
         bound = decoder.max_error_bound
     with athcodec.read(tmp_path / f"part{suffix}", fps=24) as part:
         assert part.metadata["start_frame"] == 11 and part.frame_count == 20

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-import athcodec
-from athcodec.errors import FormatError
 from files import Parts, opened
 from plants import awkward, bush, chain_plant, clip_of, grow, plant, random_hierarchy, tube
 from test_format import HandMade, Sapling
+
+import athcodec
+from athcodec.errors import FormatError
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "spec" / "reference_decoder.py"
@@ -34,7 +34,7 @@ def assert_same_bits(data: bytes) -> None:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
             assert_same_numbers(file.positions(level),
-                                np.concatenate([clip.positions(depth=level) for clip in played]))
+                                np.concatenate([clip.positions(level=level) for clip in played]))
         assert_same_numbers(file.rest(), decoder.rest)
         assert_same_numbers(np.concatenate(file.times), np.concatenate([clip.time for clip in played]))
         assert [(clip.name, clip.frames, clip.segments, clip.seams) for clip in file.clips] == [
@@ -160,7 +160,7 @@ def test_spoilt_clips_and_times_are_refused_alike_or_mean_the_same(name):
     for kind, content in changed_contents(parts, {"CLIPS", "TIME"}):
         data = parts.with_payload(kind, content)
         outcomes.append(outcome(lambda data=data: assert_same_bits(data)))
-        assert outcomes[-1] == outcome(lambda data=data: opened(data).check())
+        assert outcomes[-1] == outcome(lambda data=data: opened(data).file.check())
     assert 50 < outcomes.count("BAD_CHUNK") < 199
 
 
@@ -194,7 +194,7 @@ def test_spoilt_chunks_are_refused_alike_or_mean_the_same(full_ath):
         data = parts.with_chunks(chunks)
         level = chunks[i][0].level if chunks[i][0].is_motion else parts.header.level_count - 1
         got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
-        expected = outcome(lambda data=data, level=level: opened(data).positions(depth=level))
+        expected = outcome(lambda data=data, level=level: opened(data).positions(level=level))
         if isinstance(expected, str) or isinstance(got, str):
             refused += 1
             assert isinstance(got, str) and got == expected
@@ -229,7 +229,7 @@ def test_the_command_shows_a_level_and_writes_it(bushy_ath, tmp_path):
     done = run(bushy_ath, "--depth", 1, "--out", tmp_path / "positions.npy", "--checksum")
     assert done.returncode == 0, done.stderr
     with athcodec.open(bushy_ath) as decoder:
-        expected = decoder.positions(depth=1)
+        expected = decoder.positions(level=1)
     assert np.load(tmp_path / "positions.npy").tobytes() == expected.tobytes()
     assert "level 1 of" in done.stdout
     assert done.stdout.split()[-1] == f"{athcodec.container.crc32c(expected.tobytes()):08x}"

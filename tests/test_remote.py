@@ -18,13 +18,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import fsspec
 import numpy as np
 import pytest
+from files import Parts
+from plants import plant
 
 import athcodec
 from athcodec import cli, remote
 from athcodec.errors import BadChecksum, LevelUnavailable, NotAnAthFile, RemoteError, Truncated
 from athcodec.remote import GAP, READ_AHEAD, Remote
-from files import Parts
-from plants import plant
 
 
 class Server(ThreadingHTTPServer):
@@ -175,27 +175,27 @@ def local(large_ath):
 def test_opening_a_file_is_one_request(server, local):
     with athcodec.open(server.url) as decoder:
         assert server.ranges == [(0, READ_AHEAD)]
-        assert decoder.info() == local.info() and decoder.metadata == local.metadata
-        assert decoder.source.requests == 1 and decoder.source.bytes == READ_AHEAD
+        assert decoder.file.info() == local.file.info() and decoder.metadata == local.metadata
+        assert decoder.file.source.requests == 1 and decoder.file.source.bytes == READ_AHEAD
 
 
 def test_a_long_prelude_takes_a_second_request(server, local, monkeypatch):
     monkeypatch.setattr(remote, "READ_AHEAD", 1000)
     with athcodec.open(server.url) as decoder:
-        assert decoder.info() == local.info()
-        prelude = decoder.container.prelude_length
-    assert prelude > 2000 and decoder.source.requests <= 3
+        assert decoder.file.info() == local.file.info()
+        prelude = decoder.file.prelude_length
+    assert prelude > 2000 and decoder.file.source.requests <= 3
     assert max(stop for _, stop in server.ranges) < prelude + 1000
 
 
-def runs(decoder: athcodec.Decoder, depth: int, first: int, last: int) -> list[tuple[int, int]]:
+def runs(decoder: athcodec.Decoder, level: int, first: int, last: int) -> list[tuple[int, int]]:
     """(start, stop) of the chunks that the segments need behind what is read ahead, joined where they are
     close."""
     joined: list[list[int]] = []
-    kinds = (16,) if depth == decoder.full_level_count - 1 else (16, 17)
-    for chunk in decoder.container.chunks:
-        wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == depth)
-        if wanted and chunk.is_motion and chunk.level <= depth and first <= chunk.segment <= last:
+    kinds = (16,) if level == decoder.full_level_count - 1 else (16, 17)
+    for chunk in decoder.file.chunks:
+        wanted = chunk.kind in kinds or (chunk.kind == 18 and chunk.level == level)
+        if wanted and chunk.is_motion and chunk.level <= level and first <= chunk.segment <= last:
             start, stop = max(chunk.offset, READ_AHEAD), chunk.offset + chunk.length
             if joined and start - joined[-1][1] <= GAP:
                 joined[-1][1] = stop
@@ -205,67 +205,67 @@ def runs(decoder: athcodec.Decoder, depth: int, first: int, last: int) -> list[t
 
 
 def test_a_segment_is_one_request_for_each_run_of_its_chunks(server, local):
-    depth, segment = local.level_count - 1, len(local.segments) - 1
+    level, segment = local.level_count - 1, len(local.segments) - 1
     frame = local.segments[segment][0]
-    wanted = runs(local, depth, segment, segment)
+    wanted = runs(local, level, segment, segment)
     assert len(wanted) > 1
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(frame), local.positions(frame))
         assert sorted(server.ranges[1:]) == wanted
-        assert decoder.source.bytes == READ_AHEAD + sum(stop - start for start, stop in wanted)
-        before = decoder.source.requests
+        assert decoder.file.source.bytes == READ_AHEAD + sum(stop - start for start, stop in wanted)
+        before = decoder.file.source.requests
         decoder.positions(frame + 1)
         decoder.positions(0, 0)
         decoder.positions(frame)
-        assert decoder.source.requests == before, "what has come is kept"
+        assert decoder.file.source.requests == before, "what has come is kept"
 
 
 def test_the_whole_motion_takes_three_requests_at_most(server, local):
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(), local.positions())
-        assert decoder.source.requests <= 3, "the front, and runs of chunks with maps of subtrees between them"
+        assert decoder.file.source.requests <= 3, "the front, and runs of chunks with maps of subtrees between them"
     with athcodec.open(server.url) as decoder:
         for (_, block), (_, expected) in zip(decoder.blocks(), local.blocks(), strict=True):
             assert np.array_equal(block, expected)
-        assert decoder.source.requests <= 3
+        assert decoder.file.source.requests <= 3
 
 
 def test_a_coarse_level_fetches_no_finer_ones(server, local):
     with athcodec.open(server.url) as decoder:
-        assert np.array_equal(decoder.positions(depth=1), local.positions(depth=1))
-        assert decoder.source.bytes <= max(READ_AHEAD, local.depths[1].bytes)
+        assert np.array_equal(decoder.positions(level=1), local.positions(level=1))
+        assert decoder.file.source.bytes <= max(READ_AHEAD, local.levels[1].bytes)
 
 
 def test_checking_fetches_every_byte_once(server):
     with athcodec.open(server.url, strict=True) as decoder:
-        decoder.check()
-        assert decoder.source.requests == 2 and decoder.source.bytes == len(server.data)
+        decoder.file.check()
+        assert decoder.file.source.requests == 2 and decoder.file.source.bytes == len(server.data)
 
 
 def test_what_is_too_much_to_keep_is_fetched_piece_by_piece_and_right(server, local, monkeypatch):
     monkeypatch.setattr(remote, "KEPT_BYTES", READ_AHEAD)
     with athcodec.open(server.url) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), local.positions())
-        kept = sum(map(len, decoder.source._kept.values()))
+        kept = sum(map(len, decoder.file.source._kept.values()))
     assert kept <= 2 * READ_AHEAD
 
 
 def test_a_short_file_is_one_request_in_all(server, full_ath, full_clip):
     server.data = full_ath.read_bytes()
     with athcodec.open(server.url) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert decoder.metadata == full_clip.metadata and list(decoder.attributes) == list(full_clip.attributes)
-        assert decoder.source.requests == 1 and decoder.source.bytes == len(server.data)
+        assert decoder.file.source.requests == 1 and decoder.file.source.bytes == len(server.data)
 
 
 def test_a_prefix_on_a_server_plays_the_levels_that_are_there(server, local):
-    server.data = server.data[: local.depths[1].bytes + 10]
+    server.data = server.data[: local.levels[1].bytes + 10]
     with athcodec.open(server.url) as decoder:
-        assert decoder.deepest == 1 and not decoder.complete
-        assert np.array_equal(decoder.positions(), local.positions(depth=1))
+        assert decoder.deepest == 1 and not decoder.file.complete
+        assert np.array_equal(decoder.positions(), local.positions(level=1))
         with pytest.raises(LevelUnavailable, match="cut off"):
-            decoder.positions(depth=2)
+            decoder.positions(level=2)
 
 
 def test_redirects_are_followed_and_counted(server, local):
@@ -278,7 +278,7 @@ def test_redirects_are_followed_and_counted(server, local):
     server.fault = redirect
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(), local.positions())
-        assert decoder.source.requests == len(server.ranges)
+        assert decoder.file.source.requests == len(server.ranges)
 
 
 def test_several_threads_play_from_one_server(server, local):
@@ -348,8 +348,8 @@ def test_a_server_without_ranges_sends_the_file_once(server, local):
     server.fault = ignore_ranges
     with athcodec.open(server.url) as decoder:
         assert np.array_equal(decoder.positions(), local.positions())
-        decoder.check()
-        assert decoder.source.requests == 1 and decoder.source.bytes == len(server.data)
+        decoder.file.check()
+        assert decoder.file.source.requests == 1 and decoder.file.source.bytes == len(server.data)
 
 
 def test_a_large_file_on_a_server_without_ranges_is_refused(server, monkeypatch):
@@ -487,25 +487,25 @@ def other_url(request, large_ath):
 
 def test_other_systems_of_fsspec_work(other_url, local):
     with athcodec.open(other_url) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), local.positions())
-        assert decoder.source.requests == 3, "one of them for the length"
+        assert decoder.file.source.requests == 3, "one of them for the length"
 
 
 def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local, tmp_path, capsys):
     """As few requests as over HTTP, and one for the length."""
-    size, out = local.file_length, tmp_path / "a.h5"
+    size, out = local.file.file_length, tmp_path / "a.h5"
     assert cli.main(["info", other_url, "--json", "--stats"]) == 0
     printed, err = capsys.readouterr()
     assert json.loads(printed)["vertices"] == local.vertex_count
     assert err == f"athcodec: stats: 2 requests, {READ_AHEAD:,} bytes fetched of {size:,}\n"
     assert cli.main(["verify", other_url, "--stats"]) == 0
     assert f"3 requests, {size:,} bytes" in capsys.readouterr().err
-    assert cli.main(["decode", other_url, str(out), "--depth", "1", "--frames", "200:210", "--stats"]) == 0
+    assert cli.main(["decode", other_url, str(out), "--level", "1", "--frames", "200:210", "--stats"]) == 0
     requests, fetched = re.search(r"stats: (\d) requests, ([\d,]+) bytes", capsys.readouterr().err).groups()
-    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.depths[1].bytes)
+    assert int(requests) <= 4 and int(fetched.replace(",", "")) <= max(READ_AHEAD, local.levels[1].bytes)
     with athcodec.read_hdf5(out) as clip:
-        assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), depth=1))
+        assert np.array_equal(clip.block(0, 10), local.positions(slice(200, 210), level=1))
 
 
 def test_requests_to_an_object_store_are_those_that_it_answers(s3, large_ath, local):
@@ -513,7 +513,7 @@ def test_requests_to_an_object_store_are_those_that_it_answers(s3, large_ath, lo
     before = len(s3.answers())
     with athcodec.open(url) as decoder:
         assert np.array_equal(decoder.positions(local.frame_count - 1), local.positions(local.frame_count - 1))
-        counted = decoder.source.requests
+        counted = decoder.file.source.requests
     asked = s3.answers()[before:]
     assert len(asked) == counted > 3
     assert asked[0] == "HEAD /plants/tree.ath 200" and set(asked[1:]) == {"GET /plants/tree.ath 206"}

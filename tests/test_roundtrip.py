@@ -52,7 +52,7 @@ def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **option
     bound = bound_for(clip, fraction)
     summary = athcodec.encode(clip, folder / "trip.ath", max_error=bound, **{"effort": "fast"} | options)
     with athcodec.open(summary.path, strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         decoded = decoder.positions()
         assert decoded.dtype == clip.dtype and decoded.shape == clip.positions.shape
         assert largest_error(decoded, clip) <= bound == decoder.max_error_bound
@@ -161,12 +161,12 @@ def test_the_bound_does_not_depend_on_what_tam_accepts(tam, scratch):
 
 def test_one_accepted_plant_is_one_node_and_two_levels(scratch):
     decoder = reopened(plant(seed=4, branches=15, frames=20), scratch, tam=Thresholds(1e9, 0, 1e9, 0))
-    assert decoder.table1()["nodes"] == 1 and decoder.level_count == 2
+    assert decoder.file.table1()["nodes"] == 1 and decoder.level_count == 2
 
 
 def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
     decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0))
-    assert decoder.table1()["depth"] == 30 and decoder.full_level_count == 31
+    assert decoder.file.table1()["depth"] == 30 and decoder.full_level_count == 31
 
 
 def test_float64_output_of_a_float32_file_is_within_the_bound_too(bushy_ath, bushy_clip):
@@ -296,7 +296,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
     for edges in (derived, derived[::-1].copy()):
         decoder = reopened(with_static(source, edges=edges), scratch)
         assert same_array(decoder.edges, edges)
-        sizes.append(decoder.container.find(ct.EDGES).length)
+        sizes.append(decoder.file.find(ct.EDGES).length)
     assert sizes[0] < 30 < sizes[1], "edges that follow from the hierarchy cost next to nothing"
 
 
@@ -324,7 +324,7 @@ def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch
     bare, full = (reopened(full_clip, scratch, attributes=which) for which in ("none", "all"))
     assert bare.faces is None and bare.edges is None and bare.attributes == {}
     assert bare.metadata == {"unit": "m", "up_axis": "y"} and full.metadata == full_clip.metadata
-    assert np.array_equal(bare.positions(), full.positions()) and bare.file_length < full.file_length
+    assert np.array_equal(bare.positions(), full.positions()) and bare.file.file_length < full.file.file_length
 
 
 @pytest.mark.parametrize("more", [

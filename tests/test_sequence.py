@@ -8,13 +8,13 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
+from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 import athcodec
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from athcodec.sources.mesh import parse_mesh
-from moving_meshes import assert_same_mesh, assert_same_motion, coded, mixed_clip, quad_clip, survives_damage
 
 TRIANGLE = "v 0 0 {}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -178,7 +178,7 @@ def test_other_libraries_read_what_is_written(tmp_path, suffix):
 def test_end_to_end_the_bound_holds(tmp_path, suffix):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
-        athcodec.write(Excerpt(decoder), tmp_path / f"out{suffix}")
+        athcodec.write(ClipView(decoder), tmp_path / f"out{suffix}")
         bound = decoder.max_error_bound
     with athcodec.read(tmp_path / f"out_0001{suffix}") as again:
         off = np.linalg.norm(again.block(0, 20).astype(float) - clip.block(0, 20), axis=2)

@@ -18,10 +18,10 @@ class Whole:
     def __init__(self, path):
         self.path, self.data = path, path.read_bytes()
         with athcodec.open(path, strict=True) as decoder:
-            self.chunks, self.depths = decoder.container.chunks, decoder.depths
-            self.prelude = decoder.container.prelude_length
-            self.segments, self.header = decoder.segments, decoder.container.header
-            self.positions = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+            self.chunks, self.levels = decoder.file.chunks, decoder.levels
+            self.prelude = decoder.file.prelude_length
+            self.segments, self.header = decoder.segments, decoder.file.header
+            self.positions = [decoder.positions(level=level) for level in range(decoder.level_count)]
             self.bound, self.attributes = decoder.max_error_bound, decoder.attributes
 
     def cut(self, size: int, **options) -> athcodec.Decoder:
@@ -30,7 +30,7 @@ class Whole:
     def deepest_within(self, size: int) -> int:
         """By the chunks alone: the deepest level whose chunks, and those before it, end at `size` or earlier."""
         late = [chunk.level for chunk in self.chunks if chunk.is_motion and chunk.offset + chunk.length > size]
-        return min(late, default=len(self.depths)) - 1
+        return min(late, default=len(self.levels)) - 1
 
 
 @pytest.fixture(scope="module", params=["sample_ath", "bushy_ath", "full_ath"])
@@ -50,19 +50,19 @@ def full(full_ath):
 
 def assert_plays_as_far_as_it_goes(whole: Whole, size: int) -> None:
     decoder, deepest = whole.cut(size), whole.deepest_within(size)
-    assert not decoder.complete and decoder.missing and "\n" not in decoder.missing
-    assert [depth.available for depth in decoder.depths] == [d <= deepest for d in range(len(whole.depths))]
+    assert not decoder.file.complete and decoder.missing and "\n" not in decoder.missing
+    assert [level.available for level in decoder.levels] == [d <= deepest for d in range(len(whole.levels))]
     with pytest.raises(Truncated):
-        decoder.check()
+        decoder.file.check()
     if deepest < 0:
         with pytest.raises(Truncated, match="level 0"):
             decoder.positions()
     else:
         assert decoder.deepest == deepest
         assert np.array_equal(decoder.positions(), whole.positions[deepest])
-    if deepest + 1 < len(whole.depths):
+    if deepest + 1 < len(whole.levels):
         with pytest.raises(LevelUnavailable, match=f"level {deepest + 1}, segment"):
-            decoder.positions(depth=deepest + 1)
+            decoder.positions(level=deepest + 1)
 
 
 def test_every_chunk_boundary_is_a_place_to_stop(whole):
@@ -100,13 +100,13 @@ def test_every_prefix_fails_in_strict_opening(full):
     for size in range(len(full.data)):
         with pytest.raises(FormatError):
             full.cut(size, strict=True)
-    full.cut(len(full.data), strict=True).check()
+    full.cut(len(full.data), strict=True).file.check()
 
 
 def test_what_is_missing_is_named(bushy):
     first = next(c.offset for c in bushy.chunks if (c.is_motion, c.level, c.segment) == (True, 1, 2))
     decoder = bushy.cut(first + 1)
-    levels = len(bushy.depths)
+    levels = len(bushy.levels)
     assert decoder.missing.startswith("level 1: segments 2-3; level 2: segments 0-3")
     assert decoder.missing.count("level") == levels - 1
     last = bushy.chunks[-1]
@@ -116,7 +116,7 @@ def test_what_is_missing_is_named(bushy):
 def test_a_file_cut_in_its_attributes_plays_in_full_and_says_so(full):
     size = next(c.offset for c in full.chunks if c.kind & 0x7FFF == 32) + 3
     decoder = full.cut(size)
-    assert not decoder.complete and "attributes" in decoder.missing
+    assert not decoder.file.complete and "attributes" in decoder.missing
     assert np.array_equal(decoder.positions(), full.positions[-1]) and decoder.attributes == {}
 
 
@@ -132,44 +132,44 @@ def test_segments_that_arrived_play_deeper_than_those_that_did_not(bushy):
 
 
 def test_a_prefix_cut_after_a_level_plays_that_level_bit_for_bit(whole):
-    for level in whole.depths:
+    for level in whole.levels:
         decoder = whole.cut(level.bytes)
-        assert decoder.deepest == level.depth
-        assert np.array_equal(decoder.positions(), whole.positions[level.depth])
+        assert decoder.deepest == level.level
+        assert np.array_equal(decoder.positions(), whole.positions[level.level])
         with pytest.raises(LevelUnavailable):
-            whole.cut(level.bytes - 1).positions(depth=level.depth)
+            whole.cut(level.bytes - 1).positions(level=level.level)
 
 
 # ---- truncate ----
 
 
 def test_truncated_files_are_whole_and_play_the_same_levels(whole, tmp_path):
-    for level in whole.depths:
-        target = tmp_path / f"{level.depth}.ath"
-        size = truncate(whole.path, target, level.depth)
+    for level in whole.levels:
+        target = tmp_path / f"{level.level}.ath"
+        size = truncate(whole.path, target, level.level)
         assert size == target.stat().st_size
         with athcodec.open(target, strict=True) as decoder:
-            decoder.check()
-            assert decoder.complete and decoder.missing == ""
-            assert decoder.level_count == level.depth + 1 and decoder.full_level_count == len(whole.depths)
-            for depth in range(level.depth + 1):
-                assert np.array_equal(decoder.positions(depth=depth), whole.positions[depth])
-            with pytest.raises(LevelUnavailable, match=f"expected 0 to {level.depth}"):
-                decoder.positions(depth=level.depth + 1)
+            decoder.file.check()
+            assert decoder.file.complete and decoder.missing == ""
+            assert decoder.level_count == level.level + 1 and decoder.full_level_count == len(whole.levels)
+            for coarser in range(level.level + 1):
+                assert np.array_equal(decoder.positions(level=coarser), whole.positions[coarser])
+            with pytest.raises(LevelUnavailable, match=f"expected 0 to {level.level}"):
+                decoder.positions(level=level.level + 1)
 
 
 def test_a_truncated_file_promises_the_error_of_its_last_level(whole, tmp_path):
-    for level in whole.depths:
-        truncate(whole.path, tmp_path / "cut.ath", level.depth)
+    for level in whole.levels:
+        truncate(whole.path, tmp_path / "cut.ath", level.level)
         with athcodec.open(tmp_path / "cut.ath") as decoder:
-            expected = whole.bound if level.depth == len(whole.depths) - 1 else level.max_error
+            expected = whole.bound if level.level == len(whole.levels) - 1 else level.max_error
             assert decoder.max_error_bound == expected
-            assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.depths] == [
-                (d.max_error, d.rms_error, d.nodes) for d in whole.depths[: level.depth + 1]]
+            assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.levels] == [
+                (d.max_error, d.rms_error, d.nodes) for d in whole.levels[: level.level + 1]]
 
 
 def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, tmp_path):
-    sizes = [truncate(full.path, tmp_path / "cut.ath", level.depth) for level in full.depths]
+    sizes = [truncate(full.path, tmp_path / "cut.ath", level.level) for level in full.levels]
     assert sizes == sorted(set(sizes)) and sizes[-1] == len(full.data)
     truncate(full.path, tmp_path / "cut.ath", 0)
     with athcodec.open(tmp_path / "cut.ath") as decoder:
@@ -197,15 +197,15 @@ def test_a_file_can_be_truncated_onto_itself(bushy, tmp_path):
 
 
 def test_keeping_every_level_keeps_every_byte(whole, tmp_path):
-    truncate(whole.path, tmp_path / "same.ath", len(whole.depths) - 1)
+    truncate(whole.path, tmp_path / "same.ath", len(whole.levels) - 1)
     assert (tmp_path / "same.ath").read_bytes() == whole.data
 
 
 def test_a_prefix_can_be_truncated_to_what_it_holds(bushy, tmp_path):
-    (tmp_path / "prefix.ath").write_bytes(bushy.data[: bushy.depths[2].bytes + 5])
+    (tmp_path / "prefix.ath").write_bytes(bushy.data[: bushy.levels[2].bytes + 5])
     truncate(tmp_path / "prefix.ath", tmp_path / "two.ath", 2)
     with athcodec.open(tmp_path / "two.ath", strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), bushy.positions[2])
 
 
@@ -221,8 +221,8 @@ def flip(place: int):
     return change
 
 
-@pytest.mark.parametrize("make, depth, error", [
-    (lambda w: w.data[: w.depths[1].bytes - 1], 1, Truncated),
+@pytest.mark.parametrize("make, level, error", [
+    (lambda w: w.data[: w.levels[1].bytes - 1], 1, Truncated),
     (lambda w: w.data[: w.prelude - 1], 0, Truncated),
     (lambda w: damaged(w, flip(w.prelude + 3)), 1, BadChecksum),
     (lambda w: damaged(w, flip(w.prelude - 3)), 0, BadChecksum),
@@ -232,12 +232,12 @@ def flip(place: int):
     (lambda w: w.data, -1, LevelUnavailable),
 ], ids=["level cut off", "prelude cut off", "level damaged", "prelude damaged", "table damaged", "something else",
         "level beyond", "level before"])
-def test_truncating_what_cannot_be_truncated_raises_and_leaves_nothing(make, depth, error, bushy, tmp_path):
+def test_truncating_what_cannot_be_truncated_raises_and_leaves_nothing(make, level, error, bushy, tmp_path):
     source, folder = tmp_path / "source.ath", tmp_path / "out"
     source.write_bytes(make(bushy))
     folder.mkdir()
     with pytest.raises(error):
-        truncate(source, folder / "target.ath", depth)
+        truncate(source, folder / "target.ath", level)
     assert not list(folder.iterdir())
 
 
@@ -255,5 +255,5 @@ def test_damage_in_a_level_that_is_left_out_does_no_harm(bushy, tmp_path):
     source.write_bytes(damaged(bushy, flip(len(bushy.data) - 5)))
     truncate(source, tmp_path / "cut.ath", 2)
     with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         assert np.array_equal(decoder.positions(), bushy.positions[2])

@@ -399,7 +399,7 @@ def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
                                        branch_parent=np.array([-1]), rest=clip.rest.astype(clip.rest_dtype))
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
-            athcodec.write(athcodec.Excerpt(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
+            athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
             bound = decoder.max_error_bound
         with athcodec.read(tmp_path / "b.usdc") as again:
             error = np.linalg.norm(again.block(0, 7).astype(float) - clip.block(2, 9), axis=2).max()

@@ -1,5 +1,5 @@
 """Vertex animation textures: a shader that follows vat.md, or OpenVAT's layout, shows the level within the error that
-the JSON states; written at any depth and range of frames, and never half."""
+the JSON states; written at any level and range of frames, and never half."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import OpenEXR
 import png
 import pygltflib
 import pytest
+from plants import plant
+from test_gltf import accessor_of, far, leafy, leafy_ath  # noqa: F401, the fixtures too
 
 import athcodec
 from athcodec.clip import MotionClip
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from athcodec.exporters import openvat, vat, write
 from athcodec.sources import read
-from plants import plant
-from test_gltf import accessor_of, far, leafy, leafy_ath  # noqa: F401, the fixtures too
 
 
 def exr(path):
@@ -82,17 +82,17 @@ def shown_by_positions(folder, pixels):
 @pytest.mark.parametrize("half", [True, False])
 def test_a_shader_shows_every_level_within_the_stated_error(leafy_ath, tmp_path, half):  # noqa: F811
     with athcodec.open(leafy_ath) as decoder:
-        for depth in range(decoder.level_count):
-            excerpt = Excerpt(decoder, depth, range(3, 30))
-            folder = tmp_path / f"{depth}.vat"
-            write(excerpt, folder, half=half)
+        for level in range(decoder.level_count):
+            view = ClipView(decoder, level, range(3, 30))
+            folder = tmp_path / f"{level}.vat"
+            write(view, folder, half=half)
             frames, facts, _ = shown_by_matrices(folder)
-            wanted, size = excerpt.block(0, 27), float(np.linalg.norm(np.ptp(excerpt.rest, axis=0)))
+            wanted, size = view.block(0, 27), float(np.linalg.norm(np.ptp(view.rest, axis=0)))
             assert far(frames, wanted) == pytest.approx(facts["max_error"], rel=0.01, abs=1e-6 * size)
-            rounding = 2e-3 * np.abs(wanted - excerpt.rest).max() if half else 1e-6 * size
-            assert facts["max_error"] <= max(excerpt.max_error, 1e-5 * size) + rounding
-            assert (facts["depth"], facts["frames"], facts["start_frame"]) == (depth, 27, 3)
-            assert facts["level_max_error"] == excerpt.max_error
+            rounding = 2e-3 * np.abs(wanted - view.rest).max() if half else 1e-6 * size
+            assert facts["max_error"] <= max(view.max_error, 1e-5 * size) + rounding
+            assert (facts["level"], facts["frames"], facts["start_frame"]) == (level, 27, 3)
+            assert facts["level_max_error"] == view.max_error
             assert np.allclose(facts["bounds"]["min"], frames.min(axis=(0, 1)), atol=1e-5 * size)
 
 

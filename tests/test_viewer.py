@@ -333,7 +333,7 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
     data = windy_ath.read_bytes()
     with Line({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
         clips = {clip.name: clip for clip in decoder.clips}
-        common = {chunk.offset for chunk in decoder.container.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
+        common = {chunk.offset for chunk in decoder.file.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
 
         def outside(*names: str) -> int:
             """Bytes sent behind the first request that belong to none of these clips."""
@@ -341,7 +341,7 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
             asked = np.zeros(len(data), bool)
             for _, first, size in line.log[1:]:
                 asked[first: first + size] = True
-            for chunk in decoder.container.chunks:
+            for chunk in decoder.file.chunks:
                 if chunk.offset in common or chunk.segment in played:
                     asked[chunk.offset: chunk.offset + chunk.length] = False
             return int(asked.sum())
@@ -522,7 +522,7 @@ def test_a_server_without_ranges_sends_a_download_that_plays_while_it_grows(open
 def cut_after(path: Path, level: int) -> bytes:
     """The file up to the end of a level."""
     with athcodec.open(path) as decoder:
-        return path.read_bytes()[: decoder.info()["depths"][level]["bytes"]]
+        return path.read_bytes()[: decoder.file.info()["levels"][level]["bytes"]]
 
 
 @browser_test
@@ -556,7 +556,7 @@ def test_a_file_that_cannot_be_shown_is_said_to_be(opened, sample_ath, damage, w
 def test_what_is_whole_of_a_damaged_file_plays(opened, sample_ath):
     parts = sample_ath.read_bytes()
     with athcodec.open(sample_ath) as decoder:
-        at = decoder.info()["depths"][1]["bytes"] + 50
+        at = decoder.file.info()["levels"][1]["bytes"] + 50
     damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1:]
     with Line({"tree.ath": damaged}) as line:
         page = opened(line.page("tree.ath"), "!document.getElementById('note').hidden")

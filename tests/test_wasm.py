@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plants import awkward, clip_of, grow, plant, random_hierarchy
 
 import athcodec
 from athcodec._library import load_library
-from plants import awkward, clip_of, grow, plant, random_hierarchy
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
@@ -100,9 +100,9 @@ class Native:
             getattr(self.lib, name).restype = c_double
         self.kept = [create_string_buffer(data, len(data))]
         front, size = c_size_t(), c_size_t()
-        assert self.lib.ath_front(self.kept[0], c_size_t(len(data)), None, byref(front), byref(size)) == OK
+        assert self.lib.ath_front(self.kept[0], c_size_t(len(data)), None, byref(front), byref(size), None) == OK
         self.file = self.block(size.value)
-        assert self.lib.ath_open(self.file, size, self.kept[0], c_size_t(len(data)), None) == OK
+        assert self.lib.ath_open(self.file, size, self.kept[0], c_size_t(len(data)), None, None) == OK
         size = c_size_t(self.lib.ath_build_size(self.file))
         assert self.lib.ath_build(self.file, self.block(size.value), size) == OK
         self.info = Info()

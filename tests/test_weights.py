@@ -6,11 +6,11 @@ import json
 
 import numpy as np
 import pytest
+from plants import plant
 
 import athcodec
 from athcodec.cli import main
 from athcodec.errors import BoundError, ClipError
-from plants import plant
 
 
 def largest_errors(clip, decoder) -> np.ndarray:
@@ -57,16 +57,16 @@ def test_weights_may_be_an_array_and_are_kept(twiggy, tmp_path):
 
 def test_verify_checks_vertex_by_vertex(twiggy, tmp_path, capsys):
     source, coded = str(tmp_path / "a.h5"), str(tmp_path / "a.ath")
-    athcodec.write_hdf5(source, twiggy)
+    athcodec.write_hdf5(twiggy, source)
     assert main(["encode", source, coded, "--max-error", "0.02", "--weights", "slack"]) == 0
     assert main(["verify", coded, "--against", source]) == 0
     capsys.readouterr()
     moved = np.array(twiggy.positions)
     moved[5, 0, 0] += 0.03  # within what the file promises for all, beyond what it promises for vertex 0
     twiggy.positions = moved
-    athcodec.write_hdf5(source, twiggy)
+    athcodec.write_hdf5(twiggy, source)
     assert main(["verify", coded, "--against", source, "--json"]) == 1
-    assert not json.loads(capsys.readouterr().out)["clips"][0]["depths"][-1]["kept"]
+    assert not json.loads(capsys.readouterr().out)["clips"][0]["levels"][-1]["kept"]
 
 
 @pytest.mark.parametrize("weights, message", [

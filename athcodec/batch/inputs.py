@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from athcodec.atomic_files import is_url
 from athcodec.batch.settings import Settings, check_settings, settings_of
 from athcodec.errors import ClipError, MissingExtra, RemoteError
-from athcodec.files import is_url
 from athcodec.remote import _one_line, without_secrets
 from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
@@ -39,7 +39,7 @@ class Item:
     settings: Settings
 
     @property
-    def mark(self) -> str:
+    def fingerprint(self) -> str:
         """Short, and of plain characters whatever the names have."""
         return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 

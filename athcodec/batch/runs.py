@@ -23,13 +23,13 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
+from athcodec.atomic_files import is_url, remove_leftovers_of, scratch_folder
 from athcodec.batch import tasks
 from athcodec.batch.inputs import Item, identity, is_telling, remote_identity, sha256
 from athcodec.batch.manifest import Manifest, ManifestError, Record, read_records
 from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
-from athcodec.files import is_url, remove_leftovers_of, scratch_folder
 from athcodec.remote import without_secrets
 
 MANIFEST = "athcodec-batch.jsonl"
@@ -250,7 +250,7 @@ class _Run:
 
     def all(self, todo: Sequence[Todo]) -> None:
         """Until each clip is in the manifest."""
-        outputs = {each.item.mark: each.item.output for each in todo}
+        outputs = {each.item.fingerprint: each.item.output for each in todo}
 
         def show(event: tuple[float, dict[str, Any]]) -> None:
             self.show.stage(outputs[event[1]["clip"]], event[1]["stage"], event[1]["fraction"])
@@ -269,7 +269,7 @@ class _Run:
 
     def _folder(self, item: Item) -> str:
         """Of one clip in the scratch folder."""
-        return os.path.join(self.folder, item.mark)
+        return os.path.join(self.folder, item.fingerprint)
 
     def _submit(self, item: Item, what: str, function: Any, *arguments: Any, **options: Any) -> Any:
         """Of clips that were begun the rest comes first."""

@@ -23,9 +23,9 @@ from typing import Any
 
 from athcodec import discovery
 from athcodec.ath import Thresholds
+from athcodec.atomic_files import is_url
 from athcodec.encoding.search import EFFORTS
 from athcodec.errors import ClipError
-from athcodec.files import is_url
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.sources import FORMATS, format_named
 from athcodec.units import parse_length, parse_size

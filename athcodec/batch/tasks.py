@@ -19,12 +19,12 @@ from typing import Any
 import athcodec
 from athcodec import container as ct
 from athcodec import discovery, encoding
+from athcodec.atomic_files import is_url
 from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, upload
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoding import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
-from athcodec.files import is_url
 from athcodec.segmentation import DEFAULT_SEGMENT, split_segments
 
 BETWEEN_REPORTS = 0.3  # seconds
@@ -99,13 +99,13 @@ def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, repo
 def _done(item: Item, source: dict[str, Any], summary: encoding.Summary, verify: bool, start: float) -> Result:
     if verify:
         with athcodec.open(summary.path, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
     stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
-    last = summary.depths[-1]
+    last = summary.levels[-1]
     return {"done": stored | {
         "source": source, "bytes": summary.bytes, "raw_bytes": summary.raw_bytes,
         "max_error_bound": summary.max_error_bound, "relative_bound": summary.relative_bound,
-        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.depths),
+        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.levels),
         "sha256": sha256(summary.path), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
 
 
@@ -214,6 +214,6 @@ def _reporter(item: Item, topic: str | None) -> Report:
         nonlocal last
         if time.monotonic() - last >= BETWEEN_REPORTS:
             last = time.monotonic()
-            worker.log_event(topic, {"clip": item.mark, "stage": stage, "fraction": fraction})
+            worker.log_event(topic, {"clip": item.fingerprint, "stage": stage, "fraction": fraction})
 
     return report

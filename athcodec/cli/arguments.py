@@ -58,7 +58,7 @@ def make_parser() -> argparse.ArgumentParser:
         "verify", verbs.verify, "check that an .ath file is whole and undamaged, and how far off its source it is",
         "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
     ))
-    _truncate_arguments(verb("truncate", verbs.truncate, "leave out the levels beyond a depth, without decoding"))
+    _truncate_arguments(verb("truncate", verbs.truncate, "leave out the levels beyond one, without decoding"))
     _hierarchy_arguments(verb(
         "hierarchy", verbs.hierarchy, "find the branches of a source that names none",
         "Encoding does so by itself; here the result is shown, and saved to be edited.",
@@ -70,7 +70,7 @@ def make_parser() -> argparse.ArgumentParser:
         "Serves the viewer on this computer only, until it is interrupted.",
     ))
     _demo_arguments(verb(
-        "demo", verbs.demo, "encode the included sample, decode and measure every depth",
+        "demo", verbs.demo, "encode the included sample, decode and measure every level",
         f"Ends with a page that shows it, {verbs.DEMO_PAGE}, in DIR or in the current folder.",
     ))
     return parser
@@ -211,7 +211,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
                       "has several, as animations of their names")
     _stats_argument(verb)
     verb.add_argument(
-        "--depth", metavar="LEVEL", type=_argument(_whole),
+        "--level", "--depth", metavar="LEVEL", type=_argument(_whole),
         help="level of detail, from 0, the whole plant as one piece (default: the deepest complete one)",
     )
     verb.add_argument(
@@ -253,7 +253,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
     verb.add_argument("--against", metavar="SOURCE", action="append",
-                      help="the source: measure the error of every depth; of several clips all, in the file's order")
+                      help="the source: measure the error of every level; of several clips all, in the file's order")
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -263,7 +263,7 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath")
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
     verb.add_argument(
-        "--depth", metavar="LEVEL", type=_argument(_whole), required=True, help="the last level to keep"
+        "--level", "--depth", metavar="LEVEL", type=_argument(_whole), required=True, help="the last level to keep"
     )
 
 
@@ -278,7 +278,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _demo_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded depth there")
+    verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded level there")
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:

@@ -13,12 +13,13 @@ from typing import Any
 import athcodec
 from athcodec import discovery
 from athcodec.ath import Thresholds
+from athcodec.ath_file import Level
+from athcodec.atomic_files import check_target
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
-from athcodec.decoder import Decoder, Depth
+from athcodec.clip_view import ClipView
+from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
-from athcodec.excerpt import Excerpt
-from athcodec.files import check_target
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.units import Length
@@ -67,14 +68,14 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
                       "--takes all makes a clip of each")
 
 
-def excerpt_of(decoder: Decoder, args: argparse.Namespace) -> Excerpt:
+def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """What of a file is decoded: frames of a clip, or all clips."""
     if args.clip is not None or len(decoder.clips) == 1:
-        return Excerpt(decoder, args.depth, _frames(args.frames, decoder.frame_count))
+        return ClipView(decoder, args.level, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
         names = ", ".join(clip.name for clip in decoder.clips)
         raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
-    return Excerpt(decoder, args.depth, all_clips=True)
+    return ClipView(decoder, args.level, all_clips=True)
 
 
 def with_sources(decoder: Decoder, args: argparse.Namespace,
@@ -161,23 +162,23 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
         weights = decoder.error_weights
-        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.depths]
+        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.levels]
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
-            for depth, meter in enumerate(meters):
-                meter.add(reference, decoder.positions(slice(start, stop), depth))
+            for number, meter in enumerate(meters):
+                meter.add(reference, decoder.positions(slice(start, stop), number))
             if report:
                 report("measure", stop / clip.frame_count)
-    levels = [_measured(level, meter) for level, meter in zip(decoder.depths, meters, strict=True)]
+    levels = [_measured(level, meter) for level, meter in zip(decoder.levels, meters, strict=True)]
     if weights is not None:
         promised = decoder.max_error_bound / float(weights.max())
         levels[-1]["kept"] &= meters[-1].max_weighted_error <= promised * (1 + ROUNDING)
     return levels
 
 
-def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
+def _measured(level: Level, meter: ErrorMeter) -> dict[str, Any]:
     return {
-        "depth": level.depth,
+        "level": level.level,
         "promised_max_error": level.max_error,
         "max_error": meter.max_error,
         "rms_error": meter.rms_error,
@@ -188,20 +189,20 @@ def _measured(level: Depth, meter: ErrorMeter) -> dict[str, Any]:
 
 
 def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:
-    levels = measured["depths"]
+    levels = measured["levels"]
     broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
     if levels[-1]["max_error"] > result["max_error_bound"]:
         broken.append((levels[-1], result["max_error_bound"]))
     for level, promised in broken[:1]:
         raise AthError(
-            f"{result['file']}: level {level['depth']}: got max error {level['max_error']:.6g} against "
+            f"{result['file']}: level {level['level']}: got max error {level['max_error']:.6g} against "
             f"{measured['against']}, expected at most {promised:.6g}"
         )
 
 
-def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, depth: int) -> ErrorMeter:
-    decoded = encoded.with_name(f"{encoded.stem}_level_{depth}.h5")
-    athcodec.write(Excerpt(decoder, depth), decoded)
+def decode_and_measure(decoder: Decoder, clip: MotionClip, encoded: Path, level: int) -> ErrorMeter:
+    decoded = encoded.with_name(f"{encoded.stem}_level_{level}.h5")
+    athcodec.write(ClipView(decoder, level), decoded)
     with athcodec.read_hdf5(decoded) as again:
         return compare_clips(clip, again)
 
@@ -215,14 +216,14 @@ def check_output(path: str, source: str) -> None:
 
 def _stats(decoder: Decoder) -> str:
     """What was read of a file, and what that asked of a server."""
-    requests = getattr(decoder.source, "requests", None)
+    requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
-        return f"{decoder.bytes_read:,} bytes read of {decoder.file_length:,}"
-    return f"{counted(requests, 'request')}, {decoder.source.bytes:,} bytes fetched of {decoder.file_length:,}"
+        return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"
+    return f"{counted(requests, 'request')}, {decoder.file.source.bytes:,} bytes fetched of {decoder.file.file_length:,}"
 
 
 def what_is_missing(decoder: Decoder) -> str:
-    if decoder.complete:
+    if decoder.file.complete:
         return decoder.missing
-    got, expected = decoder.info()["available_bytes"], decoder.file_length
+    got, expected = decoder.file.info()["available_bytes"], decoder.file.file_length
     return f"cut off at {got:,} of {expected:,} bytes; missing {decoder.missing}"

@@ -32,7 +32,7 @@ from athcodec.metrics import ErrorMeter
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""
 
-LEVEL_COLUMNS = ["depth", "nodes", "bytes", "share"]
+LEVEL_COLUMNS = ["level", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
@@ -48,13 +48,13 @@ def print_file(path: str, decoder: Decoder, as_json: bool) -> None:
 
 
 def facts_of(path: str | Path, decoder: Decoder) -> dict[str, Any]:
-    """decoder.info(), and per level what it adds to the file cut before it."""
-    facts = {"file": os.fspath(path)} | decoder.info()
+    """decoder.file.info(), and per level what it adds to the file cut before it."""
+    facts = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
-    before = decoder.container.prelude_length
-    for level in facts["depths"]:
+    before = decoder.file.prelude_length
+    for level in facts["levels"]:
         level["added_bytes"] = level["bytes"] - before
         level["share"] = level["added_bytes"] / facts["bytes"]
         before = level["bytes"]
@@ -75,8 +75,8 @@ def _print_facts(facts: dict[str, Any]) -> None:
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
-    if facts["levels"] < facts["full_levels"]:
-        print(f"Holds levels 0 to {facts['levels'] - 1} of 0 to {facts['full_levels'] - 1}.")
+    if len(facts["levels"]) < facts["full_level_count"]:
+        print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
         print(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
     if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or facts["clips"][0]["loop"]:
@@ -87,9 +87,9 @@ def _print_facts(facts: dict[str, Any]) -> None:
 def _print_clips(facts: dict[str, Any]) -> None:
     """Errors at the seam are those of the deepest stored level."""
     rows = [[clip["name"], f"{clip['frames']:,}", f"{clip['seconds']:.4g}", f"{clip['segments']:,}",
-             f"{clip['seam_errors'][facts['levels'] - 1]:.3g}" if clip["loop"] else "",
+             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
              *(f"{error:.3g}" for error in clip["max_errors"])] for clip in facts["clips"]]
-    levels = [f"max at {level}" for level in range(facts["levels"])]
+    levels = [f"max at {level}" for level in range(len(facts["levels"]))]
     print_table(["clip", "frames", "seconds", "segments", _head("loop's seam", facts["unit"]), *levels], rows)
 
 
@@ -97,21 +97,21 @@ def _print_levels(facts: dict[str, Any]) -> None:
     columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
     cells = [
         [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"]
-        for level in facts["depths"]
+        for level in facts["levels"]
     ]
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
 
 
 def _level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
     """One row per level, ending in its `cells`, between what the file holds before and behind them."""
-    levels, total = facts["depths"], facts["bytes"]
+    levels, total = facts["levels"], facts["bytes"]
 
     def row(name: str, nodes: str, size: int) -> list[str]:
         return [name, nodes, f"{size:,}", f"{size / total:.1%}"]
 
     rows = [row("prelude", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
     for level, more in zip(levels, cells, strict=True):
-        name = f"{level['depth']}" if level["available"] else f"{level['depth']} (incomplete)"
+        name = f"{level['level']}" if level["available"] else f"{level['level']} (incomplete)"
         rows.append(row(name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
     behind = total - levels[-1]["bytes"]
     return [*rows, row("arrays", "", behind)] if behind else rows
@@ -121,13 +121,13 @@ def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:
     seconds = facts["frames"] / facts["fps"]
     columns = [*(_head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
     cells = []
-    for level, meter in zip(facts["depths"], meters, strict=True):
+    for level, meter in zip(facts["levels"], meters, strict=True):
         errors = [f"{meter.max_error:.3g}", f"{meter.rms_error:.3g}"]
         relative = [f"{error / meter.diagonal:.1e}" for error in (meter.max_error, meter.rms_error)]
         cells.append([*errors, *relative, f"{level['bytes'] / seconds:,.0f}"])
     print(
         f"Encoded the sample {Path(facts['file']).stem} within {DEFAULT_REL_ERROR:g} of its diagonal, "
-        "decoded every depth and measured it against the source:"
+        "decoded every level and measured it against the source:"
     )
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
     print(_size(facts))
@@ -139,13 +139,13 @@ def print_verdict(result: dict[str, Any]) -> None:
             print(f"{clip['name']}, against {clip['against']}:")
         lengths = [_head(name, result["unit"]) for name in ("promised", "max", "RMS")]
         rows = []
-        for level in clip["depths"]:
+        for level in clip["levels"]:
             measures = [f"{level[name]:.4g}" for name in MEASURES]
-            rows.append([f"{level['depth']}", *measures, "yes" if level["kept"] else "NO"])
-        print_table(["depth", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
+            rows.append([f"{level['level']}", *measures, "yes" if level["kept"] else "NO"])
+        print_table(["level", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
     if result["ok"]:
         sources = ", ".join(clip["against"] for clip in result["clips"])
-        more = f"; every depth is as close to {sources} as the file says" if sources else ""
+        more = f"; every level is as close to {sources} as the file says" if sources else ""
         print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
 
 

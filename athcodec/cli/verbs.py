@@ -19,13 +19,13 @@ from athcodec.cli.clips import (
     check_output,
     clip_to_encode,
     decode_and_measure,
-    excerpt_of,
     measure_against,
     naming,
     open_file,
     read_clip,
     refuse_broken_promises,
     thresholds,
+    view_to_decode,
     what_is_missing,
     with_branches,
     with_sources,
@@ -152,13 +152,13 @@ def hierarchy(args: argparse.Namespace) -> int:
 def decode(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     with open_file(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
-        excerpt = excerpt_of(decoder, args)
+        motion = view_to_decode(decoder, args)
         with progress() as report:
-            athcodec.write(excerpt, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
+            athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
-            say("warning", f"{args.input}: decoded to level {excerpt.depth}; {what_is_missing(decoder)}")
-        print(f"{args.output}: {excerpt.frame_count:,} frames, {excerpt.vertex_count:,} vertices, "
-              f"level {excerpt.depth}")
+            say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
+        print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
+              f"level {motion.level}")
     return 0
 
 
@@ -172,11 +172,11 @@ def verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
         with open_file(args.file, args.stats, strict=True, clip=args.clip) as decoder, ExitStack() as opened:
-            decoder.check()
+            decoder.file.check()
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}
-                measured["depths"] = measure_against(played, source, clip)
+                measured["levels"] = measure_against(played, source, clip)
                 result["clips"].append(measured)
                 refuse_broken_promises(result, measured)
         result["ok"] = True
@@ -194,9 +194,9 @@ def verify(args: argparse.Namespace) -> int:
 def truncate(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     with naming(args.input):
-        athcodec.truncate(args.input, args.output, args.depth)
+        athcodec.truncate(args.input, args.output, args.level)
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
-    print(f"{args.output}: levels 0 to {args.depth}, {after:,} of {before:,} bytes")
+    print(f"{args.output}: levels 0 to {args.level}, {after:,} of {before:,} bytes")
     return 0
 
 

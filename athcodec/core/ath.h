@@ -76,6 +76,93 @@ typedef enum ath_result {
 /* The code's name in FORMAT.md, such as "BAD_CHUNK"; "UNKNOWN" for no code. */
 ATH_API const char *ath_result_name(int result);
 
+/* ---- constants of the format --------------------------------------------------------------------------------------- */
+
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 4 };
+
+/* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
+enum {
+    ATH_OPTIONAL = 0x8000,
+    ATH_HIERARCHY = 1,
+    ATH_REST = 2,
+    ATH_TIME = 3,
+    ATH_METADATA = ATH_OPTIONAL | 4,
+    ATH_FACES = ATH_OPTIONAL | 5,
+    ATH_EDGES = ATH_OPTIONAL | 6,
+    ATH_CLIPS = 7,
+    ATH_STEMS = 16,
+    ATH_AFFINES = 17,
+    ATH_CORRECTIONS = 18,
+    ATH_SHAPES = 19, /* of all segments, in segment 0 */
+    ATH_EXACT = 20,
+    ATH_ATTRIBUTE = ATH_OPTIONAL | 32
+};
+
+enum { ATH_NO_LEVEL = 255 }; /* level of a chunk that is of no level */
+
+/* The kind's name, such as "STEMS"; null for an unknown one. */
+ATH_API const char *ath_kind_name(int kind);
+
+/* Max_Memory_Bytes limits vertices * (ATH_BYTES_PER_FRAME * F + ATH_BYTES_PER_VERTEX), F: frames of the longest segment. */
+enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512 };
+
+/* ---- faults --------------------------------------------------------------------------------------------------------- */
+
+/* What a fault is about. The names in capitals are fields of FORMAT.md. */
+typedef enum ath_field {
+    ATH_FIELD_NONE,
+    ATH_FIELD_MAGIC,            /* the four bytes of which one is wrong, as a number whose high byte comes first */
+    ATH_FIELD_VERSION,          /* major << 16 | minor */
+    ATH_FIELD_FILE_SIZE,        /* bytes that are there: for a caller who knows that no more will come */
+    ATH_FIELD_HEADER_SIZE,      /* bytes that are there */
+    ATH_FIELD_TABLE_SIZE,       /* bytes that are there of chunk table and error table, or their size against the limit */
+    ATH_FIELD_PRELUDE_SIZE,     /* bytes that are there */
+    ATH_FIELD_VERTEX_COUNT,
+    ATH_FIELD_BRANCH_COUNT,
+    ATH_FIELD_FRAME_COUNT,
+    ATH_FIELD_SEGMENT_COUNT,
+    ATH_FIELD_CHUNK_COUNT,
+    ATH_FIELD_FULL_LEVEL_COUNT,
+    ATH_FIELD_LEVEL_COUNT,
+    ATH_FIELD_CLIP_COUNT,
+    ATH_FIELD_FLAGS,
+    ATH_FIELD_RESERVED,
+    ATH_FIELD_MAX_ERROR,
+    ATH_FIELD_FRONT_CHECKSUM,
+    ATH_FIELD_ERROR,            /* an entry of the error table, of this level and segment */
+    ATH_FIELD_FILE_LENGTH,      /* where the chunks end */
+    ATH_FIELD_MEMORY,           /* bytes that a segment may take */
+    ATH_FIELD_MISSING_CHUNK,    /* a chunk that the table lacks: kind, level and segment say which */
+    ATH_FIELD_CHUNK_KIND,       /* from here on: of the chunk */
+    ATH_FIELD_CHUNK_SIZE,       /* bytes that are there, or against the limit */
+    ATH_FIELD_CHUNK_RESERVED,
+    ATH_FIELD_CHUNK_LEVEL,
+    ATH_FIELD_CHUNK_SEGMENT,
+    ATH_FIELD_CHUNK_PLACE,      /* its index in the chunk table */
+    ATH_FIELD_UNEXPECTED_CHUNK,
+    ATH_FIELD_CHUNK_CHECKSUM,
+    ATH_FIELD_HIERARCHY_DEPTH,
+    ATH_FIELD_CONTENT
+} ath_field;
+
+/* Why a file was refused, or what is missing of it (ATH_MISSING). */
+typedef struct ath_fault_info {
+    int32_t code;               /* ath_result; ATH_OK: no fault, and the rest says nothing */
+    int32_t field;              /* ath_field */
+    int32_t chunk;              /* index in ath_chunks; -1: none */
+    uint16_t kind;              /* of that chunk, or of the one that is missing */
+    uint8_t level;
+    uint8_t reserved;
+    uint32_t segment;
+    uint64_t offset;            /* of the chunk in the file */
+    double found, least, most;  /* the value found, the values allowed: integers below 2^53 are exact */
+} ath_fault_info;
+
+/* Writes the fault as one line of English, "where: got this; expected that", with a zero behind it, into at most `capacity`
+ * bytes. Returns its length without the zero, also where it does not fit. ATH_FAULT_TEXT bytes hold any. */
+enum { ATH_FAULT_TEXT = 256 };
+ATH_API size_t ath_fault_text(const ath_fault_info *fault, char *text, size_t capacity);
+
 /* ---- opening ---------------------------------------------------------------------------------------------------- */
 
 typedef struct ath_file ath_file;       /* an opened file */
@@ -93,15 +180,17 @@ ATH_API void ath_default_limits(ath_limits *limits);
 
 /* Looks at the front of a file, of which `available` bytes are there.
  * ATH_MISSING: at least *front_bytes are needed to go on. ATH_OK: *front_bytes are the prelude, up to the first motion
- * chunk, and ath_open needs *memory_bytes. Else an error of the file. limits: null for the defaults. */
+ * chunk, and ath_open needs *memory_bytes. Where these are known before the prelude is there, they are given with
+ * ATH_MISSING, too (else they are 0): ath_open may follow once *front_bytes are there. Else an error of the file.
+ * limits: null for the defaults. fault: null, or what ATH_MISSING or the error is about. */
 ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, size_t *front_bytes,
-                      size_t *memory_bytes);
+                      size_t *memory_bytes, ath_fault_info *fault);
 
 /* Opens a file in `memory`, from at least its prelude; feeds it all of `bytes`. The ath_file is the memory: cast it.
  * Checks what FORMAT.md, "Opening", lists for a stream, in its order. Errors of the file; ATH_MISSING, ATH_NO_MEMORY.
- * On BAD_CHECKSUM and BAD_CHUNK, ath_fault tells the chunk. */
-ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
-                     const ath_limits *limits);
+ * limits, fault: as for ath_front. */
+ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+                     ath_fault_info *fault);
 
 /* Computes the bases that all segments share, in memory of their own, whose size depends on the plant. Once, before
  * anything is prepared. ATH_NO_MEMORY. */
@@ -179,11 +268,14 @@ ATH_API void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, s
 ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment,
                              double *max_error, double *rms_error);
 
+/* The same as stored: level_count x segment_count pairs of them. */
+ATH_API const float *ath_errors(const ath_file *file);
+
 /* First frame of a segment (for segment_count: frame_count), and the segment that a frame is in. */
 ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
 ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);
 
-/* The chunk table, in file order. Kinds and payloads: FORMAT.md. Static data (METADATA, FACES, EDGES, ATTRIBUTE) is
+/* The chunk table, in file order, unknown optional kinds included. Payloads: FORMAT.md. Static data (METADATA, FACES, EDGES, ATTRIBUTE) is
  * handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
 typedef struct ath_chunk {
     const uint8_t *bytes; /* null: not fed */
@@ -191,16 +283,13 @@ typedef struct ath_chunk {
     uint32_t length, checksum;
     uint32_t segment;
     uint16_t kind;
-    uint8_t level;        /* 255: not of a level */
+    uint8_t level;        /* ATH_NO_LEVEL: not of a level */
     uint8_t reserved;
 } ath_chunk;
 
 ATH_API const ath_chunk *ath_chunks(const ath_file *file);
-/* ATH_OK, ATH_MISSING or ATH_BAD_CHECKSUM. */
-ATH_API int ath_check_chunk(const ath_file *file, int32_t index);
-/* The chunk that the last error was about, or -1: of ath_open and ath_build, of a preparation. */
-ATH_API int32_t ath_fault(const ath_file *file);
-ATH_API int32_t ath_work_fault(const ath_work *work);
+/* ATH_OK, ATH_MISSING or ATH_BAD_CHECKSUM. fault: null, or what that is about. */
+ATH_API int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault);
 
 /* ---- bytes ------------------------------------------------------------------------------------------------------- */
 
@@ -251,6 +340,8 @@ ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *fil
  * ATH_MORE until it is done: ATH_OK, and the segment can be played. ATH_BAD_CHECKSUM, ATH_BAD_CHUNK: it cannot be, and
  * further steps are an ATH_BAD_ARGUMENT. */
 ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
+/* What the error of the preparation is about, and which bytes ATH_MISSING: of _start once it had its memory, of _step. */
+ATH_API void ath_work_fault(const ath_work *work, ath_fault_info *fault);
 /* How many steps that takes in all. */
 ATH_API int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level);
 /* Both at once. */

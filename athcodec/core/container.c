@@ -5,11 +5,12 @@ enum {
     HEADER_SIZE = 64,
     CHUNK_SIZE = 16,
     ERRORS_SIZE = 8,
-    CHECKSUM_AT = 12,
-    OPTIONAL = 0x8000,
-    MAJOR = 0,
-    MINOR = 4
+    CHECKSUM_AT = 12
 };
+
+static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
+
+static const double LARGEST = 1.7976931348623157e308;
 
 static uint32_t u16_at(const uint8_t *at) { return (uint32_t)at[0] | (uint32_t)at[1] << 8; }
 
@@ -33,6 +34,11 @@ static double f64_at(const uint8_t *at)
     return value;
 }
 
+static uint64_t error_count(const ath_header *header)
+{
+    return (uint64_t)header->level_count * header->segment_count;
+}
+
 int ath_is_finite(double value) { return value - value == 0.0; }
 
 static int is_step(double value) { return ath_is_finite(value) && value > 0.0; }
@@ -46,14 +52,27 @@ void ath_default_limits(ath_limits *limits)
 
 /* ---- header ---- */
 
-static int check_magic(const uint8_t *bytes, size_t available)
+static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
+{
+    uint32_t word = 0;
+    for (size_t i = at; i < at + 4; i++) word = word << 8 | (i < available ? bytes[i] : 0);
+    return word;
+}
+
+static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *fault)
 {
     static const uint8_t magic[8] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n'};
-    for (size_t i = 0; i < 8 && i < available; i++)
-        if (bytes[i] != magic[i]) return ATH_NOT_AN_ATH_FILE;
-    if (available >= CHECKSUM_AT && (u16_at(bytes + 8) != MAJOR || u16_at(bytes + 10) != MINOR))
-        return ATH_UNSUPPORTED_VERSION;
-    return ATH_OK;
+    for (size_t i = 0; i < 8 && i < available; i++) {
+        double expected = (double)word_at(magic, sizeof magic, i & ~(size_t)3);
+        if (bytes[i] != magic[i])
+            return ath_refuse(fault, ATH_NOT_AN_ATH_FILE, ATH_FIELD_MAGIC,
+                              (double)word_at(bytes, available, i & ~(size_t)3), expected, expected);
+    }
+    if (available < CHECKSUM_AT) return ATH_OK;
+    uint32_t version = u16_at(bytes + 8) << 16 | u16_at(bytes + 10), expected = ATH_FORMAT_MAJOR << 16 | ATH_FORMAT_MINOR;
+    if (version == expected) return ATH_OK;
+    return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, (double)version, (double)expected,
+                      (double)expected);
 }
 
 static void parse_header(const uint8_t *bytes, ath_header *header)
@@ -72,60 +91,95 @@ static void parse_header(const uint8_t *bytes, ath_header *header)
     header->max_error = f64_at(bytes + 48);
 }
 
-static int check_count(uint32_t count, uint32_t limit)
+static int check_counts(const ath_limits *limits, const ath_header *header, ath_fault_info *fault)
 {
-    return count == 0 ? ATH_BAD_HEADER : count > limit ? ATH_LIMIT_EXCEEDED : ATH_OK;
+    const struct {
+        ath_field field;
+        uint32_t count, limit;
+    } rules[] = {
+        {ATH_FIELD_VERTEX_COUNT, header->vertex_count, limits->vertices},
+        {ATH_FIELD_BRANCH_COUNT, header->branch_count, limits->branches},
+        {ATH_FIELD_FRAME_COUNT, header->frame_count, limits->frames},
+        {ATH_FIELD_SEGMENT_COUNT, header->segment_count, limits->frames},
+        {ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks},
+    };
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
+        uint32_t count = rules[i].count, most = rules[i].limit < MOST_COUNT ? rules[i].limit : MOST_COUNT;
+        int result = count < 1 ? ATH_BAD_HEADER : count > most ? ATH_LIMIT_EXCEEDED : ATH_OK;
+        if (result != ATH_OK) return ath_refuse(fault, result, rules[i].field, count, 1, most);
+    }
+    return ATH_OK;
 }
 
-static int check_header(const uint8_t *bytes, const ath_limits *limits, const ath_header *header)
+static int check_header(const uint8_t *bytes, const ath_header *header, ath_fault_info *fault)
 {
-    uint32_t counts[5] = {header->vertex_count, header->branch_count, header->frame_count, header->segment_count,
-                          header->chunk_count};
-    uint32_t most[5] = {limits->vertices, limits->branches, limits->frames, limits->frames, limits->chunks};
-    for (int32_t i = 0; i < 5; i++) {
-        int result = check_count(counts[i], most[i] < 1u << 30 ? most[i] : 1u << 30);
-        if (result != ATH_OK) return result;
-    }
-    int valid = header->branch_count <= header->vertex_count && header->segment_count <= header->frame_count
-                && header->frame_count <= (uint64_t)ATH_SEGMENT_FRAMES * header->segment_count
-                && header->full_level_count >= 2 && header->full_level_count <= ATH_LEVELS && header->level_count >= 1
-                && header->level_count <= header->full_level_count && header->clip_count >= 1 && bytes[47] < 2
-                && u64_at(bytes + 56) == 0 && ath_is_finite(header->max_error) && header->max_error >= 0.0;
-    return valid ? ATH_OK : ATH_BAD_HEADER;
+    uint32_t least_segments = (header->frame_count + ATH_SEGMENT_FRAMES - 1) / ATH_SEGMENT_FRAMES;
+    const struct {
+        ath_field field;
+        double found, least, most;
+    } rules[] = {
+        {ATH_FIELD_BRANCH_COUNT, (double)header->branch_count, 1, (double)header->vertex_count},
+        {ATH_FIELD_SEGMENT_COUNT, (double)header->segment_count, (double)least_segments, (double)header->frame_count},
+        {ATH_FIELD_FULL_LEVEL_COUNT, (double)header->full_level_count, 2, ATH_LEVELS},
+        {ATH_FIELD_LEVEL_COUNT, (double)header->level_count, 1, (double)header->full_level_count},
+        {ATH_FIELD_CLIP_COUNT, (double)header->clip_count, 1, 255},
+        {ATH_FIELD_FLAGS, (double)bytes[47], 0, 1},
+        {ATH_FIELD_RESERVED, (double)u64_at(bytes + 56), 0, 0},
+        {ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST},
+    };
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
+        if (!(rules[i].found >= rules[i].least && rules[i].found <= rules[i].most))
+            return ath_refuse(fault, ATH_BAD_HEADER, rules[i].field, rules[i].found, rules[i].least, rules[i].most);
+    return ATH_OK;
+}
+
+static int check_size(size_t available, uint64_t needed, ath_field field, ath_fault_info *fault)
+{
+    if (available >= needed) return ATH_OK;
+    return ath_refuse(fault, ATH_MISSING, field, (double)available, (double)needed, (double)needed);
+}
+
+int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
+                    ath_fault_info *fault)
+{
+    int result = check_magic(bytes, available, fault);
+    *needed = HEADER_SIZE;
+    if (result == ATH_OK) result = check_size(available, HEADER_SIZE, ATH_FIELD_HEADER_SIZE, fault);
+    if (result != ATH_OK) return result;
+    parse_header(bytes, header);
+    if ((result = check_counts(limits, header, fault)) != ATH_OK) return result;
+    if ((result = check_header(bytes, header, fault)) != ATH_OK) return result;
+    uint64_t size = (uint64_t)CHUNK_SIZE * header->chunk_count + ERRORS_SIZE * error_count(header);
+    if (size > limits->table_bytes)
+        return ath_refuse(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, (double)size, 0, limits->table_bytes);
+    header->chunks_at = *needed = HEADER_SIZE + size;
+    return ATH_OK;
 }
 
 /* ---- tables ---- */
 
-static uint64_t error_count(const ath_header *header)
+static int check_errors(const uint8_t *table, const ath_header *header, float *errors, ath_fault_info *fault)
 {
-    return (uint64_t)header->level_count * header->segment_count;
-}
-
-static int check_errors(const uint8_t *table, uint64_t count, float *errors)
-{
-    for (uint64_t i = 0; i < 2 * count; i++) {
+    for (uint64_t i = 0; i < 2 * error_count(header); i++) {
         float error = f32_at(table + 4 * i);
-        if (!ath_is_finite((double)error) || error < 0.0f) return ATH_BAD_CHUNK_TABLE;
+        if (!ath_is_finite((double)error) || error < 0.0f) {
+            ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_ERROR, (double)error, 0, LARGEST);
+            fault->level = (uint8_t)(i / 2 / header->segment_count);
+            fault->segment = (uint32_t)(i / 2 % header->segment_count);
+            return ATH_BAD_CHUNK_TABLE;
+        }
         if (errors) errors[i] = error;
     }
     return ATH_OK;
 }
 
-static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~OPTIONAL; }
+static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
 
 int ath_is_motion(const ath_chunk *chunk) { return kind_id(chunk) >= 16 && kind_id(chunk) < 32; }
 
-/* 1: known; 0: to be skipped; -1: refused. */
-static int known(uint32_t kind)
+static int is_refused(int kind)
 {
-    static const uint16_t kinds[] = {ATH_HIERARCHY, ATH_REST, ATH_TIME, ATH_CLIPS, OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6,
-                                     ATH_STEMS, ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES, ATH_EXACT,
-                                     OPTIONAL | 32};
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
-        if (kinds[i] == kind) return 1;
-        if ((kinds[i] & ~OPTIONAL) == (int)(kind & ~(uint32_t)OPTIONAL)) return -1;
-    }
-    return kind & OPTIONAL ? 0 : -1;
+    return !ath_kind_name(kind) && (!(kind & ATH_OPTIONAL) || ath_kind_name(kind ^ ATH_OPTIONAL));
 }
 
 /* Grows along the file. */
@@ -136,42 +190,64 @@ static uint64_t key_of(const ath_chunk *chunk)
     return (uint64_t)(kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)kind_id(chunk);
 }
 
-static int check_chunk(const uint8_t *entry, const ath_limits *limits, const ath_header *header, const ath_chunk *chunk)
+static int check_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t index,
+                       int reserved, ath_fault_info *fault)
 {
-    if (known(chunk->kind) < 0) return ATH_UNKNOWN_CHUNK;
-    if (chunk->length > limits->chunk_bytes) return ATH_LIMIT_EXCEEDED;
-    int placed = ath_is_motion(chunk) ? chunk->level < header->level_count && chunk->segment < header->segment_count
-                                      : chunk->level == ATH_NO_LEVEL && chunk->segment == 0;
-    return placed && entry[2] == 0 ? ATH_OK : ATH_BAD_CHUNK_TABLE;
+    int motion = ath_is_motion(chunk);
+    double least_level = motion ? 0 : ATH_NO_LEVEL, most_level = motion ? header->level_count - 1 : ATH_NO_LEVEL;
+    double most_segment = motion ? (double)header->segment_count - 1 : 0;
+    if (is_refused(chunk->kind))
+        return ath_refuse_chunk(fault, ATH_UNKNOWN_CHUNK, ATH_FIELD_CHUNK_KIND, chunk, index, chunk->kind, 0, 0);
+    if (chunk->length > limits->chunk_bytes)
+        return ath_refuse_chunk(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_CHUNK_SIZE, chunk, index, chunk->length, 0,
+                                limits->chunk_bytes);
+    if (chunk->level < least_level || chunk->level > most_level)
+        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, chunk, index, chunk->level, least_level,
+                                most_level);
+    if (chunk->segment > most_segment)
+        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk, index, chunk->segment, 0,
+                                most_segment);
+    if (reserved != 0)
+        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_RESERVED, chunk, index, reserved, 0, 0);
+    return ATH_OK;
+}
+
+static ath_chunk chunk_of(const uint8_t *entry, uint64_t offset)
+{
+    ath_chunk chunk;
+    memset(&chunk, 0, sizeof chunk);
+    chunk.kind = (uint16_t)u16_at(entry);
+    chunk.level = entry[3];
+    chunk.segment = u32_at(entry + 4);
+    chunk.length = u32_at(entry + 8);
+    chunk.checksum = u32_at(entry + 12);
+    chunk.offset = offset;
+    chunk.bytes = chunk.length == 0 ? entry : 0; /* there is nothing to wait for */
+    return chunk;
 }
 
 static int parse_chunks(const uint8_t *table, const ath_limits *limits, const ath_header *header, uint64_t *prelude,
-                        ath_chunk *chunks)
+                        ath_chunk *chunks, ath_fault_info *fault)
 {
     uint64_t offset = header->chunks_at, key_before = 0;
     *prelude = header->file_length;
     for (uint32_t i = 0; i < header->chunk_count; i++) {
         const uint8_t *entry = table + (size_t)CHUNK_SIZE * i;
-        ath_chunk chunk;
-        memset(&chunk, 0, sizeof chunk);
-        chunk.kind = (uint16_t)u16_at(entry);
-        chunk.level = entry[3];
-        chunk.segment = u32_at(entry + 4);
-        chunk.length = u32_at(entry + 8);
-        chunk.checksum = u32_at(entry + 12);
-        chunk.offset = offset;
-        chunk.bytes = chunk.length == 0 ? table : 0; /* there is nothing to wait for */
-        int result = check_chunk(entry, limits, header, &chunk);
+        ath_chunk chunk = chunk_of(entry, offset);
+        int result = check_chunk(limits, header, &chunk, (int32_t)i, entry[2], fault);
         if (result != ATH_OK) return result;
         uint64_t key = key_of(&chunk);
-        int repeatable = chunk.kind & OPTIONAL && kind_id(&chunk) >= 32;
-        if (i > 0 && (key < key_before || (key == key_before && !repeatable))) return ATH_BAD_CHUNK_TABLE;
+        int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;
+        if (i > 0 && (key < key_before || (key == key_before && !repeatable)))
+            return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, &chunk, (int32_t)i, i, 0, i - 1);
         if (key >> 62 > 0 && (i == 0 || key_before >> 62 == 0)) *prelude = offset;
         key_before = key;
         offset += chunk.length;
         if (chunks) chunks[i] = chunk;
     }
-    return offset == header->file_length ? ATH_OK : ATH_BAD_CHUNK_TABLE;
+    if (offset == header->file_length) return ATH_OK;
+    double expected = (double)header->file_length;
+    return ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_FILE_LENGTH, (double)offset, expected, expected);
 }
 
 static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
@@ -181,23 +257,25 @@ static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
     return ath_crc32c(crc, bytes + CHECKSUM_AT + 4, (size_t)size - CHECKSUM_AT - 4);
 }
 
-int ath_read_front(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
-                   ath_chunk *chunks, float *errors)
+static int check_front(const uint8_t *bytes, const ath_header *header, ath_fault_info *fault)
 {
-    int result = check_magic(bytes, available);
-    *needed = HEADER_SIZE;
+    uint32_t found = front_checksum(bytes, header->chunks_at);
+    if (found == header->checksum) return ATH_OK;
+    return ath_refuse(fault, ATH_BAD_CHECKSUM, ATH_FIELD_FRONT_CHECKSUM, found, header->checksum, header->checksum);
+}
+
+int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
+                    uint64_t *needed, ath_chunk *chunks, float *errors, ath_fault_info *fault)
+{
+    const uint8_t *table = bytes + HEADER_SIZE;
+    *needed = header->chunks_at;
+    int result = available >= *needed ? check_front(bytes, header, fault)
+                                      : check_size(available - HEADER_SIZE, *needed - HEADER_SIZE, ATH_FIELD_TABLE_SIZE, fault);
     if (result != ATH_OK) return result;
-    if (available < HEADER_SIZE) return ATH_MISSING;
-    parse_header(bytes, header);
-    if ((result = check_header(bytes, limits, header)) != ATH_OK) return result;
-    uint64_t table_size = (uint64_t)CHUNK_SIZE * header->chunk_count, count = error_count(header);
-    if (table_size + ERRORS_SIZE * count > limits->table_bytes) return ATH_LIMIT_EXCEEDED;
-    header->chunks_at = *needed = HEADER_SIZE + table_size + ERRORS_SIZE * count;
-    if (available < *needed) return ATH_MISSING;
-    if (front_checksum(bytes, *needed) != header->checksum) return ATH_BAD_CHECKSUM;
-    if ((result = check_errors(bytes + HEADER_SIZE + table_size, count, errors)) != ATH_OK) return result;
-    if ((result = parse_chunks(bytes + HEADER_SIZE, limits, header, needed, chunks)) != ATH_OK) return result;
-    return available < *needed ? ATH_MISSING : ATH_OK;
+    result = check_errors(table + (size_t)CHUNK_SIZE * header->chunk_count, header, errors, fault);
+    if (result != ATH_OK) return result;
+    if ((result = parse_chunks(table, limits, header, needed, chunks, fault)) != ATH_OK) return result;
+    return check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
 }
 
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)

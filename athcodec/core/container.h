@@ -1,21 +1,8 @@
-/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, the only place that knows offsets. */
+/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, which writes them, the only place that knows offsets. */
 #ifndef ATH_CONTAINER_H
 #define ATH_CONTAINER_H
 
 #include "internal.h"
-
-enum {
-    ATH_HIERARCHY = 1,
-    ATH_REST = 2,
-    ATH_TIME = 3,
-    ATH_CLIPS = 7,
-    ATH_STEMS = 16,
-    ATH_AFFINES = 17,
-    ATH_CORRECTIONS = 18,
-    ATH_SHAPES = 19, /* of all segments, in segment 0 */
-    ATH_EXACT = 20,
-    ATH_NO_LEVEL = 255
-};
 
 typedef struct {
     uint64_t file_length;
@@ -26,10 +13,18 @@ typedef struct {
     int32_t level_count, full_level_count, clip_count, wide;
 } ath_header;
 
-/* Checks everything in front of the first chunk. Fills *header, *needed (bytes wanted from the front on ATH_MISSING, the
- * prelude's length on ATH_OK) and, unless null, chunk_count chunks and level_count x segment_count pairs of errors. */
-int ath_read_front(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
-                   ath_chunk *chunks, float *errors);
+/* Fill in the fault and return its code; of a fault of a chunk with its place in the table. */
+int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
+int ath_refuse_chunk(ath_fault_info *fault, int code, ath_field field, const ath_chunk *chunk, int32_t index, double found,
+                     double least, double most);
+
+/* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the prelude. */
+int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
+                    ath_fault_info *fault);
+/* What is between a valid header and the first chunk: fills, unless null, chunk_count chunks and level_count x
+ * segment_count pairs of errors. */
+int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
+                    uint64_t *needed, ath_chunk *chunks, float *errors, ath_fault_info *fault);
 
 /* Index of the first chunk that does not come before this one in file order. */
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);

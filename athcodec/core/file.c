@@ -45,9 +45,16 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 }
 
 /* FORMAT.md, "Limits": what a segment may take, whatever the decoder. */
-static int within_memory(const ath_header *header, const ath_limits *limits, uint64_t frames)
+static int check_memory(const ath_header *header, const ath_limits *limits, uint64_t frames, ath_fault_info *fault)
 {
-    return header->vertex_count * (60 * frames + 512) <= limits->memory_bytes;
+    uint64_t needed = header->vertex_count * (ATH_BYTES_PER_FRAME * frames + ATH_BYTES_PER_VERTEX);
+    if (needed <= limits->memory_bytes) return ATH_OK;
+    return ath_refuse(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_MEMORY, (double)needed, 0, (double)limits->memory_bytes);
+}
+
+static int check_least_memory(const ath_header *header, const ath_limits *limits, ath_fault_info *fault)
+{
+    return check_memory(header, limits, (header->frame_count + header->segment_count - 1) / header->segment_count, fault);
 }
 
 static ath_limits limits_or_default(const ath_limits *limits)
@@ -58,37 +65,53 @@ static ath_limits limits_or_default(const ath_limits *limits)
 }
 
 int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, size_t *front_bytes,
-              size_t *memory_bytes)
+              size_t *memory_bytes, ath_fault_info *fault)
 {
     ath_limits chosen = limits_or_default(limits);
+    ath_fault_info unwanted, beyond_limit, *why = fault ? fault : &unwanted;
     ath_header header;
     ath_file file;
     uint64_t needed;
-    int result = ath_read_front(bytes, available, &chosen, &header, &needed, 0, 0);
-    if (needed > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
-    *front_bytes = (size_t)needed;
+    why->code = ATH_OK;
+    int result = ath_read_header(bytes, available, &chosen, &header, &needed, why), has_tables = 0;
+    if (result == ATH_OK) {
+        has_tables = available >= needed;
+        result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, why);
+    }
+    *front_bytes = ath_size_or_most(needed);
     *memory_bytes = 0;
-    if (result != ATH_OK) return result;
-    uint64_t memory = carve(&file, &header, 0);
-    uint64_t frames = (header.frame_count + header.segment_count - 1) / header.segment_count;
-    if (!within_memory(&header, &chosen, frames) || memory > SIZE_MAX) return ATH_LIMIT_EXCEEDED;
-    *memory_bytes = (size_t)memory;
-    return ATH_OK;
+    if (needed > SIZE_MAX)
+        return ath_refuse(why, ATH_LIMIT_EXCEEDED, ATH_FIELD_PRELUDE_SIZE, (double)needed, 0, (double)SIZE_MAX);
+    if (!has_tables || (result != ATH_OK && result != ATH_MISSING)) return result;
+    int limit = check_least_memory(&header, &chosen, &beyond_limit);
+    if (limit == ATH_OK) *memory_bytes = ath_size_or_most(carve(&file, &header, 0));
+    if (limit == ATH_OK || result == ATH_MISSING) return result;
+    *why = beyond_limit;
+    return limit;
 }
 
 /* ---- the chunks of the prelude ---- */
 
-static int32_t index_of(const ath_file *file, const ath_chunk *chunk) { return (int32_t)(chunk - file->chunks); }
+static int refuse_missing(ath_fault_info *fault, int32_t kind, int32_t level, uint32_t segment)
+{
+    ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_MISSING_CHUNK, 0, 1, 1);
+    fault->kind = (uint16_t)kind;
+    fault->level = (uint8_t)level;
+    fault->segment = segment;
+    return ATH_BAD_CHUNK_TABLE;
+}
 
-/* The chunk's bytes, checked; the chunk is at fault until the next is loaded. */
-static int load(ath_file *file, int32_t kind, ath_bytes *content)
+/* The chunk's bytes, checked. Until the next is loaded, the fault is that this one's content is not valid. */
+static int load(const ath_file *file, int32_t kind, ath_bytes *content, ath_fault_info *fault)
 {
     const ath_chunk *chunk = ath_find_chunk(file->chunks, file->header.chunk_count, kind, ATH_NO_LEVEL, 0);
-    if (!chunk) return ATH_BAD_CHUNK_TABLE;
-    file->fault = index_of(file, chunk);
+    if (!chunk) return refuse_missing(fault, kind, ATH_NO_LEVEL, 0);
+    int32_t index = (int32_t)(chunk - file->chunks);
     content->bytes = chunk->bytes;
     content->size = chunk->length;
-    return ath_check_chunk(file, file->fault);
+    int result = ath_check_chunk(file, index, fault);
+    if (result == ATH_OK) ath_refuse_chunk(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, chunk, index, 0, 0, 0);
+    return result;
 }
 
 static int same_name(const char *a, const char *b)
@@ -130,7 +153,7 @@ static int read_clip(ath_file *file, int32_t index, ath_bytes *chunk)
     return ATH_OK;
 }
 
-static int read_clips(ath_file *file)
+static int read_clips(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     ath_bytes chunk;
@@ -140,7 +163,7 @@ static int read_clips(ath_file *file)
     memset(file->seams, 0, (size_t)header->clip_count * (size_t)header->full_level_count * sizeof *file->seams);
     if (header->clip_count == 1 && !ath_find_chunk(file->chunks, header->chunk_count, ATH_CLIPS, ATH_NO_LEVEL, 0))
         return place_clip(file, 0, header->frame_count, header->segment_count);
-    int result = load(file, ATH_CLIPS, &chunk);
+    int result = load(file, ATH_CLIPS, &chunk, fault);
     for (int32_t i = 0; result == ATH_OK && i < header->clip_count; i++) result = read_clip(file, i, &chunk);
     if (result != ATH_OK) return result;
     const ath_clip *last = file->clips + header->clip_count - 1;
@@ -149,13 +172,24 @@ static int read_clips(ath_file *file)
     return whole ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-static int read_hierarchy(ath_file *file, const ath_limits *limits)
+static int check_depth(const ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+{
+    int32_t deepest = 0;
+    for (int32_t b = 0; b < file->info.branch_count; b++) deepest = ath_max(deepest, file->branches[b].depth);
+    if ((uint32_t)deepest < limits->hierarchy_depth) return ATH_OK;
+    fault->field = ATH_FIELD_HIERARCHY_DEPTH;
+    fault->found = (double)deepest + 1;
+    fault->most = (double)limits->hierarchy_depth;
+    return fault->code = ATH_LIMIT_EXCEEDED;
+}
+
+static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
     ath_bytes chunk, body;
     ath_thresholds thresholds;
-    int result = load(file, ATH_HIERARCHY, &chunk);
+    int result = load(file, ATH_HIERARCHY, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_hierarchy(chunk, &thresholds, &body);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
@@ -166,9 +200,7 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits)
     file->info.xi = thresholds.xi;
     file->info.eta = thresholds.eta;
     file->info.lambda = thresholds.lambda;
-    for (int32_t b = 0; b < branch_count; b++)
-        if ((uint32_t)file->branches[b].depth >= limits->hierarchy_depth) return ATH_LIMIT_EXCEEDED;
-    return ATH_OK;
+    return check_depth(file, limits, fault);
 }
 
 static void plan(ath_file *file)
@@ -210,24 +242,36 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     return kind == ATH_EXACT && d == level && d == file->shape.height + 2;
 }
 
+static int is_wanted(const ath_file *file, const ath_chunk *chunk)
+{
+    if (chunk->kind == ATH_SHAPES && chunk->segment > 0) return 0;
+    return !ath_is_motion(chunk) || !ath_kind_name(chunk->kind)
+           || ath_file_needs(file, chunk->kind, chunk->level, chunk->level);
+}
+
+static int refuse_first_missing(const ath_file *file, int32_t kind, int32_t level, ath_fault_info *fault)
+{
+    int32_t segment = 0;
+    while (ath_file_chunk(file, kind, level, segment)) segment++;
+    return refuse_missing(fault, kind, level, (uint32_t)segment);
+}
+
 /* The table has the motion chunks that the hierarchy asks for, and no others. */
-static int check_motion_chunks(const ath_file *file)
+static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
 {
     static const int32_t kinds[] = {ATH_STEMS, ATH_AFFINES, ATH_EXACT};
-    uint32_t count[3][ATH_LEVELS] = {{0}};
-    for (uint32_t c = 0; c < file->header.chunk_count; c++) {
+    int32_t count[3][ATH_LEVELS] = {{0}};
+    for (int32_t c = 0; c < file->info.chunk_count; c++) {
         const ath_chunk *chunk = file->chunks + c;
+        if (!is_wanted(file, chunk))
+            return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_UNEXPECTED_CHUNK, chunk, c, 1, 0, 0);
         for (int32_t i = 0; i < 3; i++)
             if (chunk->kind == kinds[i]) count[i][chunk->level]++;
-        if (chunk->kind == ATH_CORRECTIONS && chunk->level != file->shape.height + 1) return ATH_BAD_CHUNK_TABLE;
-        if (chunk->kind == ATH_SHAPES && (chunk->segment > 0 || !(file->stems_levels >> chunk->level & 1)))
-            return ATH_BAD_CHUNK_TABLE;
     }
     for (int32_t i = 0; i < 3; i++)
-        for (int32_t d = 0; d < file->header.level_count; d++) {
-            uint32_t wanted = ath_file_needs(file, kinds[i], d, d) ? file->header.segment_count : 0;
-            if (count[i][d] != wanted) return ATH_BAD_CHUNK_TABLE;
-        }
+        for (int32_t d = 0; d < file->info.level_count; d++)
+            if (ath_file_needs(file, kinds[i], d, d) && count[i][d] < file->info.segment_count)
+                return refuse_first_missing(file, kinds[i], d, fault);
     return ATH_OK;
 }
 
@@ -238,13 +282,13 @@ static int all_finite(const double *values, size_t count)
     return 1;
 }
 
-static int read_rest(ath_file *file)
+static int read_rest(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     size_t numbers = 3 * (size_t)header->vertex_count;
     ath_bytes chunk, body;
     ath_rest_head head;
-    int result = load(file, ATH_REST, &chunk);
+    int result = load(file, ATH_REST, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
     if (result != ATH_OK) return result;
     memcpy(file->info.origin, head.origin, sizeof head.origin);
@@ -275,11 +319,11 @@ static int time_clip(const ath_file *file, int32_t index, ath_time_method method
     return ATH_OK;
 }
 
-static int read_time(ath_file *file)
+static int read_time(ath_file *file, ath_fault_info *fault)
 {
     ath_bytes chunk, body;
     ath_time_method method;
-    int result = load(file, ATH_TIME, &chunk);
+    int result = load(file, ATH_TIME, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_time(chunk, file->info.clip_count, &method, &body);
     if (result == ATH_OK && method == 2)
         result = ath_decode_times(file->scratch, body.bytes, body.size, file->info.frame_count, file->times);
@@ -306,25 +350,27 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->wide = header->wide;
 }
 
-static int read_prelude(ath_file *file, const ath_limits *limits)
+/* One level more than the lossy ones gives the very positions of the source. */
+static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
-    int result = read_clips(file);
+    int32_t lossy = file->shape.height + 2, found = file->info.full_level_count;
+    if (found == lossy || found == lossy + 1) return ATH_OK;
+    return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
+}
+
+static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+{
+    int result = read_clips(file, fault);
+    if (result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
+    if (result == ATH_OK) result = read_hierarchy(file, limits, fault);
     if (result != ATH_OK) return result;
-    file->fault = -1;
-    if (!within_memory(&file->header, limits, (uint64_t)file->longest)) return ATH_LIMIT_EXCEEDED;
-    result = read_hierarchy(file, limits);
-    if (result != ATH_OK) return result;
-    file->fault = -1;
     plan(file);
     file->info.node_count = file->shape.node_count;
-    int32_t lossy_levels = file->shape.height + 2; /* one more gives the very positions of the source */
-    if (file->header.full_level_count != lossy_levels && file->header.full_level_count != lossy_levels + 1)
-        return ATH_BAD_HEADER;
+    if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
-    if ((result = check_motion_chunks(file)) != ATH_OK) return result;
-    if ((result = read_rest(file)) != ATH_OK) return result;
-    if ((result = read_time(file)) != ATH_OK) return result;
-    file->fault = -1;
+    if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
+    if ((result = read_rest(file, fault)) != ATH_OK) return result;
+    if ((result = read_time(file, fault)) != ATH_OK) return result;
     file->shape.rest = file->rest;
     file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->shape.piece_count, file->rest, file->gaps,
                                                    (int32_t *)file->scratch);
@@ -332,25 +378,37 @@ static int read_prelude(ath_file *file, const ath_limits *limits)
     return ATH_OK;
 }
 
-int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits)
+/* The header goes into the file, once that fits into the memory. */
+static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+                      ath_fault_info *fault)
+{
+    ath_header header;
+    uint64_t needed;
+    int result = ath_read_header(bytes, available, limits, &header, &needed, fault);
+    if (result != ATH_OK) return result;
+    if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    memset(file, 0, sizeof *file);
+    carve(file, &header, (uint8_t *)file);
+    file->header = header;
+    result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, fault);
+    set_info(file, needed);
+    return result != ATH_OK ? result : check_least_memory(&header, limits, fault);
+}
+
+int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+             ath_fault_info *fault)
 {
     ath_limits chosen = limits_or_default(limits);
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     ath_file *file = (ath_file *)memory;
-    size_t front, needed;
-    uint64_t prelude;
-    if (!ath_fits(memory, memory_bytes, sizeof *file)) return ATH_NO_MEMORY;
-    file->fault = -1;
-    int result = ath_front(bytes, available, &chosen, &front, &needed);
-    if (result != ATH_OK) return result;
-    if (memory_bytes < needed) return ATH_NO_MEMORY;
-    memset(file, 0, sizeof *file);
-    ath_read_front(bytes, available, &chosen, &file->header, &prelude, 0, 0);
-    carve(file, &file->header, (uint8_t *)memory);
-    ath_read_front(bytes, available, &chosen, &file->header, &prelude, file->chunks, file->errors);
-    file->fault = -1;
-    set_info(file, prelude);
-    ath_feed(file, bytes, 0, available);
-    return read_prelude(file, &chosen);
+    if (!ath_fits(memory, memory_bytes, sizeof *file)) return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    int result = read_front(file, memory_bytes, bytes, available, &chosen, why);
+    if (result == ATH_OK) {
+        ath_feed(file, bytes, 0, available);
+        result = read_prelude(file, &chosen, why);
+    }
+    why->code = result;
+    return result;
 }
 
 /* ---- building ---- */
@@ -397,6 +455,8 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
 /* ---- what a file holds ---- */
 
 void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
+
+const float *ath_errors(const ath_file *file) { return file->errors; }
 
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 
@@ -506,14 +566,18 @@ int32_t ath_segment_of(const ath_file *file, int32_t frame)
 
 const ath_chunk *ath_chunks(const ath_file *file) { return file->chunks; }
 
-int ath_check_chunk(const ath_file *file, int32_t index)
+int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
 {
     const ath_chunk *chunk = file->chunks + index;
-    if (!chunk->bytes) return ATH_MISSING;
-    return ath_crc32c(0, chunk->bytes, chunk->length) == chunk->checksum ? ATH_OK : ATH_BAD_CHECKSUM;
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    why->code = ATH_OK;
+    if (!chunk->bytes)
+        return ath_refuse_chunk(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, index, 0, chunk->length, chunk->length);
+    uint32_t found = ath_crc32c(0, chunk->bytes, chunk->length);
+    if (found == chunk->checksum) return ATH_OK;
+    return ath_refuse_chunk(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, index, found, chunk->checksum,
+                            chunk->checksum);
 }
-
-int32_t ath_fault(const ath_file *file) { return file->fault; }
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)
 {

@@ -27,7 +27,6 @@ struct ath_file {
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
     int32_t longest;             /* frames of the longest segment */
-    int32_t fault;
     uint32_t stems_levels;       /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };

@@ -64,7 +64,7 @@ struct ath_work {
     int32_t next_kind;       /* of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
-    int32_t fault;
+    ath_fault_info fault;
     int32_t node_step;
     int32_t counts[ATH_SLOTS];
     int32_t *shape_integers; /* of the piece, 0 between pieces */
@@ -160,10 +160,28 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
     return checks + heads + file->shape.piece_count + 1;
 }
 
-/* Whether all chunks have been fed. */
+static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
+{
+    return ath_refuse_chunk(&work->fault, code, field, chunk, (int32_t)(chunk - work->file->chunks), found, expected,
+                            expected);
+}
+
+/* Notes the chunk whose content is not valid, if it is not. */
+static int blame(ath_work *work, const ath_chunk *chunk, int result)
+{
+    return result == ATH_OK ? ATH_OK : refuse(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
+}
+
+/* Null for a chunk that the segment does without. */
+static int check_fed(ath_work *work, const ath_chunk *chunk)
+{
+    return !chunk || chunk->bytes ? ATH_OK : refuse(work, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, 0, chunk->length);
+}
+
+/* ATH_MISSING unless all have been fed. */
 static int find_chunks(ath_work *work)
 {
-    int there = 1;
+    int result = ATH_OK;
     for (int32_t d = 0; d <= work->level; d++) {
         const ath_chunk *stems = wanted_chunk(work->file, work->index, work->level, ATH_STEMS, d);
         const ath_chunk *affines = wanted_chunk(work->file, work->index, work->level, ATH_AFFINES, d);
@@ -171,13 +189,15 @@ static int find_chunks(ath_work *work)
         work->shapes[d].chunk = shapes;
         work->stems[d].chunk = stems;
         work->affines[d].chunk = affines;
-        there = there && (!stems || stems->bytes) && (!affines || affines->bytes) && (!shapes || shapes->bytes);
+        if (result == ATH_OK) result = check_fed(work, stems);
+        if (result == ATH_OK) result = check_fed(work, affines);
+        if (result == ATH_OK) result = check_fed(work, shapes);
     }
     work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
                                            work->file->shape.height + 1);
     work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
-    there = there && (!work->exact_level.chunk || work->exact_level.chunk->bytes);
-    return there && (!work->corrections.chunk || work->corrections.chunk->bytes);
+    if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
+    return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
 }
 
 static void ready_motion(ath_work *work)
@@ -221,12 +241,11 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     work->segment = segment;
     work->index = index;
     work->level = level;
-    work->fault = -1;
     work->next_kind = ATH_STEMS;
     ready_motion(work);
-    int there = find_chunks(work);
-    work->phase = there ? CHECKSUMS : FAILED;
-    return there ? ATH_OK : ATH_MISSING;
+    int result = find_chunks(work);
+    work->phase = result == ATH_OK ? CHECKSUMS : FAILED;
+    return result;
 }
 
 /* ---- steps ---- */
@@ -235,13 +254,6 @@ static ath_bytes bytes_of(const ath_chunk *chunk)
 {
     ath_bytes bytes = {chunk->bytes, chunk->length};
     return bytes;
-}
-
-/* Notes the chunk that is at fault, if anything is. */
-static int blame(ath_work *work, const ath_chunk *chunk, int result)
-{
-    if (result != ATH_OK) work->fault = (int32_t)(chunk - work->file->chunks);
-    return result;
 }
 
 static const ath_chunk *chunk_to_check(const ath_work *work)
@@ -273,7 +285,8 @@ static int check_some(ath_work *work)
         work->crc_at += size;
     }
     if (chunk && work->crc_at < chunk->length) return ATH_OK;
-    if (chunk && work->crc != chunk->checksum) return blame(work, chunk, ATH_BAD_CHECKSUM);
+    if (chunk && work->crc != chunk->checksum)
+        return refuse(work, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, work->crc, chunk->checksum);
     next_to_check(work);
     return ATH_OK;
 }
@@ -576,7 +589,7 @@ int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t seg
     return result;
 }
 
-int32_t ath_work_fault(const ath_work *work) { return work->fault; }
+void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }
 
 int32_t ath_segment_index(const ath_segment *segment) { return segment->index; }
 

@@ -48,7 +48,7 @@ class BoundOption:
         diagonal, extent = source.seen.diagonal, source.extent
         least = 2 * least_bound(source)
         if self.rel_error is None and self.lossless:
-            return max(LOSSLESS_REL_ERROR * extent, least, extent / qz.LARGEST_RANGE)
+            return max(LOSSLESS_REL_ERROR * extent, least, extent / qz.LARGEST_EXTENT)
         fraction = self.rel_error or DEFAULT_REL_ERROR
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from athcodec import container as ct
 from athcodec.ath import Thresholds
+from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
@@ -23,7 +24,6 @@ from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob,
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
-from athcodec.files import check_target, new_file
 from athcodec.segmentation import split_segments
 
 
@@ -227,5 +227,5 @@ def _weighted_progress(
 ) -> WeightedProgress:
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
     return WeightedProgress(progress, stage_weights(
-        clip.vertex_count, segments, options.effort, samples=min(SAMPLES, len(clip.span_frames)),
+        clip.vertex_count, segments, options.effort, samples=min(SAMPLES, len(clip.clip_range_frames)),
         branches=not clip.has_branches, sizes=option.target_size is not None, motion=not draft))

@@ -24,6 +24,7 @@ from athcodec import container as ct
 from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import MotionClip
 from athcodec.decoder import Decoder
+from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
@@ -31,7 +32,7 @@ from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, decide
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_segment, thread_count
-from athcodec.encoding.summary import LevelSummary, Seam, Summary
+from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
@@ -75,7 +76,7 @@ class EncodingOptions:
 class Draft:
     """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
 
-    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `mark` tells
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `fingerprint` tells
     a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
     """
 
@@ -85,7 +86,7 @@ class Draft:
     segment_count: int
     found: Found | None  # branches, for a clip without
     options: EncodingOptions
-    mark: str
+    fingerprint: str
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ class _Decided:
     learned_modes: LearnedModes | None
 
     @property
-    def mark(self) -> str:
+    def fingerprint(self) -> str:
         return hashlib.sha256(self.prelude.hierarchy_stream + self.prelude.rest_chunk.stream).hexdigest()
 
 
@@ -229,13 +230,13 @@ class EncodingJob:
 
     def draft(self, decided: _Decided) -> Draft:
         return Draft(decided.settings, decided.learned_modes, self.seen, self.segment_count, self.found, self.options,
-                     decided.mark)
+                     decided.fingerprint)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         ath = self.seen.ath(self.thresholds(draft.settings.bound))
         decided = _Decided(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
-        if decided.mark != draft.mark:
+        if decided.fingerprint != draft.fingerprint:
             raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
                             "on machines that calculate alike")
         return decided
@@ -258,12 +259,12 @@ class EncodingJob:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
-        if any(span.loop for span in self.clip.spans):
-            with Decoder(out, strict=True) as decoder:
+        if any(clip_range.loop for clip_range in self.clip.clip_ranges):
+            with open_ath(out, strict=True) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
-        with Decoder(out, strict=True) as decoder:  # before the file gets its name
+        with open_ath(out, strict=True) as decoder:  # before the file gets its name
             summary = _summary(Path(path), self, decided, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
@@ -276,21 +277,22 @@ class EncodingJob:
             store.add(ct.SHAPES, stream, level)
         errors = self._add_motion(store, prelude, coded)
         self._add_static(store)
-        if self.clip.spans:
-            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.spans)))
+        if self.clip.clip_ranges:
+            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
                            self.segment_count, len(errors), len(errors),
                            0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
-                           self.clip.dtype == np.float64, len(self.clip.span_frames))
+                           self.clip.dtype == np.float64, len(self.clip.clip_range_frames))
         return _Result(store, header, errors)
 
     def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
-        return ct.pack_clips(self.clip.spans, [len(segments) for segments in self.source.span_segments], seam_errors)
+        segment_counts = [len(segments) for segments in self.source.clip_range_segments]
+        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
         return [self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-                for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames)]
+                for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)]
 
     @staticmethod
     def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
@@ -308,7 +310,7 @@ class EncodingJob:
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
         """Of the loops of the file just written."""
         seams = []
-        for clip, (start, stop) in zip(decoder.clips, self.clip.span_frames):
+        for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames):
             if clip.loop:
                 beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
                 step, *steps = (np.linalg.norm(self._step(*frames), axis=1).max()
@@ -321,7 +323,7 @@ class EncodingJob:
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
                                                   prelude.hierarchy_stream))
         store.add(ct.REST, ct.pack_rest(prelude.rest_chunk))
-        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.span_frames)))
+        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
         metadata = self.clip.metadata if self._keeps_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
         if metadata:
@@ -379,7 +381,6 @@ class EncodingJob:
 
 def _summary(path: Path, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk],
              decoder: Decoder) -> Summary:
-    depths = [LevelSummary(d.depth, d.nodes, d.bytes, d.max_error, d.rms_error) for d in decoder.depths]
     sizes: dict[str, int] = {}
     for chunk in chunks:
         name = ct.KIND_NAMES[chunk.kind]
@@ -392,5 +393,5 @@ def _summary(path: Path, job: EncodingJob, decided: _Decided, result: _Result, c
                "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum())}
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
     return Summary(path, result.header.file_length, raw, settings.largest_bound,
-                   bound / diagonal if diagonal > 0 else 0.0, decoder.table1(), depths, sizes, choices,
+                   bound / diagonal if diagonal > 0 else 0.0, decoder.file.table1(), decoder.file.levels, sizes, choices,
                    job.seams(decoder), None if job.found is None else str(job.found))

@@ -21,7 +21,7 @@ LARGEST_MODE = 2.0**20
 REQUIRED_SAVINGS = (1.0, 1.25)  # by which factor a piece's estimated bits must shrink for learned modes
 TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
-LARGEST_RANGE = 2.0**28  # extent over bound that corrections alone can still express
+LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
@@ -50,8 +50,8 @@ def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype
         reason = ("the smallest that a file can hold" if least == SMALLEST_BOUND else
                   f"twice the spacing of the source's {np.dtype(dtype).name} coordinates")
         raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
-    if extent > LARGEST_RANGE * bound:
-        raise BoundError(f"max error: got {bound:.3g}; expected at least {extent / LARGEST_RANGE:.3g} for positions "
+    if extent > LARGEST_EXTENT * bound:
+        raise BoundError(f"max error: got {bound:.3g}; expected at least {extent / LARGEST_EXTENT:.3g} for positions "
                          f"and a rest pose that are up to {extent:.3g} apart")
 
 

@@ -66,10 +66,10 @@ class SegmentSample:
 
 def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
-    middles = [start + len(own) // 2 for start, own in zip(source.span_starts, source.span_segments)]
+    middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
         return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
-    lengths = np.array([own[-1][1] - own[0][0] for own in source.span_segments])
+    lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(np.argsort([_moved(source, segment) for segment in middles], kind="stable"),
                             min(SAMPLES, len(middles)))
     return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum()))

@@ -58,23 +58,23 @@ class Source:
     rest: np.ndarray = field(init=False)  # (N, 3) float64
     origin: np.ndarray = field(init=False)  # (3,) float64
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
-    span_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
+    clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
 
     def __post_init__(self) -> None:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.sheet_like = ~_thin_branches(self)
-        self.span_segments = [[(start + a, start + b) for a, b in
+        self.clip_range_segments = [[(start + a, start + b) for a, b in
                                split_segments(stop - start, self.clip.vertex_count, self.segment_frames,
                                               ct.Limits.memory_bytes)]
-                              for start, stop in self.clip.span_frames]
-        self.segments = [segment for segments in self.span_segments for segment in segments]
+                              for start, stop in self.clip.clip_range_frames]
+        self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
     @property
-    def span_starts(self) -> list[int]:
+    def clip_range_starts(self) -> list[int]:
         """The first segment of each clip of the file."""
-        return np.cumsum([0, *map(len, self.span_segments[:-1])]).tolist()
+        return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
 
     @property
     def extent(self) -> float:

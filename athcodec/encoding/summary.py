@@ -5,16 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-
-@dataclass(frozen=True)
-class LevelSummary:
-    """One level of a file just written; errors in scene units."""
-
-    depth: int
-    nodes: int
-    bytes: int
-    max_error: float
-    rms_error: float
+from athcodec.ath_file import Level
 
 
 @dataclass(frozen=True)
@@ -55,7 +46,7 @@ class Summary:
         The bound over the diagonal of the bounding box of all frames; 0 where that is a point.
     table1 : dict
         Nodes, height and mean subtree sizes of the ATH (Song, Yang and Peng 2011, table 1).
-    levels : list of LevelSummary
+    levels : list of Level
         Coarse to fine.
     chunk_bytes : dict of str to int
         Bytes per kind of chunk (FORMAT.md), "HEADER" for header and tables.
@@ -73,7 +64,7 @@ class Summary:
     max_error_bound: float
     relative_bound: float
     table1: dict
-    depths: list[LevelSummary]
+    levels: list[Level]
     chunk_bytes: dict[str, int]
     choices: dict
     seams: tuple[Seam, ...] = ()

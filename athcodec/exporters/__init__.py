@@ -1,7 +1,7 @@
 """Writers: one module per file format, mirroring sources/. Nothing here knows how .ath files are coded.
 
 `write` imports the module of the wanted format and no other. A module has one function,
-`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or an Excerpt of an .ath file.
+`write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+from athcodec.atomic_files import check_target
 from athcodec.errors import ClipError
-from athcodec.files import check_target
 from athcodec.sources import Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
@@ -60,7 +60,7 @@ FORMATS = (
 
 def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None,
           **options: object) -> None:
-    """Write a MotionClip or an Excerpt to `path`, which appears only when it is whole.
+    """Write a MotionClip or a ClipView to `path`, which appears only when it is whole.
 
     format    the name of one of FORMATS; None: known by the suffix
     options   see WriteOptions
@@ -79,14 +79,14 @@ def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, 
 
 
 def _check_clips(motion: Any, kind: Format) -> None:
-    spans = getattr(motion, "spans", ())
-    if len(spans) > 1 and not kind.holds_several:
-        names = ", ".join(span.name for span in spans)
+    clip_ranges = getattr(motion, "clip_ranges", ())
+    if len(clip_ranges) > 1 and not kind.holds_several:
+        names = ", ".join(clip_range.name for clip_range in clip_ranges)
         suffixes = " ".join(suffix for each in FORMATS if each.holds_several for suffix in each.suffixes)
         raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
                         f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
 
 
-def write_hdf5(path: str | PathLike[str], clip: Any, gzip: bool = False) -> None:
+def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None:
     """Write `clip` in athcodec's HDF5 schema to `path`; see exporters/hdf5.py, and `write` for the rest."""
     write(clip, path, "hdf5", gzip=gzip)

@@ -19,6 +19,7 @@ import imath
 import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
+from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.parts import (
     DOMAINS,
@@ -30,10 +31,8 @@ from athcodec.exporters.parts import (
     own_arrays,
     parts_of,
     rows_of,
-    told,
 )
-from athcodec.files import new_files
-from athcodec.sources.parts import OWN, turned_corners
+from athcodec.sources.parts import OWN, ArrayDescriptor, turned_corners
 
 SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
           "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}
@@ -46,7 +45,7 @@ Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or an Excerpt as .abc. Raises ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .abc. Raises ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder:
         try:
@@ -204,4 +203,5 @@ def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, st
         raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
         held = _filled(imath.UnsignedCharArray, raw)
         Abc.OUcharArrayProperty(properties, f"array{i}").setValue(held)
-        Abc.OStringProperty(properties, f"array{i}.told").setValue(json.dumps(told(name, values, domain)))
+        descriptor = ArrayDescriptor.of(name, values, domain)
+        Abc.OStringProperty(properties, f"array{i}.descriptor").setValue(json.dumps(descriptor._asdict()))

@@ -1,6 +1,6 @@
 """What of a motion moves as one, for formats that hold transforms in place of vertices.
 
-It starts from the parts that an .ath file has at a depth (nodes and stems), or from the branches of a clip, and fits to
+It starts from the parts that an .ath file has at a level (nodes and stems), or from the branches of a clip, and fits to
 each, frame by frame, what a format can do: `Placed` finds translation, rotation and three scales, `Mapped` any affine
 map. A part that this leaves further off than allowed, such as a stem that bends, is cut into shorter ones, down to
 single vertices, which a translation places exactly. It knows no file format.
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.hierarchy import build_hierarchy, hierarchy_of
 
 ROUNDS = 8
@@ -35,7 +35,7 @@ OF_CLIP = 1e-4  # of the clip's size, where there is no level
 def allowed_error(motion: Any) -> float:
     """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
     size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
-    return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, Excerpt) else OF_CLIP * size
+    return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, ClipView) else OF_CLIP * size
 
 
 @dataclass(eq=False)
@@ -161,7 +161,7 @@ def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[
 
 def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An order of the vertices, and ranges of it that are the parts to begin with."""
-    if isinstance(motion, Excerpt):
+    if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return motion.decoder.hierarchy.vertex_source, parts.first_vertex.astype(np.int64), (
             parts.vertex_count.astype(np.int64))

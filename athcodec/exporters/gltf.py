@@ -1,6 +1,6 @@
 """Writes GLB: glTF 2.0 in one file, moved by joints or by morph targets. Structure and skinning are written by hand.
 
-"joints": a joint for each part that moves as one at the excerpt's depth (node or stem of the .ath file, branch of a
+"joints": a joint for each part that moves as one at the view's level (node or stem of the .ath file, branch of a
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
 further off than the level itself is (of a clip: parts.OF_CLIP of its size) is cut into shorter ones (parts.py).
 "morphs": a morph target per frame, exact but for float32, large. "auto": whichever is smaller, of a clip that is short;
@@ -24,8 +24,9 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import new_file
+from athcodec.clip_view import ClipView
 from athcodec.errors import ClipError
-from athcodec.excerpt import Excerpt
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import (
@@ -42,7 +43,6 @@ from athcodec.exporters.gltf_build import (
     takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
-from athcodec.files import new_file
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -52,7 +52,7 @@ BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
                report: Callable[[float], None]) -> dict[str, Any]:
-    """Write a MotionClip or an Excerpt as GLB to `path`; returns what asset.extras.athcodec says of it.
+    """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
     """
@@ -61,14 +61,14 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
         joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, lambda done: report(0.95 * done))
     if wanted == "joints" and joints is None:
         raise ClipError(f"joints: got more than {MOST_JOINTS} that it takes to move the clip, expected fewer: choose a "
-                        "lower depth, or morphs")
+                        "lower level, or morphs")
     if wanted == "auto":
         wanted = _smaller(motion, joints)
     if wanted == "morphs":
         _check_morphs(motion)
     facts = {"animation": wanted, "unit": str(motion.metadata.get("unit") or "")}
-    if isinstance(motion, Excerpt):
-        facts |= {"depth": motion.depth, "level_max_error": float(motion.max_error)}
+    if isinstance(motion, ClipView):
+        facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     try:
         found, left_out = shapes(motion, Path(fspath(path)).stem)
         if wanted == "joints":

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from athcodec import __version__
-from athcodec.clip import Span
+from athcodec.clip import ClipRange
 from athcodec.errors import ClipError
 from athcodec.joining import metadata_of
 from athcodec.units import METRES, unit_symbol
@@ -199,30 +199,31 @@ class Take:
 def takes(motion: Any) -> list[Take]:
     """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
     apart."""
-    spans = motion.spans or (Span("", motion.frame_count),)
-    return [_take(motion, span, start, stop) for span, (start, stop) in zip(spans, motion.span_frames)]
+    clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
+    return [_take(motion, clip_range, start, stop)
+            for clip_range, (start, stop) in zip(clip_ranges, motion.clip_range_frames)]
 
 
-def _take(motion: Any, span: Span, start: int, stop: int) -> Take:
+def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
     times = np.asarray(motion.time[start:stop], np.float64)
-    is_loop = span.loop and len(times) > 1
-    extras = {"loop": True} if span.loop else {}
-    if len(motion.spans) > 1:
+    is_loop = clip_range.loop and len(times) > 1
+    extras = {"loop": True} if clip_range.loop else {}
+    if len(motion.clip_ranges) > 1:
         own_fps = 1 / np.median(np.diff(times)) if len(times) > 1 else motion.fps
-        extras |= _clock(metadata_of(motion.metadata, span.name), times, own_fps)
+        extras |= _clock(metadata_of(motion.metadata, clip_range.name), times, own_fps)
     times = times - times[0]
     if is_loop:
         times = np.append(times, times[-1] + times[-1] / (len(times) - 1))
     times = times.astype(np.float32)
     if (np.diff(times) <= 0).any():
         raise ClipError("time: got frames closer to each other than float32 seconds tell, expected longer steps")
-    return Take(span.name or "motion", start, stop, is_loop, times, extras)
+    return Take(clip_range.name or "motion", start, stop, is_loop, times, extras)
 
 
 def clock(motion: Any) -> dict[str, Any]:
     """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
     said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
-    return said if len(motion.spans) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
+    return said if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
 
 
 def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float],
         return None
     parts, poses = moving.parts, [moving.places, *moving.values]
     still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
-    for start, stop in motion.span_frames:
+    for start, stop in motion.clip_range_frames:
         _hold([each[start:stop] for each in poses], still, parts.reach, SLACK * allowed)
     bind = np.zeros((len(parts), 4, 4))
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)

@@ -17,12 +17,12 @@ from typing import Any
 import h5py
 import numpy as np
 
+from athcodec.atomic_files import PendingFile
 from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
-from athcodec.files import Part
 from athcodec.hierarchy import branch_orders
-from athcodec.joining import with_notes
+from athcodec.joining import with_clip_metadata
 
 CHUNK_BYTES = 1 << 20
 
@@ -80,8 +80,8 @@ class Hdf5Writer:
         }
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
-        self._part: Part | None = Part(path)
-        self._file, self._sink = None, Sink(self._part.descriptor, self._part.path)
+        self._pending: PendingFile | None = PendingFile(path)
+        self._file, self._sink = None, Sink(self._pending.descriptor, self._pending.path)
         try:
             self._file = h5py.File(self._sink, "w")
             self._positions = self._create_positions(dtype)
@@ -117,29 +117,29 @@ class Hdf5Writer:
         """Complete the file and give it its name; ClipError where frames are missing. Does nothing once
         done.
         """
-        if self._part is None:
+        if self._pending is None:
             return
         try:
             if self._written < self._frame_count:
                 raise ClipError(f"frames: got {self._written}, expected {self._frame_count}, one per time")
             self._file.close()
             self._sink.check()
-            self._part.complete()
-            self._part = None
+            self._pending.complete()
+            self._pending = None
         except BaseException:
             self.abort()
             raise
 
     def abort(self) -> None:
         """Give up: remove what has been written. Does nothing once closed."""
-        part, self._part = self._part, None
-        if part is None:
+        pending, self._pending = self._pending, None
+        if pending is None:
             return
         try:
             if self._file is not None:
                 self._file.close()
         finally:
-            part.discard()
+            pending.discard()
 
     def _create_positions(self, dtype: np.dtype) -> h5py.Dataset:
         shape = (self._frame_count, self._vertex_count, 3)
@@ -168,8 +168,8 @@ class Hdf5Writer:
 def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
-    `clip` is a MotionClip, an Excerpt, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata, spans and rest_dtype are written where it has them.
+    `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
+    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and rest_dtype are written where it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
     rest = np.asarray(clip.rest)
@@ -179,7 +179,7 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
         rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
         dtype=clip.dtype,
         gzip=options.gzip,
-        metadata=with_notes(clip),
+        metadata=with_clip_metadata(clip),
         **{name: getattr(clip, name, None) for name in optional},
     )
     with writer:

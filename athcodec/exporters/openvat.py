@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import new_folder
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import portions
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
-from athcodec.files import new_folder
 
 NARROWEST = 64
 HIGHEST = 16384
@@ -30,7 +30,7 @@ HIGHEST = 16384
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
                report: Callable[[float], None]) -> dict[str, Any]:
-    """Write a MotionClip or an Excerpt to the new folder `path`; returns what the JSON says. options.half: 16 bits in
+    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: 16 bits in
     place of float.
 
     Raises ClipError where the texture would be larger than engines take, FileExistsError where `path` exists.

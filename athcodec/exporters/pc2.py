@@ -17,11 +17,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from athcodec.atomic_files import check_target, new_files
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.mesh import ObjWriter, has_mesh
 from athcodec.exporters.timing import frame_numbers
-from athcodec.files import check_target, new_files
 from athcodec.sources.mesh import Mesh, read_mesh
 from athcodec.sources.pc2 import HEADER, MAGIC
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.excerpt import Excerpt
+from athcodec.clip_view import ClipView
 from athcodec.exporters.gltf_build import clock
 
 WIDEST = 4096  # what devices take
@@ -18,8 +18,8 @@ LAYOUT = "athcodec/exporters/vat.md"
 
 
 def facts_of(motion: Any) -> dict[str, Any]:
-    """Rate, level and size of a MotionClip or Excerpt."""
-    level = {"depth": motion.depth, "level_max_error": float(motion.max_error)} if isinstance(motion, Excerpt) else {}
+    """Rate, level and size of a MotionClip or ClipView."""
+    level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}
 
 

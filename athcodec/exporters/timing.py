@@ -22,5 +22,5 @@ def start_frame_of(motion: Any) -> float:
 
 
 def frame_numbers(motion: Any) -> np.ndarray:
-    """(T,) float64; whole where times fall on frames but for rounding. Those of an excerpt are those of the clip."""
+    """(T,) float64; whole where times fall on frames but for rounding. Those of a view are those of the clip."""
     return start_frame_of(motion) + np.round(np.asarray(motion.time) * frame_rate_of(motion), 6)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
+from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.parts import (
     KNOWN_ATTRIBUTES,
@@ -29,9 +30,8 @@ from athcodec.exporters.parts import (
     own_arrays,
     parts_of,
     rows_of,
-    told,
 )
-from athcodec.files import new_files
+from athcodec.sources.parts import ArrayDescriptor
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20
@@ -51,7 +51,7 @@ INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform",
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
-    """Write a MotionClip or an Excerpt as .usdc, .usda, .usdz or, binary, .usd. Raises ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd. Raises ClipError, OSError."""
     path = os.fspath(path)
     with new_files(path) as folder, _saying(path):
         name = Path(path).name
@@ -256,7 +256,7 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
                                          Sdf.VariabilityUniform)
         raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
         attribute.Set(Vt.UCharArray.FromNumpy(raw) if len(raw) else Vt.UCharArray())
-        for key, text in told(name, values, domain).items():
+        for key, text in ArrayDescriptor.of(name, values, domain)._asdict().items():
             attribute.SetCustomDataByKey(f"{OWN}:{key}", text)
 
 

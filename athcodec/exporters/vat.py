@@ -1,7 +1,7 @@
 """Writes vertex animation textures of node matrices: a folder of EXR textures, a JSON file and the rest pose as GLB.
 
 A node has three texels per frame. Nodes are the parts of a level; stems that bend are cut until a map of each is no
-further off than the level itself (parts.py), so textures are small at any depth. The error is measured on what is
+further off than the level itself (parts.py), so textures are small at any level. The error is measured on what is
 written, rounding included, and stated in the JSON and by write_clip. The layout is in vat.md. Textures are made in
 memory, as image files are.
 """
@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.atomic_files import new_folder
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.fitting import Mapped, Moving, allowed_error, fit
 from athcodec.exporters.gltf import write_rest
 from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
-from athcodec.files import new_folder
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
@@ -31,7 +31,7 @@ FLOAT16_MAX = 65504.0
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
                report: Callable[[float], None]) -> dict[str, Any]:
-    """Write a MotionClip or an Excerpt to the new folder `path`; returns what the JSON says. options.half: half
+    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
     Raises ClipError where there are more nodes than a texture takes, or motion that half precision cannot hold,
@@ -39,7 +39,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
     """
     moving = fit(motion, Mapped, allowed_error(motion), MOST_NODES, lambda done: report(0.6 * done))
     if moving is None:
-        raise ClipError(f"vat: got more than {MOST_NODES} nodes, expected fewer: choose a lower depth")
+        raise ClipError(f"vat: got more than {MOST_NODES} nodes, expected fewer: choose a lower level")
     rows = _rows(moving, np.float16 if options.half else np.float32)
     name = Path(fspath(path)).stem or "clip"
     with new_folder(path) as folder:

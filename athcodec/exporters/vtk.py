@@ -18,10 +18,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
 from athcodec.exporters.sequence import file_names
-from athcodec.files import check_target, new_files
 
 _HEAD = ('<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
          'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n')

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, MotionClip, Skin, Span
+from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.errors import ClipError
 from athcodec.joining import join
 from athcodec.sources import ReadOptions
@@ -43,7 +43,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
 
     The rest pose, where options.rest is "auto", is the scene without animation. metadata has "animations", the names of
     those that are played, and "other_animations", those that are not; with options.takes the names are those of the
-    clip's spans. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
+    clip's ranges. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
     needs a package, OSError where a file cannot be opened.
     """
     try:
@@ -112,7 +112,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             rest=rest if rest is not None and np.isfinite(rest).all() else None,
             rest_pose="mean" if options.rest == "mean" else "first",
             edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, parts),
-            spans=(Span("", len(timing.times), True),) if timing.is_loop else (),
+            clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
             metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(parts)
             | ({} if options.takes else _played(scene)),
             unchanged=lambda: file.stamp() == before, **branches,

@@ -31,7 +31,7 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES, MotionClip, frame_rate
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import take_notes
+from athcodec.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
 
 CHUNK_CACHE_BYTES = 64 << 20
@@ -103,7 +103,7 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
         **_branches(file, positions, metadata, options.root),
     )
     _drop_derivable_order(clip)
-    take_notes(clip)
+    read_clip_metadata(clip)
     return clip
 
 

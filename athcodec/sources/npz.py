@@ -23,7 +23,7 @@ import numpy as np
 from athcodec.clip import RESERVED_NAMES, MotionClip, check_finite, check_float_dtype, frame_rate
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import take_notes
+from athcodec.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
 from athcodec.sources.frames import Frames
 from athcodec.sources.raw import raw_frames, read_exactly, watch
@@ -88,7 +88,7 @@ def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
     order = clip.attributes.get("branch_order")
     if order is not None and clip.has_branches and np.array_equal(order, branch_orders(clip.branch_parent)):
         del clip.attributes["branch_order"]
-    take_notes(clip)
+    read_clip_metadata(clip)
     return clip
 
 

@@ -178,7 +178,7 @@ def broken_promises(attack: Attack, folder: Path) -> list[str]:
     except BoundError as error:
         return [] if _may_be_refused(clip, options["max_error"]) else [f"refused without reason: {error}"]
     with athcodec.open(summary.path, strict=True) as decoder:
-        decoder.check()
+        decoder.file.check()
         return list(_broken(decoder, clip, options["max_error"], attack))
 
 
@@ -199,14 +199,14 @@ def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: A
     source = clip.positions
     if decoder.max_error_bound > bound:
         yield f"the file promises {decoder.max_error_bound}, not {bound}"
-    for depth, level in enumerate(decoder.depths):
-        off = distances(decoder.positions(depth=depth), source, bound)
-        stated = decoder.container.errors[depth, :, 0] / bound
+    for level in range(decoder.level_count):
+        off = distances(decoder.positions(level=level), source, bound)
+        stated = decoder.file.errors[level, :, 0] / bound
         for segment, (start, stop) in enumerate(decoder.segments):
             worst = off[start:stop].max()
             if not worst <= stated[segment] * (1 + 1e-6) + 1e-9:
-                yield f"level {depth}, segment {segment}: stated {stated[segment]}, got {worst} bounds"
-        if depth == decoder.level_count - 1 and not off.max() <= 1.0:
+                yield f"level {level}, segment {segment}: stated {stated[segment]}, got {worst} bounds"
+        if level == decoder.level_count - 1 and not off.max() <= 1.0:
             frame, vertex = np.unravel_index(np.argmax(off), off.shape)
             yield f"frame {frame}, vertex {vertex}: {off.max()} bounds off"
     frame = attack.seed % clip.frame_count

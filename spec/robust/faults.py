@@ -53,7 +53,7 @@ class Place:
     def words(self, verb: str, target: Path) -> list[str]:
         """The command line of a verb that writes `target`."""
         given = str(self.source if verb == "encode" else self.encoded)
-        more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--depth", "1"]}
+        more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--level", "1"]}
         return [verb.split()[0], given, str(target), *more.get(verb, [])]
 
     def left_over(self, target: Path) -> list[str]:
@@ -82,7 +82,7 @@ def is_whole(path: Path) -> bool:
     try:
         if path.suffix == ".ath":
             with athcodec.open(path, strict=True) as decoder:
-                decoder.check()
+                decoder.file.check()
         else:
             with athcodec.read_hdf5(path) as clip:
                 clip.block(0, clip.frame_count)
@@ -139,7 +139,7 @@ def _next_run(place: Place, target: Path) -> None:
         athcodec.truncate(place.encoded, target, 1)
     else:
         with athcodec.open(place.encoded) as decoder:
-            athcodec.write_hdf5(target, decoder)
+            athcodec.write_hdf5(decoder, target)
 
 
 # ---- full disks ----

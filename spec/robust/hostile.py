@@ -19,7 +19,8 @@ import numpy as np
 import athcodec
 from athcodec import container as ct
 from athcodec._native import crc32c
-from athcodec.container import Container, Limits
+from athcodec.ath_file import AthFile
+from athcodec.container import Limits
 from athcodec.errors import FormatError, NotAnAthFile, TrailingBytes, Truncated
 from spec.robust import Row, _cases
 from spec.robust._cases import Cases, Wrong
@@ -47,7 +48,7 @@ def valid_files() -> dict[str, bytes]:
 
 def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **options) -> None:
     try:
-        athcodec.open(BytesIO(data), **options).check()
+        athcodec.open(BytesIO(data), **options).file.check()
     except expected as error:
         if "\n" in str(error):
             raise Wrong(f"got more than one line: {error}") from None
@@ -64,7 +65,7 @@ def within_limits(data: bytes) -> int:
 def _whole_clip(data: bytes) -> int:
     """Bytes of all positions, which `use` asks for as doubles."""
     try:
-        header = Container(BytesIO(data), limits=LIMITS).header
+        header = AthFile(BytesIO(data), limits=LIMITS).header
     except FormatError:
         return 0
     return 2 * 24 * header.vertex_count * header.frame_count
@@ -76,7 +77,7 @@ def _whole_clip(data: bytes) -> int:
 @cache
 def _played(data: bytes) -> list[np.ndarray]:
     decoder = athcodec.open(BytesIO(data))
-    return [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+    return [decoder.positions(level=level) for level in range(decoder.level_count)]
 
 
 def prefix_strictly(data: bytes, size: int) -> int:
@@ -85,7 +86,7 @@ def prefix_strictly(data: bytes, size: int) -> int:
 
 
 def prefix_as_a_stream(data: bytes, size: int) -> int:
-    whole = Container(BytesIO(data))
+    whole = AthFile(BytesIO(data))
     if size < whole.prelude_length:
         refused(data[:size], (Truncated, NotAnAthFile))
         return 0
@@ -121,8 +122,8 @@ def flipped_bit(data: bytes, bit: int) -> int:
 
 def checked_bits(data: bytes) -> list[int]:
     """All but those of unknown chunks, whose bytes no decoder reads."""
-    container = Container(BytesIO(data))
-    known = [range(chunk.offset, chunk.offset + chunk.length) for chunk in container.chunks]
+    file = AthFile(BytesIO(data))
+    known = [range(chunk.offset, chunk.offset + chunk.length) for chunk in file.chunks]
     front = range(_tables_end(data))
     return [8 * place + bit for places in [front, *known] for place in places for bit in range(8)]
 
@@ -218,9 +219,9 @@ def seconds_and_bytes(data: bytes) -> tuple[float, int]:
     decoder = athcodec.open(BytesIO(data))
     given = sum(block.nbytes for _, block in decoder.blocks())
     taken = time.perf_counter() - start
-    work = decoder._player.work_size() + decoder._player.segment_size(decoder.level_count - 1)
-    own = len(decoder._player._memory) + len(decoder._player._build) + work * len(decoder.segments)
-    own += CHUNK_BYTES * decoder.container.header.chunk_count
+    work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.level_count - 1)
+    own = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
+    own += CHUNK_BYTES * decoder.file.header.chunk_count
     return taken, len(data) + given + decoder.rest.nbytes + own
 
 

@@ -112,7 +112,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
     sees."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
-    expected = [[decoder.positions(depth=depth) for depth in range(decoder.level_count)] for decoder in shared]
+    expected = [[decoder.positions(level=level) for level in range(decoder.level_count)] for decoder in shared]
 
     def watch(seed: int) -> int:
         rng, wrong = random.Random(seed), 0
@@ -135,11 +135,11 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
 def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
     """Whether a frame or a few, of any level, are what they should be."""
-    depth, frame = rng.randrange(decoder.level_count), rng.randrange(decoder.frame_count)
+    level, frame = rng.randrange(decoder.level_count), rng.randrange(decoder.frame_count)
     if rng.random() < 0.2:
         frames = slice(frame, frame + 10)
-        return np.array_equal(decoder.positions(frames, depth), expected[depth][frames])
-    return np.array_equal(decoder.positions(frame, depth), expected[depth][frame])
+        return np.array_equal(decoder.positions(frames, level), expected[level][frames])
+    return np.array_equal(decoder.positions(frame, level), expected[level][frame])
 
 
 # ---- seeks ----
@@ -157,7 +157,7 @@ def seek_at_random(path: str, seeks: int) -> dict:
     """Growth of memory and of the number of Python's objects over so many seeks and changes of level."""
     rng = random.Random(4)
     with athcodec.open(path) as decoder:
-        expected = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+        expected = [decoder.positions(level=level) for level in range(decoder.level_count)]
 
         def some(count: int) -> int:
             return sum(not _same(decoder, expected, rng) for _ in range(count))
@@ -193,7 +193,7 @@ def open_many(path: str, count: int) -> dict:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
     rng, before, files = random.Random(9), resident_bytes(), _open_files()
     with athcodec.open(path) as decoder:
-        expected = [decoder.positions(depth=depth) for depth in range(decoder.level_count)]
+        expected = [decoder.positions(level=level) for level in range(decoder.level_count)]
     decoders = [athcodec.open(path) for _ in range(count)]
     wrong = sum(not _same(decoder, expected, rng) for decoder in decoders)
     each = (resident_bytes() - before) / count
@@ -263,12 +263,12 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         positions=np.float32(rest + 0.1 * np.sin(angle)[:, None, None] * rest[:, 1:2] ** 2), time=np.arange(40) / 30,
         vertex_branch=np.repeat([0, 1, 2], 4), branch_parent=[-1, 0, 0], rest=rest)
     return {
-        "info": opened(lambda decoder: decoder.info()),
+        "info": opened(lambda decoder: decoder.file.info()),
         "positions": opened(lambda decoder: decoder.positions()),
-        "frames": opened(lambda decoder: [decoder.positions(i, depth) for i in (0, -1) for depth in (0, 1)]),
+        "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
         "static": opened(lambda decoder: (decoder.attributes, decoder.metadata, decoder.edges, decoder.rest)),
-        "check": opened(lambda decoder: decoder.check()),
+        "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),
     }
@@ -285,7 +285,7 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
         out.parent.mkdir()
         expected = lasting.positions()
         calls = _calls(path, str(out)) | {
-            "an open decoder": lambda: [lasting.positions(i, depth) for i in (0, -1) for depth in (1, 0)]}
+            "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]}
         for which, call in calls.items():
             call()  # what is made once is there from now on
             files, n, fired, error = _open_files(), 1, True, None

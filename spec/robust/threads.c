@@ -76,9 +76,9 @@ static void read_file(plant *p, const char *path)
 static void open_plant(plant *p)
 {
     size_t front, size;
-    expect(ath_front(p->bytes, p->size, NULL, &front, &size), "front");
+    expect(ath_front(p->bytes, p->size, NULL, &front, &size, NULL), "front");
     p->file = memory_of(size);
-    expect(ath_open(p->file, size, p->bytes, p->size, NULL), "open");
+    expect(ath_open(p->file, size, p->bytes, p->size, NULL, NULL), "open");
     expect(ath_build(p->file, memory_of(ath_build_size(p->file)), ath_build_size(p->file)), "build");
     ath_get_info(p->file, &p->info);
     pthread_rwlock_init(&p->feeding, NULL);
@@ -131,7 +131,7 @@ static void visit(plant *p, uint32_t *state, int own)
         pthread_rwlock_rdlock(&p->feeding);
         prepare(p, work, segment, level, mine);
         ath_ranges(p->file, level, segment, segment, 1, ranges, 8);
-        expect(ath_check_chunk(p->file, draw(state, p->info.chunk_count)), "chunk");
+        expect(ath_check_chunk(p->file, draw(state, p->info.chunk_count), NULL), "chunk");
         pthread_rwlock_unlock(&p->feeding);
         wrong += look(p, mine, positions) != p->seen[index];
         if (!own) {

@@ -6,7 +6,7 @@ enum { FIXED = 1 << 20 }; /* of any file: models, the struct itself */
 static void read_front(const uint8_t *bytes, size_t size, const ath_limits *limits)
 {
     size_t front = 0, memory = 0, again = 0;
-    int result = ath_front(bytes, size, limits, &front, &memory);
+    int result = ath_front(bytes, size, limits, &front, &memory, NULL);
     REQUIRE(ath_result_name(result)[0] != 'U' || result == ATH_UNSUPPORTED_VERSION || result == ATH_UNKNOWN_CHUNK,
             "every result has a name");
     if (result == ATH_MISSING) {
@@ -18,7 +18,7 @@ static void read_front(const uint8_t *bytes, size_t size, const ath_limits *limi
     REQUIRE(memory <= limits->memory_bytes + tables + FIXED, "memory is bounded by the limits");
     for (size_t cut = front; cut-- > 0; cut = cut * 7 / 8) {
         uint8_t *prefix = fuzz_copy(bytes, cut);
-        REQUIRE(ath_front(prefix, cut, limits, &again, &memory) == ATH_MISSING, "less than the prelude is too little");
+        REQUIRE(ath_front(prefix, cut, limits, &again, &memory, NULL) == ATH_MISSING, "less than the prelude is too little");
         REQUIRE(again > cut && again <= front, "a prefix asks for more, and never for more than the prelude");
         free(prefix);
     }

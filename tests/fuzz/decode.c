@@ -129,7 +129,7 @@ static void ask(user *u, int32_t argument)
     ath_level_error(u->file, level, argument & 2 ? segment : 0, segment, &largest, &rms);
     level = ath_depth_for(u->file, argument & 4 ? segment : 0, segment, argument, 0.02 * argument, 1080.0, 1.0);
     REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
-    for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i);
+    for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i, NULL);
     int32_t last = u->info.vertex_count - 1;
     REQUIRE(ath_vertex_source(u->file)[last] <= last, "vertices are those of the source");
     REQUIRE(ath_branch_source(u->file)[u->info.branch_count - 1] < u->info.branch_count, "so are branches");
@@ -139,7 +139,6 @@ static void ask(user *u, int32_t argument)
     REQUIRE(times[0] <= times[clip->frame_count - 1], "times ascend");
     REQUIRE(ath_clip_named(u->file, clip->name) == argument % u->info.clip_count, "a clip is found by its name");
     REQUIRE(ath_seam_error(u->file, argument % u->info.clip_count, level) >= 0.0, "seams have errors");
-    REQUIRE(ath_fault(u->file) == -1, "an opened file has no fault");
 }
 
 /* Memory that is too small or not aligned, and levels and segments that there are not. */
@@ -163,7 +162,7 @@ static void misuse(user *u, int32_t argument)
     REQUIRE(refuses(u, work, work_size, 0, levels, memory, size, ATH_BAD_ARGUMENT), "no such level");
     REQUIRE(ath_build((ath_file *)(uintptr_t)u->file, memory, 0) == ATH_NO_MEMORY, "too little is seen");
     size = size < 64 ? size : 64;
-    REQUIRE(ath_open(memory, size, u->bytes, u->size, NULL) == ATH_NO_MEMORY, "too little is seen");
+    REQUIRE(ath_open(memory, size, u->bytes, u->size, NULL, NULL) == ATH_NO_MEMORY, "too little is seen");
     free(work);
     free(memory);
     for (int32_t result = -1; result < 72; result += 1 + argument % 3)
@@ -223,7 +222,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint8_t *file = fuzz_copy(data, size - OPTIONS);
     if (options[0] & 3) fuzz_repair(file, size - OPTIONS);
     size_t there = size - OPTIONS, least = there, memory;
-    if (options[0] & 4 && ath_front(file, there, &limits, &least, &memory) == ATH_OK) there = least;
+    if (options[0] & 4 && ath_front(file, there, &limits, &least, &memory, NULL) == ATH_OK) there = least;
     if (fuzz_open(&opened, file, there, &limits, options[2])) {
         use(&opened, file, size - OPTIONS, options);
         fuzz_close(&opened);

@@ -82,10 +82,23 @@ void fuzz_repair(uint8_t *file, size_t size)
 
 static int is_refusal(int result) { return result > ATH_OK && result < ATH_TRAILING_BYTES; }
 
+/* Every refusal says what it is about, in a sentence that the caller's buffer holds. */
+static void check_fault(const ath_fault_info *fault, int result)
+{
+    char text[ATH_FAULT_TEXT];
+    REQUIRE(fault->code == result, "a fault has the code of its result");
+    if (result == ATH_OK) return;
+    REQUIRE(fault->field != ATH_FIELD_NONE, "a refusal names the field");
+    size_t length = ath_fault_text(fault, text, sizeof text);
+    REQUIRE(length < sizeof text && strlen(text) == length && strstr(text, ": got "), "a fault has a sentence");
+}
+
 int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const ath_limits *limits, int fill)
 {
     size_t front = 0, size = 0;
-    int result = ath_front(bytes, available, limits, &front, &size);
+    ath_fault_info fault;
+    int result = ath_front(bytes, available, limits, &front, &size, &fault);
+    check_fault(&fault, result);
     if (result == ATH_MISSING) REQUIRE(front > available, "what is missing is more than what is there");
     if (result != ATH_OK) {
         REQUIRE(result == ATH_MISSING || is_refusal(result), "ath_front gives a code of ath.h");
@@ -93,7 +106,8 @@ int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const a
     }
     REQUIRE(front <= available, "a prelude that was accepted is there");
     opened->file = fuzz_memory(size, fill);
-    result = ath_open(opened->file, size, bytes, available, limits);
+    result = ath_open(opened->file, size, bytes, available, limits, &fault);
+    check_fault(&fault, result);
     if (result != ATH_OK) {
         REQUIRE(is_refusal(result), "ath_open refuses with an error of the file");
         free(opened->file);
@@ -129,7 +143,10 @@ ath_segment *fuzz_prepare(const ath_file *file, int32_t segment, int32_t level, 
         } while (result == ATH_MORE);
     }
     if (result == ATH_BAD_CHECKSUM || result == ATH_BAD_CHUNK) {
-        REQUIRE(ath_work_fault(work) >= 0, "a refusal names its chunk");
+        ath_fault_info fault;
+        ath_work_fault(work, &fault);
+        check_fault(&fault, result);
+        REQUIRE(fault.chunk >= 0, "a refusal names its chunk");
         REQUIRE(ath_prepare_step((ath_work *)work, 1) == ATH_BAD_ARGUMENT, "what was refused cannot go on");
     } else {
         REQUIRE(result == ATH_OK || result == ATH_MISSING, "preparing gives its codes");

@@ -37,7 +37,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(default="*.ath", options={"HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    depth: IntProperty(name="Depth", default=DEEPEST, min=DEEPEST,
+    level: IntProperty(name="Level", default=DEEPEST, min=DEEPEST,
                        description="Level of detail: 0 is the coarsest, -1 the deepest in the file")
     clip: StringProperty(name="Clip", description="The motion to play, of a file that has several: else the first")
     loop: BoolProperty(name="Loop", default=False, description="Begin again after the last frame")
@@ -51,7 +51,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
         for path in paths:
             try:
-                obj = add_object(context, path, self.depth, self.loop, self.set_scene, self.use_relative, self.clip)
+                obj = add_object(context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip)
             except Exception as error:  # of the file, told in one line
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
@@ -76,7 +76,7 @@ class IO_FH_ath(bpy.types.FileHandler):
         return context.area is not None and context.area.type in ("VIEW_3D", "OUTLINER")
 
 
-def add_object(context, path: str, depth: int = DEEPEST, loop: bool = False, set_scene: bool = True,
+def add_object(context, path: str, level: int = DEEPEST, loop: bool = False, set_scene: bool = True,
                use_relative: bool = True, clip: str = ""):
     """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
     path = os.path.normpath(bpy.path.abspath(path))
@@ -90,7 +90,7 @@ def add_object(context, path: str, depth: int = DEEPEST, loop: bool = False, set
         _set_scene(context.scene, decoder, first, rate)
     context.scene.render.use_lock_interface = True  # meshes change while a render goes through the frames
     settings = obj.ath
-    settings.depth, settings.loop, settings.frame_offset, settings.clip = depth, loop, first, decoder.clip.name
+    settings.level, settings.loop, settings.frame_offset, settings.clip = level, loop, first, decoder.clip.name
     relative = use_relative and bpy.data.is_saved
     settings.filepath = player._relative(path, os.path.dirname(bpy.data.filepath)) if relative else path
     player.show(obj, context.scene)

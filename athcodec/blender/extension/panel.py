@@ -24,7 +24,7 @@ class OBJECT_PT_ath(bpy.types.Panel):
             return
         if obj.ath.clip or len(player.clip_names(obj)) > 1:
             layout.prop(obj.ath, "clip")
-        for name in ("depth", "frame_offset", "speed", "loop"):
+        for name in ("level", "frame_offset", "speed", "loop"):
             layout.prop(obj.ath, name)
         problem = player.problem_of(obj)
         if problem:
@@ -39,9 +39,9 @@ class OBJECT_PT_ath(bpy.types.Panel):
             decoder = player.decoder_for(obj)
         except Exception as error:  # shown, not raised while drawing
             return [" ".join(str(error).split())]
-        shown = decoder.depths[player.depth_of(obj, decoder)]
+        shown = decoder.levels[player.level_of(obj, decoder)]
         unit = decoder.metadata.get("unit", "")
-        return [f"level {shown.depth} of 0 to {decoder.deepest}: {shown.nodes:,} nodes",
+        return [f"level {shown.level} of 0 to {decoder.deepest}: {shown.nodes:,} nodes",
                 f"largest error {shown.max_error:.3g} {unit}",
                 f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.vertex_count:,} vertices"]
 

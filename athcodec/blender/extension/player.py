@@ -62,9 +62,9 @@ def problem_of(obj) -> str:
     return _problems.get(obj.name_full, "")
 
 
-def depth_of(obj, decoder) -> int:
+def level_of(obj, decoder) -> int:
     """The level that an object shows: what it asks for, as far as the file has it."""
-    return decoder.deepest if obj.ath.depth == DEEPEST else min(obj.ath.depth, decoder.deepest)
+    return decoder.deepest if obj.ath.level == DEEPEST else min(obj.ath.level, decoder.deepest)
 
 
 def place_in(decoder, settings, scene) -> float:
@@ -81,12 +81,12 @@ def place_in(decoder, settings, scene) -> float:
     return round(place) if abs(place - round(place)) < 1e-4 else place
 
 
-def positions_at(decoder, place: float, depth: int) -> np.ndarray:
+def positions_at(decoder, place: float, level: int) -> np.ndarray:
     """(N, 3) float32; between two frames on the line from one to the other, behind the last of a loop to the first."""
     frame = int(place)
-    positions = decoder.positions(frame % decoder.frame_count, depth, np.float32)
+    positions = decoder.positions(frame % decoder.frame_count, level, np.float32)
     if place > frame:
-        after = decoder.positions((frame + 1) % decoder.frame_count, depth, np.float32)
+        after = decoder.positions((frame + 1) % decoder.frame_count, level, np.float32)
         positions += np.float32(place - frame) * (after - positions)
     return positions
 
@@ -110,7 +110,7 @@ def _show(obj, scene) -> None:
     mesh = obj.data
     if len(mesh.vertices) != decoder.vertex_count:
         raise ValueError(f"the mesh has {len(mesh.vertices)} vertices, the file {decoder.vertex_count}")
-    positions = positions_at(decoder, place_in(decoder, obj.ath, scene), depth_of(obj, decoder))
+    positions = positions_at(decoder, place_in(decoder, obj.ath, scene), level_of(obj, decoder))
     mesh.vertices.foreach_set("co", positions.reshape(-1))
     mesh.update()
 

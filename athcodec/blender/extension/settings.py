@@ -27,8 +27,8 @@ class AthSettings(bpy.types.PropertyGroup):
     clip: StringProperty(
         name="Clip", update=_show, search=_clip_names, search_options=set(),
         description="Which motion of the file, where it has several: its first where none is named")
-    depth: IntProperty(
-        name="Depth", default=DEEPEST, min=DEEPEST, soft_max=16, update=_show,
+    level: IntProperty(
+        name="Level", default=DEEPEST, min=DEEPEST, soft_max=16, update=_show,
         description="Level of detail: 0 is the coarsest, larger is closer to the source, -1 is the deepest in the file")
     frame_offset: FloatProperty(
         name="Start Frame", default=1.0, update=_show, description="The frame of the scene at which the motion begins")

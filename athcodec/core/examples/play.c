@@ -52,6 +52,14 @@ static void check(int result, const char *where)
     if (result != ATH_OK) fail(where, ath_result_name(result));
 }
 
+static void check_fault(const ath_fault_info *fault, const char *where)
+{
+    char text[ATH_FAULT_TEXT];
+    if (fault->code == ATH_OK) return;
+    ath_fault_text(fault, text, sizeof text);
+    fail(where, text);
+}
+
 /* malloc aligns to 16 on 64-bit systems. Where it does not, athcodec says NO_MEMORY: take an aligned allocator. */
 static void *allocate(size_t size)
 {
@@ -75,6 +83,7 @@ static size_t receive(player *p)
 static void open_file(player *p, const char *path, size_t slices)
 {
     size_t front;
+    ath_fault_info fault;
     int result;
     p->download = fopen(path, "rb");
     if (!p->download || fseek(p->download, 0, SEEK_END) != 0) fail(path, "cannot be read");
@@ -82,11 +91,12 @@ static void open_file(player *p, const char *path, size_t slices)
     p->slice = p->length / slices + 1;
     p->bytes = allocate(p->length);
     rewind(p->download);
-    do result = ath_front(p->bytes, p->there, NULL, &front, &p->file_size);
+    do result = ath_front(p->bytes, p->there, NULL, &front, &p->file_size, &fault);
     while (result == ATH_MISSING && receive(p) > 0);
-    check(result, path);
+    check_fault(&fault, path);
     p->file = allocate(p->file_size);
-    check(ath_open(p->file, p->file_size, p->bytes, p->there, NULL), path);
+    ath_open(p->file, p->file_size, p->bytes, p->there, NULL, &fault);
+    check_fault(&fault, path);
     p->build_size = ath_build_size(p->file);
     p->bases = allocate(p->build_size);
     check(ath_build(p->file, p->bases, p->build_size), path);
@@ -183,6 +193,7 @@ static void prepare(player *p, double place)
 {
     int32_t now = ath_blend_at(p->file, place).segment[0];
     double left = (ath_segment_start(p->file, now + 1) - place) * p->drawn_per_frame;
+    ath_fault_info fault;
     int urgent;
     do {
         take_over(p, now);
@@ -190,7 +201,8 @@ static void prepare(player *p, double place)
         if (!p->preparing && !start_next(p, now, left)) return;
         int result = ath_prepare_step(p->work, urgent ? INT32_MAX : p->steps / p->spread + 1);
         if (result == ATH_MORE) return;
-        check(result, "preparing");
+        ath_work_fault(p->work, &fault);
+        check_fault(&fault, "preparing");
         p->preparing = 0;
     } while (urgent);
     take_over(p, now);

@@ -1,8 +1,8 @@
 """Files that take their name only when they are whole, and what dead writers have left of theirs.
 
 A file is written beside its target as `.NAME.XXXXXXXX.part`, under a lock that the system drops when the
-writer dies, and then renamed. Whoever next writes to the same target removes the parts that nobody holds any
-more. Where a file system has no locks, parts of dead writers stay: one of a living writer is never removed.
+writer dies, and then renamed. Whoever next writes to the same target removes the pending files that nobody holds any
+more. Where a file system has no locks, those of dead writers stay: one of a living writer is never removed.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ try:
 except ImportError:  # Windows, where nobody can remove a file that another has open
     fcntl = None
 
-NAME_CHARACTERS = 50  # of the target in the part's name: a name of the longest length has room for the rest too
+NAME_CHARACTERS = 50  # of the target in the pending file's name: a name of the longest length has room for the rest too
 PLAIN_OPEN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
-_PART = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
+_PENDING_NAME = re.compile(r"(\..*\.)[0-9a-f]{8}\.part", re.DOTALL)
 _URL = re.compile(r"[a-z][a-z0-9+.-]+(://|::)", re.IGNORECASE)
 
 
@@ -58,7 +58,7 @@ def is_url(path: object) -> bool:
     return isinstance(path, str) and _URL.match(path) is not None
 
 
-class Part:
+class PendingFile:
     """A file on its way to `path`: it is written as `name`, beside it, until it is complete; `descriptor` is
     open.
 
@@ -98,11 +98,11 @@ class Part:
 
 
 class _Naming(io.FileIO):
-    """The bytes of a part, whose errors name the file that it becomes."""
+    """The bytes of a pending file, whose errors name the file that it becomes."""
 
-    def __init__(self, part: Part):
-        super().__init__(part.descriptor, "w+", closefd=False)
-        self._path = part.path
+    def __init__(self, pending: PendingFile):
+        super().__init__(pending.descriptor, "w+", closefd=False)
+        self._path = pending.path
 
     def write(self, data) -> int | None:
         try:
@@ -115,13 +115,13 @@ class _Naming(io.FileIO):
 def new_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file that replaces `path` when the block ends, and leaves nothing behind when it raises. Raises
     OSError."""
-    part = Part(path)
+    pending = PendingFile(path)
     try:
-        with io.BufferedRandom(_Naming(part)) as out:
+        with io.BufferedRandom(_Naming(pending)) as out:
             yield out
-        part.complete()
+        pending.complete()
     except BaseException:
-        part.discard()
+        pending.discard()
         raise
 
 
@@ -134,11 +134,11 @@ def new_files(path: str | os.PathLike[str], named: bool = True) -> Iterator[str]
     directory, name = os.path.split(path)
     with scratch_folder(path) as folder:
         yield folder
-        made = sorted(os.listdir(folder), key=lambda each: (each == name, each))
+        made = sorted(os.listdir(folder), key=lambda file: (file == name, file))
         if named and name not in made:
             raise FileNotFoundError(f"{path}: the writer has made no such file")
-        for each in made:
-            os.replace(os.path.join(folder, each), os.path.join(directory, each))
+        for file in made:
+            os.replace(os.path.join(folder, file), os.path.join(directory, file))
 
 
 @contextmanager
@@ -194,8 +194,8 @@ def remove_leftovers_of(directory: str, names: Iterable[str]) -> None:
     prefixes = {_prefix(name) for name in names}
     with suppress(OSError):  # a directory that can be written to but not listed
         for found in os.listdir(directory):
-            part = _PART.fullmatch(found)
-            if part and part[1] in prefixes:
+            match = _PENDING_NAME.fullmatch(found)
+            if match and match[1] in prefixes:
                 _remove_if_dead(os.path.join(directory, found))
 
 
@@ -206,17 +206,17 @@ def _prefix(name: str) -> str:
 def _locked_new_file(path: str) -> tuple[str, int]:
     directory, name = os.path.split(path)
     while True:
-        part = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
+        pending = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
         try:
-            descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | PLAIN_OPEN, 0o666)
+            descriptor = os.open(pending, os.O_RDWR | os.O_CREAT | os.O_EXCL | PLAIN_OPEN, 0o666)
         except FileExistsError:
             continue
         if fcntl is None:
-            return part, descriptor
+            return pending, descriptor
         with suppress(OSError):  # a file system without locks
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         if os.fstat(descriptor).st_nlink:
-            return part, descriptor
+            return pending, descriptor
         os.close(descriptor)  # another took it for a leftover before it was locked
 
 

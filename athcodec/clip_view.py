@@ -1,4 +1,4 @@
-"""Some frames of an .ath file at one depth, or all its clips, in the shape of a clip: what exporters write.
+"""Some frames of an .ath file at one level, or all its clips, in the shape of a clip: what exporters write.
 
 It decodes nothing itself (decoder.py) and knows no file format (exporters/).
 """
@@ -11,38 +11,38 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.clip import Span, polygons, span_frames
+from athcodec.clip import ClipRange, clip_range_frames, polygons
 from athcodec.decoder import Affines, Decoder
 from athcodec.errors import LevelUnavailable
 
 
-class Excerpt:
-    """Frames `frames` of `decoder` at level `depth` (None: the deepest complete one), vertices in the source's order.
+class ClipView:
+    """Frames `frames` of `decoder` at `level` (None: the deepest complete one), vertices in the source's order.
 
-    It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the excerpt; time and
+    It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the view; time and
     metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
-    one after the other, as a MotionClip of several spans has them. Raises LevelUnavailable where depth or frames do not
-    exist.
+    one after the other, as a MotionClip of several clip ranges has them. Raises LevelUnavailable where level or
+    frames do not exist.
     """
 
-    def __init__(self, decoder: Decoder, depth: int | None = None, frames: range | None = None, *,
+    def __init__(self, decoder: Decoder, level: int | None = None, frames: range | None = None, *,
                  all_clips: bool = False):
         self.decoder = decoder
-        self.depth = decoder.deepest if depth is None else depth
-        if not 0 <= self.depth < decoder.level_count:
-            raise LevelUnavailable(f"depth: got {depth}; expected 0 to {decoder.level_count - 1}")
+        self.level = decoder.deepest if level is None else level
+        if not 0 <= self.level < decoder.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.level_count - 1}")
         played = [decoder.play(clip.name) for clip in decoder.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
     @property
-    def spans(self) -> tuple[Span, ...]:
+    def clip_ranges(self) -> tuple[ClipRange, ...]:
         """The clips; frames of a loop that are not all it has are no loop."""
-        return tuple(Span(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
+        return tuple(ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
                      for decoder, frames in self._runs)
 
     @property
-    def span_frames(self) -> list[tuple[int, int]]:
-        return span_frames(self.spans)
+    def clip_range_frames(self) -> list[tuple[int, int]]:
+        return clip_range_frames(self.clip_ranges)
 
     @property
     def frame_count(self) -> int:
@@ -62,8 +62,8 @@ class Excerpt:
 
     @property
     def max_error(self) -> float:
-        """The largest distance of any vertex in any frame of its clips at this depth from the source."""
-        return max(decoder.depths[self.depth].max_error for decoder, _ in self._runs)
+        """The largest distance of any vertex in any frame of its clips at this level from the source."""
+        return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)
 
     @property
     def time(self) -> np.ndarray:
@@ -78,7 +78,7 @@ class Excerpt:
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
-        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.joined_metadata)
+        return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
 
     @property
     def rest(self) -> np.ndarray:
@@ -113,25 +113,25 @@ class Excerpt:
         return polygons(self.faces, self.attributes)
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Frames start to stop - 1 of the excerpt, (stop - start, N, 3)."""
+        """Frames start to stop - 1 of the view, (stop - start, N, 3)."""
         found = []
-        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+        for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
             if own:
-                found.append(decoder.positions(slice(own.start, own.stop), self.depth))
+                found.append(decoder.positions(slice(own.start, own.stop), self.level))
         return found[0] if len(found) == 1 else np.concatenate(found)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
         """(start, (k, N, 3)) over all frames, one segment in memory at a time."""
-        for (decoder, frames), (first, _) in zip(self._runs, self.span_frames):
-            for start, block in decoder.blocks(self.depth, frames=slice(frames.start, frames.stop)):
+        for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
+            for start, block in decoder.blocks(self.level, frames=slice(frames.start, frames.stop)):
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """What moves as one in frame `frame` of the excerpt; see Decoder.affines."""
-        for (decoder, frames), (first, last) in zip(self._runs, self.span_frames):
+        """What moves as one in frame `frame` of the view; see Decoder.affines."""
+        for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
-                return decoder.affines(frames[frame - first], self.depth)
+                return decoder.affines(frames[frame - first], self.level)
         raise IndexError(f"frame {frame}: expected 0 to {self.frame_count - 1}")
 
 

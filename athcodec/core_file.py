@@ -1,13 +1,14 @@
 """ath.h in Python: a file opened by the C core, its prepared segments, and what they show.
 
 Every member mirrors a function of core/ath.h, where its contract stands; this module owns the memory, checks sizes and
-turns result codes into the errors of errors.py. It reads no file: whoever uses it feeds the bytes (decoder.py does).
+turns result codes into exceptions. It reads no file: whoever uses it feeds the bytes (ath_file.py does).
 Vertices are in file order unless said otherwise; positions are in scene units.
 """
 
 from __future__ import annotations
 
 import ctypes
+import math
 import threading
 from ctypes import (
     POINTER,
@@ -28,10 +29,14 @@ import numpy as np
 from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
+FAULT_TEXT = 256
 OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
 
 PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
+CHUNK = np.dtype([("bytes", "<u8"), ("offset", "<u8"), ("length", "<u4"), ("checksum", "<u4"), ("segment", "<u4"),
+                  ("kind", "<u2"), ("level", "u1"), ("reserved", "u1")])
+"""ath_chunk"""
 
 
 class Limits(Structure):
@@ -54,9 +59,9 @@ class Info(Structure):
     _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
                 ("origin", c_double * 3)]
     _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
-                                              "level_count full_level_count node_count chunk_count wide").split()]
+                                              "level_count full_level_count node_count chunk_count is_float64").split()]
     _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lam", c_uint32),
-                 ("rest_wide", c_int32)]
+                 ("rest_is_float64", c_int32)]
 
 
 class Clip(Structure):
@@ -67,11 +72,17 @@ class Clip(Structure):
                                               "reserved").split()]
 
 
-class Chunk(Structure):
-    """ath_chunk."""
+class Fault(Structure):
+    """ath_fault_info; its text is one line of English."""
 
-    _fields_ = [("bytes", ctypes.c_void_p), ("offset", c_uint64), ("length", c_uint32), ("checksum", c_uint32),
-                ("segment", c_uint32), ("kind", c_uint16), ("level", c_uint8), ("reserved", c_uint8)]
+    _fields_ = [("code", c_int32), ("field", c_int32), ("chunk", c_int32), ("kind", c_uint16), ("level", c_uint8),
+                ("reserved", c_uint8), ("segment", c_uint32), ("offset", c_uint64), ("found", c_double),
+                ("least", c_double), ("most", c_double)]
+
+    def __str__(self) -> str:
+        text = ctypes.create_string_buffer(FAULT_TEXT)
+        lib.ath_fault_text(byref(self), text, len(text))
+        return text.value.decode()
 
 
 class Range(Structure):
@@ -87,13 +98,23 @@ def aligned(size: int) -> np.ndarray:
     return block[start: start + size]
 
 
-class PlayError(Exception):
-    """A result of the core that is no success: `code` (FORMAT.md, "Errors", or above 63 about the call), and the chunk
-    at fault, or None."""
+class CoreError(Exception):
+    """A result of the core that is no success: `code` (FORMAT.md, "Errors", or above 63 about the call), in words what
+    is at fault."""
 
-    def __init__(self, code: int, chunk: Chunk | None = None):
-        super().__init__(lib.ath_result_name(code).decode())
-        self.code, self.chunk = code, chunk
+    def __init__(self, code: int, fault: Fault | None = None):
+        super().__init__(str(fault) if fault else lib.ath_result_name(code).decode())
+        self.code = code
+
+
+def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
+    """What the front of a file says of which these bytes are there: how many of them ath_open needs, at least, and how
+    much memory it then takes (0: not known yet), with what is missing. Raises CoreError."""
+    there, size, memory, fault = as_bytes(data), c_size_t(), c_size_t(), Fault()
+    result = lib.ath_front(there.ctypes.data, len(there), byref(limits), byref(size), byref(memory), byref(fault))
+    if result not in (OK, MISSING):
+        raise CoreError(result, fault)
+    return size.value, memory.value, fault
 
 
 class Segment:
@@ -115,25 +136,21 @@ class Work:
 
 
 class File:
-    """An opened file. Raises PlayError; safe to read from several threads, each with a Work of its own."""
+    """An opened file. Raises CoreError; safe to read from several threads, each with a Work of its own."""
 
-    def __init__(self, prelude: bytes, limits: Limits):
-        self._prelude = as_bytes(prelude)
-        data, front, size = self._prelude.ctypes.data, c_size_t(), c_size_t()
-        self._check(lib.ath_front(data, len(self._prelude), byref(limits), byref(front), byref(size)))
-        self._memory = aligned(size.value)
+    def __init__(self, prelude: bytes, memory: int, limits: Limits):
+        self._prelude, self._memory, fault = as_bytes(prelude), aligned(memory), Fault()
         self._file = self._memory.ctypes.data
-        result = lib.ath_open(self._file, size.value, data, len(self._prelude), byref(limits))
-        if result != OK:
-            raise PlayError(result, self._chunk(lib.ath_fault(self._file)))
+        self._check(lib.ath_open(self._file, memory, self._prelude.ctypes.data, len(self._prelude), byref(limits),
+                                 byref(fault)), fault)
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self._build, self._building = None, threading.Lock()
 
     @staticmethod
-    def _check(result: int) -> int:
+    def _check(result: int, fault: Fault | None = None) -> int:
         if result not in (OK, HELD):
-            raise PlayError(result)
+            raise CoreError(result, fault)
         return result
 
     def build(self) -> None:
@@ -176,8 +193,33 @@ class File:
         lib.ath_rest_wide(self._file, order, out.ctypes.data, out.strides[0])
         return out
 
-    def _chunk(self, index: int) -> Chunk | None:
-        return ctypes.cast(lib.ath_chunks(self._file), POINTER(Chunk))[index] if index >= 0 else None
+    def chunks(self) -> np.ndarray:
+        """(C,) of CHUNK: the chunk table, unknown optional kinds included."""
+        return self._array(lib.ath_chunks(self._file), CHUNK, self.info.chunk_count)
+
+    def check_chunk(self, index: int, offset: int, data: bytes) -> None:
+        """Compares the checksum of a chunk, which is at this offset of the file, with its bytes; they are not kept."""
+        there, fault = as_bytes(data), Fault()
+        self.feed(there, offset)
+        try:
+            self._check(lib.ath_check_chunk(self._file, index, byref(fault)), fault)
+        finally:
+            self.drop(offset, len(there))
+
+    def errors(self) -> np.ndarray:
+        """(levels, segments, 2) float32: largest and RMS error of each level in each segment, scene units."""
+        shape = self.info.level_count, self.info.segment_count, 2
+        return self._array(lib.ath_errors(self._file), "<f4", math.prod(shape)).reshape(shape)
+
+    def level_error(self, level: int, segments: range) -> tuple[float, float]:
+        """Largest and RMS error of a level in these segments, scene units."""
+        largest, rms = c_double(), c_double()
+        lib.ath_level_error(self._file, level, segments[0], segments[-1], byref(largest), byref(rms))
+        return largest.value, rms.value
+
+    def segment_starts(self, segments: range) -> list[int]:
+        """The first frame of each of these segments, and that behind the last of them."""
+        return [lib.ath_segment_start(self._file, segment) for segment in (*segments, segments.stop)]
 
     def cut(self, level: int) -> np.ndarray:
         """(P,) of PART: what the plant is made of at a level."""
@@ -195,7 +237,7 @@ class File:
         count = lib.ath_ranges(self._file, level, segment, last, 0, None, 0)
         ranges = (Range * count)()
         lib.ath_ranges(self._file, level, segment, last, 0, ranges, count)
-        return [(each.offset, each.size) for each in ranges]
+        return [(found.offset, found.size) for found in ranges]
 
     def feed(self, data: np.ndarray, offset: int) -> None:
         """data: uint8, which the caller keeps until it is dropped."""
@@ -215,10 +257,11 @@ class File:
     def prepare(self, work: Work, segment: int, level: int, into: Segment) -> None:
         """Decodes a segment at a level."""
         self.build()
-        result = lib.ath_prepare(work.memory.ctypes.data, len(work.memory), self._file, segment, level, into.pointer,
-                                 len(into.memory))
+        memory, fault = work.memory.ctypes.data, Fault()
+        result = lib.ath_prepare(memory, len(work.memory), self._file, segment, level, into.pointer, len(into.memory))
         if result != OK:
-            raise PlayError(result, self._chunk(lib.ath_work_fault(work.memory.ctypes.data)))
+            lib.ath_work_fault(memory, byref(fault))
+        self._check(result, fault)
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
@@ -233,6 +276,6 @@ class File:
                                           out.ctypes.data, 12 * out.itemsize))
         return out
 
-    def depth_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
+    def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
         return lib.ath_depth_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)

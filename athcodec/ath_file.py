@@ -1,0 +1,682 @@
+"""An .ath file: its bytes, what all its clips share, and the segments that its core prepares.
+
+Opening reads the prelude; everything else is read when it is asked for. The C core parses and decodes (core_file.py);
+this module feeds it bytes and reads the static data. What one clip shows is the business of decoder.py.
+"""
+
+from __future__ import annotations
+
+import builtins
+import os
+import threading
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec import core_file
+from athcodec._native import WHOLE, as_bytes
+from athcodec.atomic_files import is_url
+from athcodec.clip import check_stem_index
+from athcodec.container import Chunk, Limits
+from athcodec.errors import (
+    BadChecksum,
+    BadChunk,
+    ClipError,
+    ClipUnavailable,
+    FormatError,
+    LevelUnavailable,
+    LimitExceeded,
+    NotAnAthFile,
+    TrailingBytes,
+    Truncated,
+    error_class,
+)
+from athcodec.hierarchy import Hierarchy, derived_edges
+
+INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
+CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of detail of a file.
+
+    Attributes
+    ----------
+    level : int
+        Its number, 0 for the coarsest.
+    nodes : int
+        Parts that the plant is made of: exact stems, and subtrees that move as one.
+    bytes : int
+        Size of the file cut off after this level.
+    max_error, rms_error : float
+        Largest and root-mean-square distance of the vertices from the source, in scene units.
+    available : bool
+        Whether this level and all coarser ones are in the file, undamaged.
+    """
+
+    level: int
+    nodes: int
+    bytes: int
+    max_error: float
+    rms_error: float
+    available: bool
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A clip of a file. Frames and segments are numbered over the whole file, one clip after the other.
+
+    Attributes
+    ----------
+    name : str
+        Empty where the only clip of a file has none.
+    first_frame, frame_count, first_segment, segment_count : int
+        Its place in the file.
+    loop : bool
+        Whether its first frame follows its last.
+    duration : float
+        Seconds from the first frame to the last.
+    seam_errors : tuple of float
+        For a loop, how well each level of the full file keeps the step from the last frame to the first: the most that
+        any vertex's is off, in scene units. Empty for others.
+    """
+
+    name: str
+    first_frame: int
+    frame_count: int
+    first_segment: int
+    segment_count: int
+    loop: bool
+    duration: float
+    seam_errors: tuple[float, ...]
+
+    @property
+    def segments(self) -> range:
+        """Numbers of its segments in the file."""
+        return range(self.first_segment, self.first_segment + self.segment_count)
+
+
+class AthFile:
+    """An opened .ath file, for any number of decoders, one per clip; a context manager.
+
+    Arrays are in the source's order of vertices and branches unless said otherwise, lengths in scene units. Threads may
+    share it.
+
+    Parameters
+    ----------
+    path : str, path-like or binary file object
+        A path, a URL, or a seekable file object, which stays open when this is closed.
+    strict : bool
+        Refuse a file that is shorter or longer than its header says.
+    allow_partial : bool
+        Read all of the file now; a damaged level hides itself and those after it instead of raising.
+    limits : Limits, optional
+        What the file may ask for; by default those of FORMAT.md.
+
+    Attributes
+    ----------
+    limits : Limits
+        What the file may ask for.
+    core : core_file.File
+        The file as the C core has opened it.
+    available_length : int
+        Bytes that are there.
+    bytes_read : int
+        Bytes read so far.
+
+    Raises
+    ------
+    FormatError
+        Where it cannot be decoded: Truncated, BadChecksum, LimitExceeded ...
+    RemoteError, OSError
+        Where it cannot be read.
+    """
+
+    def __init__(self, path: str | os.PathLike[str] | BinaryIO, *, strict: bool = False, allow_partial: bool = False,
+                 limits: Limits | None = None):
+        self.limits = limits or Limits()
+        self.bytes_read = 0
+        self._lock = threading.Lock()
+        self._owned = not hasattr(path, "read")
+        self._source: Any = _opened(path) if self._owned else path
+        try:
+            self.available_length: int = self._source.seek(0, os.SEEK_END)
+            self.core = self._open_core()
+            self._check_length(strict)
+            self._set_tables()
+            self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
+        except BaseException:
+            self.close()
+            raise
+
+    # ---- bytes ----
+
+    def close(self) -> None:
+        """Closes the file where it was opened here."""
+        if self._owned:
+            self._source.close()
+
+    def __enter__(self) -> AthFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def source(self) -> Any:
+        """The file object that the bytes come from. Of a URL: its `requests` and `bytes` count what it has cost."""
+        return self._source
+
+    def _read_some(self, offset: int, length: int) -> bytes:
+        """`length` bytes, or what there is of them: a file may give fewer at a time than it was asked for."""
+        self._source.seek(offset)
+        parts, got = [], 0
+        while got < length and (part := self._source.read(length - got)):
+            parts.append(part)
+            got += len(part)
+        self.bytes_read += got
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def _read(self, offset: int, length: int, what: str) -> bytes:
+        data = self._read_some(offset, length)
+        if len(data) < length:
+            raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
+        return data
+
+    def _prefetch(self, ranges: list[tuple[int, int]]) -> None:
+        """Tells a file that is far away which (offset, size) are read next."""
+        if hasattr(self._source, "prefetch"):
+            self._source.prefetch(ranges)
+
+    def _open_core(self) -> core_file.File:
+        limits, data = core_file.Limits.of(self.limits), b""
+        try:
+            needed, memory, lacking = core_file.front(data, limits)
+            while len(data) < needed:
+                more = self._read_some(len(data), needed - len(data))
+                if not more:
+                    raise Truncated(str(lacking)) if data else NotAnAthFile("file: got no bytes; expected an .ath file")
+                data += more
+                if len(data) < needed or not memory:
+                    needed, memory, lacking = core_file.front(data, limits)
+            return core_file.File(data, memory, limits)
+        except core_file.CoreError as error:
+            raise self._refusal(error) from None
+
+    def _refusal(self, error: core_file.CoreError) -> FormatError:
+        refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
+        return refused(f"{error}{getattr(self._source, 'doubt', '') if refused is BadChecksum else ''}")
+
+    def _check_length(self, strict: bool) -> None:
+        expected, got = self.file_length, self.available_length
+        if strict and got != expected:
+            raise (Truncated if got < expected else TrailingBytes)(f"file: got {got} bytes; expected {expected}")
+
+    @property
+    def file_length(self) -> int:
+        """Bytes that the header announces."""
+        return self.core.info.file_length
+
+    @property
+    def prelude_length(self) -> int:
+        """Bytes in front of the first chunk of motion."""
+        return self.core.info.prelude_length
+
+    @property
+    def complete(self) -> bool:
+        """Whether every byte that the header announces is there."""
+        return self.available_length >= self.file_length
+
+    # ---- chunks ----
+
+    def _set_tables(self) -> None:
+        table = self.core.chunks()
+        self._index = np.flatnonzero(np.isin(table["kind"], list(ct.KIND_NAMES)))  # of the known chunks
+        self._table = table = table[self._index]
+        self._ends = table["offset"] + table["length"]
+        self._is_motion = ct.is_motion(table["kind"])
+        self._is_late = self._is_motion & (self._ends > self.available_length)
+
+    @cached_property
+    def chunks(self) -> list[Chunk]:
+        """The chunk table without unknown kinds, in file order."""
+        return list(map(Chunk, *(self._table[name].tolist() for name in CHUNK_FIELDS), self._index.tolist()))
+
+    def _chunks_of(self, kind: int) -> list[Chunk]:
+        rows = np.flatnonzero(self._table["kind"] == kind)
+        return list(map(Chunk, *(self._table[name][rows].tolist() for name in CHUNK_FIELDS), self._index[rows].tolist()))
+
+    def find(self, kind: int) -> Chunk | None:
+        """The first chunk of a kind, such as the only one of metadata."""
+        return next(iter(self._chunks_of(kind)), None)
+
+    def is_available(self, chunk: Chunk) -> bool:
+        """Whether the chunk's bytes are there."""
+        return chunk.offset + chunk.length <= self.available_length
+
+    def payload(self, chunk: Chunk) -> bytes:
+        """A chunk's bytes as stored.
+
+        Raises
+        ------
+        Truncated
+            Where they are not there.
+        BadChecksum
+            Where they are damaged.
+        """
+        with self._lock:
+            data = self._read(chunk.offset, chunk.length, str(chunk))
+            try:
+                self.core.check_chunk(chunk.index, chunk.offset, data)
+            except core_file.CoreError as error:
+                raise self._refusal(error) from None
+        return data
+
+    def _first_damaged_level(self) -> int:
+        self._prefetch([(0, self.file_length)])
+        for chunk in self.chunks:
+            if chunk.is_motion and self.is_available(chunk):
+                try:
+                    self.payload(chunk)
+                except BadChecksum:
+                    return chunk.level
+        return self.level_count
+
+    # ---- what the file holds ----
+
+    @property
+    def header(self) -> ct.Header:
+        """The fixed header."""
+        return ct.Header(**{field.name: getattr(self.core.info, field.name) for field in fields(ct.Header)})
+
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of the plant, N."""
+        return self.core.info.vertex_count
+
+    @property
+    def branch_count(self) -> int:
+        """Branches of the plant, B."""
+        return self.core.info.branch_count
+
+    @property
+    def frame_count(self) -> int:
+        """Frames of all clips."""
+        return self.core.info.frame_count
+
+    @property
+    def segment_count(self) -> int:
+        """Segments of all clips."""
+        return self.core.info.segment_count
+
+    @property
+    def level_count(self) -> int:
+        """Stored levels: 0 to level_count - 1."""
+        return self.core.info.level_count
+
+    @property
+    def full_level_count(self) -> int:
+        """Levels of the original encoding; more than level_count in a truncated file."""
+        return self.core.info.full_level_count
+
+    @property
+    def max_error_bound(self) -> float:
+        """Largest distance of any vertex in any frame at the deepest stored level, as promised; scene units."""
+        return self.core.info.max_error
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of positions by default: float32, or float64 where the source's precision asked for it."""
+        return np.dtype(np.float64 if self.core.info.is_float64 else np.float32)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """The point that the file's arithmetic is relative to, (3,) float64."""
+        return np.array(self.core.info.origin)
+
+    @property
+    def thresholds(self) -> tuple[float, int, float, int]:
+        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted."""
+        info = self.core.info
+        return info.epsilon, info.eta, info.xi, info.lam
+
+    @cached_property
+    def clips(self) -> tuple[Clip, ...]:
+        """All that the file holds, in its order."""
+        return tuple(Clip(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment,
+                          clip.segment_count, bool(clip.loop), clip.duration,
+                          tuple(self.core.seam_error(index, level) for level in range(self.full_level_count))
+                          if clip.loop else ())
+                     for index, clip in enumerate(self.core.clips()))
+
+    def clip_named(self, name: str) -> Clip:
+        """The clip of this name.
+
+        Raises
+        ------
+        ClipUnavailable
+            Where no clip has it.
+        """
+        found = next((clip for clip in self.clips if clip.name == name), None)
+        if found is None:
+            names = ", ".join(repr(clip.name) for clip in self.clips if clip.name)
+            raise ClipUnavailable(f"clip: got {name!r}; expected {names or 'none, the only one has no name'}")
+        return found
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """Seconds, (T,) float64, of the frames of all clips."""
+        return self.core.times()
+
+    def segment_starts(self, clip: Clip) -> list[int]:
+        """The first frame of each segment of a clip, and that behind its last; counted over the whole file."""
+        return self.core.segment_starts(clip.segments)
+
+    # ---- levels ----
+
+    def available(self, level: int) -> bool:
+        """Whether all segments of all levels up to this one are there and undamaged."""
+        return level < self._first_lacking
+
+    @cached_property
+    def _first_lacking(self) -> int:
+        """The first level that is not all there or damaged."""
+        return int(self._table["level"][self._is_late].min(initial=self._damaged_from))
+
+    @property
+    def deepest(self) -> int:
+        """The deepest complete level.
+
+        Raises
+        ------
+        Truncated
+            Where not even level 0 is complete.
+        """
+        if self._first_lacking == 0:
+            raise Truncated(f"level 0: got {self.available_length} bytes; expected at least {self._level_end(0)}")
+        return self._first_lacking - 1
+
+    @cached_property
+    def missing(self) -> str:
+        """One line on what a cut-off or damaged file lacks; empty when nothing."""
+        late = self._table[self._is_late]
+        parts = []
+        for level in np.unique(late["level"]).tolist():
+            segments = late["segment"][late["level"] == level]
+            first, last = int(segments.min()), int(segments.max())
+            parts.append(f"level {level}: " + (f"segments {first}-{last}" if first < last else f"segment {first}"))
+        if self._damaged_from < self.level_count:
+            parts.append(f"damaged from level {self._damaged_from}")
+        if not self.complete and not parts:
+            parts.append("attributes behind the motion")
+        return "; ".join(parts)
+
+    def _level_end(self, level: int) -> int:
+        """Bytes of the file cut off after a level."""
+        kept = ct.is_prelude(self._table["kind"]) | (self._is_motion & (self._table["level"] <= level))
+        return int(self._ends[kept].max())
+
+    def nodes_at(self, level: int) -> int:
+        """Parts that the plant is made of at a level: exact stems, and subtrees that move as one."""
+        parts = self.core.cut(level)
+        return len(self.exact_branches(parts)) + int((parts["branch"] >= 0).sum())
+
+    def exact_branches(self, parts: np.ndarray) -> np.ndarray:
+        """Branches whose stems are exact in a cut (core_file.PART), ascending, in file order."""
+        runs = parts[parts["branch"] < 0]
+        run = np.searchsorted(runs["first"], self.branches["first"], "right") - 1
+        ends = np.append(runs["first"] + runs["count"], 0)  # -1: before the first run
+        return np.flatnonzero(self.branches["first"] < ends[run])
+
+    @property
+    def levels(self) -> list[Level]:
+        """The stored levels, coarse to fine, with their errors in all clips."""
+        return self.levels_in(range(self.segment_count))
+
+    def levels_in(self, segments: range) -> list[Level]:
+        """The stored levels, coarse to fine, with their errors in some segments of the file."""
+        return [Level(level, self.nodes_at(level), self._level_end(level), *self.core.level_error(level, segments),
+                      self.available(level)) for level in range(self.level_count)]
+
+    @cached_property
+    def errors(self) -> np.ndarray:
+        """Largest and RMS error of each level in each segment, (levels, segments, 2) float64, scene units."""
+        return self.core.errors().astype(np.float64)
+
+    def table1(self) -> dict[str, float]:
+        """Table 1 of the paper: depth (levels of nodes), nodes, leaves and the four thresholds of the ATH."""
+        branches = self.branches
+        whole, inside = branches["flags"] & WHOLE > 0, np.zeros(len(branches) + 1, np.int64)
+        np.add.at(inside, np.flatnonzero(whole) + 1, 1)
+        np.add.at(inside, (np.arange(len(branches)) + branches["subtree"])[whole], -1)
+        is_node = np.cumsum(inside)[:-1] == 0
+        leaf = is_node & (whole | (branches["subtree"] == 1))
+        epsilon, eta, xi, lam = self.thresholds
+        return {"depth": int(branches["depth"][is_node].max()) + 1, "nodes": self.core.info.node_count,
+                "leaves": int(leaf.sum()), "epsilon": epsilon, "eta": eta, "xi": xi, "lam": lam}
+
+    def info(self) -> dict[str, Any]:
+        """What `athcodec info --json` prints: of the whole file, all clips together."""
+        first = self.clips[0]
+        return {
+            "vertices": self.vertex_count, "frames": self.frame_count, "fps": median_rate(self.time[: first.frame_count]),
+            "branches": self.branch_count, "segments": self.segment_count, "nodes": self.core.info.node_count,
+            "bytes": self.file_length, "available_bytes": self.available_length,
+            "max_error_bound": self.max_error_bound, "complete": self.complete,
+            "full_level_count": self.full_level_count, "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
+            "clips": [{"name": clip.name, "frames": clip.frame_count, "segments": clip.segment_count,
+                       "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors),
+                       "max_errors": [level.max_error for level in self.levels_in(clip.segments)]}
+                      for clip in self.clips],
+            "levels": [asdict(level) for level in self.levels],
+        }
+
+    # ---- static data, in the source's numbering ----
+
+    @cached_property
+    def branches(self) -> np.ndarray:
+        """Records of the branches in file order, (B,) of _native.BRANCH."""
+        return self.core.branches()
+
+    @cached_property
+    def hierarchy(self) -> Hierarchy:
+        """The branches in file order and how they hang on each other."""
+        return Hierarchy.from_parts(self.branches["parent"], self.branches["count"], self.branches["attach"],
+                                    self.core.vertex_source(), self.core.branch_source())
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Rest pose as decoded, (N, 3), float32 or float64 as the source had it."""
+        with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
+            dtype = np.float64 if self.core.info.rest_is_float64 else np.float32
+            return self.core.rest(core_file.SOURCE_ORDER).astype(dtype, copy=False)
+
+    @cached_property
+    def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.hierarchy.source_branches()
+
+    @property
+    def vertex_branch(self) -> np.ndarray:
+        """The branch of each vertex, (N,) int32."""
+        return self._source_branches[0]
+
+    @property
+    def branch_parent(self) -> np.ndarray:
+        """The parent of each branch, (B,) int32, -1 for a root."""
+        return self._source_branches[1]
+
+    @property
+    def stem_index(self) -> np.ndarray | None:
+        """Place of each vertex on its stem, (N,) int32, where the source's numbering does not say it, else None."""
+        vertex_branch, _, places = self._source_branches
+        return check_stem_index(places, vertex_branch)
+
+    @cached_property
+    def faces(self) -> np.ndarray | None:
+        """Vertex numbers of the corners, (F, k) of the source's integer type, or None."""
+        return self._indices(ct.FACES, "FACES")
+
+    @cached_property
+    def edges(self) -> np.ndarray | None:
+        """Vertex numbers of both ends, (E, 2) of the source's integer type, or None."""
+        return self._indices(ct.EDGES, "EDGES")
+
+    def _indices(self, kind: int, name: str) -> np.ndarray | None:
+        chunk = self.find(kind)
+        if chunk is None:
+            return None
+        head, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
+        if array is None and kind == ct.EDGES:
+            return derived_edges(self.hierarchy).astype(self._derived_dtype(head))
+        if array is None or array.ndim != 2 or array.dtype.kind not in "iu" or (
+                kind == ct.EDGES and array.shape[1] != 2) or (
+                array.size and (array.min() < 0 or array.max() >= self.vertex_count)):
+            raise BadChunk(f"{name}: got {ct.brief(head)}; expected rows of vertex numbers")
+        return array
+
+    def _derived_dtype(self, head: dict[str, Any]) -> np.dtype:
+        if head.get("derived") not in INTEGER_TYPES or np.iinfo(head["derived"]).max < self.vertex_count - 1:
+            raise BadChunk(f"EDGES: got {ct.brief(head)}; expected an array or a type that holds derived edges")
+        return np.dtype(head["derived"])
+
+    @cached_property
+    def metadata(self) -> dict[str, Any]:
+        """Unit, up axis and whatever else the sources of all clips said of themselves, as `join` puts it together."""
+        chunk = self.find(ct.METADATA)
+        return ct.parse_metadata(self.payload(chunk), self.limits) if chunk else {}
+
+    @cached_property
+    def attributes(self) -> dict[str, np.ndarray]:
+        """Named static arrays, unchanged. Those of a file that was cut off before them are left out."""
+        result: dict[str, np.ndarray] = {}
+        for chunk in self._chunks_of(ct.ATTRIBUTE):
+            if not self.is_available(chunk):
+                continue
+            if len(result) >= self.limits.attributes:
+                raise LimitExceeded(f"{chunk}: got more than {self.limits.attributes} attributes")
+            data = self.payload(chunk)
+            name = ct.array_name(data, str(chunk), self.limits)
+            _, array = ct.parse_array(data, str(chunk), self.limits)
+            if array is None or name in result:
+                raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice or without data")
+            result[name] = array
+            total = sum(array.nbytes for array in result.values())
+            if total > self.limits.memory_bytes:
+                raise LimitExceeded(f"{chunk}: got {total} bytes of attributes; the limit is "
+                                    f"{self.limits.memory_bytes}")
+        return result
+
+    @property
+    def error_weights(self) -> np.ndarray | None:
+        """Factors on the bound that the file was encoded with, (N,) float64, or None.
+
+        Vertex v is within max_error_bound * error_weights[v] / error_weights.max() at the deepest level of the full
+        file.
+        """
+        name = self.metadata.get("error_weights")
+        array = self.attributes.get(name) if isinstance(name, str) else None
+        if array is None or array.size != self.vertex_count or array.dtype.kind not in "biuf":
+            return None
+        weights = array.reshape(-1).astype(np.float64)
+        return weights if np.isfinite(weights).all() and weights.min() > 0 else None
+
+    # ---- segments ----
+
+    @cached_property
+    def _work(self) -> core_file.Work:
+        return core_file.Work(self.core.work_size())
+
+    def prefetch(self, segments: range, level: int) -> None:
+        """Fetches what these segments need at a level from a file that is far away."""
+        with self._lock:
+            self._prefetch(self.core.missing(level, segments[0], segments[-1]))
+
+    def prepare(self, segment: int, level: int, spare: core_file.Segment | None = None) -> core_file.Segment:
+        """Decodes a segment of the file at a level.
+
+        Parameters
+        ----------
+        segment : int
+            Counted over the whole file.
+        level : int
+            One that is stored.
+        spare : core_file.Segment, optional
+            A prepared segment that nobody needs any more; its memory is taken where it is large enough.
+
+        Returns
+        -------
+        core_file.Segment
+            What `core.positions` and `core.matrices` show.
+
+        Raises
+        ------
+        LevelUnavailable
+            Where the file was cut off before it.
+        FormatError
+            Where it is damaged, or needs more memory than is allowed.
+        """
+        size = self.core.segment_size(level)
+        needed, limit = size + self.core.work_size(), self.limits.memory_bytes
+        if needed > limit:
+            raise LimitExceeded(f"level {level}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
+        ready = spare if spare is not None and len(spare.memory) >= size else core_file.Segment(size)
+        with self._lock:
+            self._decode(segment, level, ready)
+        return ready
+
+    def _decode(self, segment: int, level: int, ready: core_file.Segment) -> None:
+        missing = self.core.missing(level, segment)
+        if any(offset + size > self.available_length for offset, size in missing):
+            raise LevelUnavailable(f"level {level}, segment {segment}: not in the file; it is cut off at "
+                                   f"{self.available_length} of {self.file_length} bytes")
+        self._prefetch(missing)
+        pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in missing]
+        try:
+            for (offset, _), data in zip(missing, pieces):
+                self.core.feed(data, offset)
+            self.core.prepare(self._work, segment, level, ready)
+        except core_file.CoreError as error:
+            raise self._refusal(error) from None
+        finally:
+            for offset, size in missing:
+                self.core.drop(offset, size)
+
+    def check(self) -> None:
+        """Reads every chunk and decodes every level.
+
+        Raises
+        ------
+        FormatError
+            The first fault that is met.
+        """
+        if not self.complete:
+            raise Truncated(f"file: got {self.available_length} bytes; expected {self.file_length}; {self.missing}")
+        with self._lock:
+            self._prefetch([(0, self.file_length)])
+        for chunk in self.chunks:
+            self.payload(chunk)
+        try:
+            _ = self.metadata, self.faces, self.edges, self.attributes
+        except ClipError as error:
+            raise BadChunk(f"static data: {error}") from None
+        ready = None
+        for segment in range(self.segment_count):
+            for level in range(self.level_count):
+                ready = self.prepare(segment, level, ready)
+
+
+def _opened(path: Any) -> Any:
+    if is_url(path):
+        from athcodec.remote import Remote  # what it needs takes long to import
+
+        return Remote(path)
+    return builtins.open(os.fspath(path), "rb")
+
+
+def median_rate(time: np.ndarray) -> float:
+    """Median frame rate of times in seconds, frames per second; 0 for a single frame."""
+    return float(1 / np.median(np.diff(time))) if len(time) > 1 else 0.0
