@@ -421,7 +421,7 @@ def test_the_core_reads_many_fronts_as_the_container_does(data):
 def test_the_core_asks_for_more_of_any_front_that_is_not_whole(data):
     prelude = Container(BytesIO(data)).prelude_length
     for size in range(prelude):
-        with pytest.raises(player.PlayError, match="MISSING") as caught:
+        with pytest.raises(player.PlayError, match="got [0-9]+ bytes; expected [0-9]+") as caught:
             player.File(data[:size], player.Limits.of(Limits()))
         assert caught.value.code == player.MISSING == 66
     assert player.File(data[:prelude], player.Limits.of(Limits())).info.file_length == len(data)
