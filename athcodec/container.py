@@ -86,7 +86,7 @@ class Header:
     level_count: int
     full_level_count: int
     max_error: float
-    wide: bool = False
+    is_float64: bool = False
     clip_count: int = 1
     chunk_count: int = 0
     file_length: int = 0
@@ -117,7 +117,7 @@ class Chunk:
 def _pack_header(header: Header, checksum: int) -> bytes:
     return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
                         header.branch_count, header.frame_count, header.segment_count, header.level_count,
-                        header.full_level_count, header.clip_count, int(header.wide), header.max_error, 0)
+                        header.full_level_count, header.clip_count, int(header.is_float64), header.max_error, 0)
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
@@ -379,7 +379,7 @@ def truncated_front(container: Container, level: int) -> tuple[bytes, list[Chunk
     errors = container.errors[: level + 1]
     promise = header.max_error if level + 1 == header.full_level_count else float(errors[level, :, 0].max())
     shorter = Header(header.vertex_count, header.branch_count, header.frame_count, header.segment_count, level + 1,
-                     header.full_level_count, promise, header.wide, header.clip_count)
+                     header.full_level_count, promise, header.is_float64, header.clip_count)
     return pack_front(shorter, chunks, errors), chunks
 
 
@@ -433,8 +433,8 @@ class Rest:
 
 
 def pack_rest(rest: Rest) -> bytes:
-    wide = rest.source_dtype == np.float64
-    return _REST.pack(int(rest.exact), int(wide), 0, *rest.origin, rest.step) + rest.stream
+    is_float64 = rest.source_dtype == np.float64
+    return _REST.pack(int(rest.exact), int(is_float64), 0, *rest.origin, rest.step) + rest.stream
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:

@@ -266,7 +266,7 @@ class Decoder:
     @property
     def dtype(self) -> np.dtype:
         """Type of positions by default: float32, or float64 where the source's precision asked for it."""
-        return np.dtype(np.float64 if self.container.header.wide else np.float32)
+        return np.dtype(np.float64 if self.container.header.is_float64 else np.float32)
 
     @property
     def fps(self) -> float:
@@ -400,7 +400,7 @@ class Decoder:
     @property
     def rest(self) -> np.ndarray:
         """Rest pose as decoded, (N, 3), float32 or what the source had."""
-        dtype = np.float64 if self._player.info.rest_wide else np.float32
+        dtype = np.float64 if self._player.info.rest_is_float64 else np.float32
         with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
             return self._player.rest(player.SOURCE_ORDER).astype(dtype, copy=False)
 
