@@ -21,8 +21,8 @@ SHEET, LOOSE, WHOLE = 1, 2, 4
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
 PIECE = np.dtype(
-    [(name, "<i8") for name in ("modes", "basis", "carrier")]
-    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_carried "
+    [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
+    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_attached "
                                   "reserved").split()]
 )
 NODE = np.dtype(
@@ -35,7 +35,7 @@ class CorePlan(ctypes.Structure):
     """ath_plan."""
 
     _fields_ = [(name, c_int32) for name in ("vertex_count", "branch_count", "piece_count", "node_count")]
-    _fields_ += [("carrier_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
+    _fields_ += [("attach_cache_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
     _fields_ += [(name, c_void_p) for name in ("branches", "pieces", "nodes", "rest", "bases")]
 
 
@@ -49,7 +49,7 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "carriers", "work")]
+    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work")]
     _fields_ += [("frames", c_int32), ("reserved", c_int32)]
 
 
@@ -107,7 +107,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
-    "ath_carrier_size": (c_size_t, [c_int64, c_int32]),
+    "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [c_int32, c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
                                c_double, c_void_p, c_void_p, c_void_p]),

@@ -201,7 +201,7 @@ class SegmentMotion:
         self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
         self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(core.node_count, np.int32)
-        self._carriers = np.empty(lib.ath_carrier_size(core.carrier_rows, frames))
+        self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
         self.cosines = cosine_basis(frames)
         self._bind()
 
@@ -214,7 +214,7 @@ class SegmentMotion:
             c_stream.step, c_stream.omega = stream.step, stream.omega
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-                             carriers=self._carriers.ctypes.data, frames=self.frames)
+                             attach_caches=self._attach_caches.ctypes.data, frames=self.frames)
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
         if self.shapes is not None:

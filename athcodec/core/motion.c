@@ -13,7 +13,7 @@ size_t ath_motion_work(int32_t longest, int32_t frames)
     return 2 * scratch_rows(longest, frames) + (3 + 9 + 3) * (size_t)frames;
 }
 
-size_t ath_carrier_size(int64_t carrier_rows, int32_t frames) { return (size_t)carrier_rows * 3 * (size_t)frames; }
+size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames) { return (size_t)attach_cache_rows * 3 * (size_t)frames; }
 
 ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
 {
@@ -27,20 +27,20 @@ ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
     return scratch;
 }
 
-static double *carried_vertices(const ath_motion *motion, const ath_piece *piece)
+static double *cached_vertices(const ath_motion *motion, const ath_piece *piece)
 {
-    return motion->carriers + ath_carrier_size(piece->carrier, motion->frames);
+    return motion->attach_caches + ath_attach_cache_size(piece->attach_cache, motion->frames);
 }
 
-static const double *carried_vertex(const ath_motion *motion, const ath_piece *piece, int32_t vertex)
+static const double *cached_vertex(const ath_motion *motion, const ath_piece *piece, int32_t vertex)
 {
-    return motion->carriers + ath_carrier_size(piece->carrier + vertex - piece->first, motion->frames);
+    return motion->attach_caches + ath_attach_cache_size(piece->attach_cache + vertex - piece->first, motion->frames);
 }
 
-static ath_frames carried_frames(const ath_motion *motion, const ath_piece *piece)
+static ath_frames cached_frames(const ath_motion *motion, const ath_piece *piece)
 {
     ath_frames at;
-    at.rotation = motion->carriers + ath_carrier_size(piece->carrier + piece->count, motion->frames);
+    at.rotation = motion->attach_caches + ath_attach_cache_size(piece->attach_cache + piece->count, motion->frames);
     at.point = at.rotation + 9 * (size_t)motion->frames;
     return at;
 }
@@ -123,14 +123,14 @@ void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece 
         return;
     }
     const ath_piece *parent = plan->pieces + piece->parent;
-    ath_frames base = carried_frames(motion, parent);
-    const double *here = carried_vertex(motion, parent, piece->attach);
+    ath_frames base = cached_frames(motion, parent);
+    const double *here = cached_vertex(motion, parent, piece->attach);
     copy_rows(at.point, here, 3 * (size_t)T);
     if (!(parent->flags & ATH_SHEET)) {
         int32_t last = parent->first + parent->count - 1;
         int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, last);
-        const double *from = before < parent->first ? base.point : carried_vertex(motion, parent, before);
-        const double *to = carried_vertex(motion, parent, after);
+        const double *from = before < parent->first ? base.point : cached_vertex(motion, parent, before);
+        const double *to = cached_vertex(motion, parent, after);
         const double *rest_from = before < parent->first ? ath_rest_attach(plan, parent) : ath_rest_of(plan, before);
         const double *rest_to = ath_rest_of(plan, after);
         double tangent[3], length2 = 0.0;
@@ -359,8 +359,8 @@ static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *pi
 static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
-    if (piece->carrier < 0) return;
-    ath_frames at = carried_frames(motion, piece);
+    if (piece->attach_cache < 0) return;
+    ath_frames at = cached_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
     if (piece->flags & ATH_SHEET)
         turn_with_sheet(plan, T, piece, scratch, at.rotation);
@@ -428,7 +428,7 @@ static const double *place_used(const ath_plan *plan, const ath_motion *motion, 
                                 const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
-    if (piece->carrier >= 0) here.placed = carried_vertices(motion, piece);
+    if (piece->attach_cache >= 0) here.placed = cached_vertices(motion, piece);
     place(plan, motion, piece, rows, used, &here);
     carry(plan, motion, piece, &here);
     return here.placed;

@@ -17,7 +17,7 @@ typedef struct ath_stream {
 typedef struct ath_motion {
     const ath_stream *streams; /* one per level, 0 to height + 1 */
     const double *cosines;     /* frames x frames */
-    double *carriers;          /* ath_carrier_size(carrier_rows, frames) doubles */
+    double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
     int32_t frames;
     int32_t reserved;
@@ -58,7 +58,7 @@ typedef struct {
 } ath_scratch;
 
 ATH_ENCODER_API size_t ath_motion_work(int32_t longest, int32_t frames);
-ATH_ENCODER_API size_t ath_carrier_size(int64_t carrier_rows, int32_t frames);
+ATH_ENCODER_API size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames);
 
 ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion);
 void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, ath_frames at);

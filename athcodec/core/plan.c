@@ -71,29 +71,29 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
         piece->flags = j == 0 ? branch->flags : branch->flags & ~ATH_LOOSE;
         piece->rank = piece->count;
         piece->low_level = -1;
-        piece->carrier = piece->last_carried = -1;
+        piece->attach_cache = piece->last_attached = -1;
         for (int32_t v = piece->first; v < piece->first + piece->count; v++) piece_of_vertex[v] = next + j;
     }
 }
 
-/* Carriers on a stack: in depth-first order those on top are done with first. One goes when its last piece has been
+/* Attach caches on a stack: in depth-first order those on top are done with first. One goes when its last piece has been
  * attached, before that piece is kept itself, so that a long chain never holds more than one. */
-static void place_carriers(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
+static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
 {
     int64_t used = 0;
     int32_t height = 0;
-    plan->carrier_rows = 0;
+    plan->attach_cache_rows = 0;
     plan->longest = 0;
     for (int32_t p = 0; p < plan->piece_count; p++) plan->longest = ath_max(plan->longest, pieces[p].count);
     for (int32_t p = 0; p < plan->piece_count; p++)
-        if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_carried = p;
+        if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_attached = p;
     for (int32_t p = 0; p < plan->piece_count; p++) {
-        while (!keep && height > 0 && pieces[stack[height - 1]].last_carried <= p) used = pieces[stack[--height]].carrier;
-        if (pieces[p].last_carried < 0) continue;
+        while (!keep && height > 0 && pieces[stack[height - 1]].last_attached <= p) used = pieces[stack[--height]].attach_cache;
+        if (pieces[p].last_attached < 0) continue;
         stack[height++] = p;
-        pieces[p].carrier = used;
-        used += pieces[p].count + ATH_CARRIER_FRAMES;
-        if (used > plan->carrier_rows) plan->carrier_rows = used;
+        pieces[p].attach_cache = used;
+        used += pieces[p].count + ATH_ATTACH_CACHE_FRAMES;
+        if (used > plan->attach_cache_rows) plan->attach_cache_rows = used;
     }
 }
 
@@ -133,7 +133,7 @@ void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t 
         for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].level = level;
         next_piece += parts;
     }
-    place_carriers(plan, pieces, memory, keep);
+    place_attach_caches(plan, pieces, memory, keep);
 }
 
 /* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes

@@ -9,7 +9,7 @@
 typedef struct ath_piece {
     int64_t modes;        /* its cantilever modes in the bases */
     int64_t basis;        /* its basis: `rank` rows of `count` */
-    int64_t carrier;      /* where what it carries is kept, in vertices; -1 when nothing hangs on it */
+    int64_t attach_cache; /* where its frames are kept for the pieces that hang on it, in vertices; -1: none does */
     int32_t first, count; /* vertices */
     int32_t parent;       /* piece, -1 for a root */
     int32_t attach;       /* vertex, -1 for a root */
@@ -19,7 +19,7 @@ typedef struct ath_piece {
     int32_t level;        /* whose stream completes it */
     int32_t low_level;    /* whose stream holds its tracks and first modes, -1 when `level` does */
     int32_t low_modes;
-    int32_t last_carried; /* last piece that hangs on it, -1: none */
+    int32_t last_attached; /* last piece that hangs on it, -1: none */
     int32_t reserved;
 } ath_piece;
 
@@ -35,7 +35,7 @@ typedef struct ath_node {
 
 typedef struct ath_plan {
     int32_t vertex_count, branch_count, piece_count, node_count;
-    int64_t carrier_rows; /* memory of carriers, in vertices */
+    int64_t attach_cache_rows; /* memory of all attach caches, in vertices */
     int32_t height;       /* deepest node: levels run from 0 to height + 1 */
     int32_t longest;      /* vertices of the longest piece */
     const ath_branch *branches;
@@ -45,16 +45,16 @@ typedef struct ath_plan {
     const double *bases;
 } ath_plan;
 
-/* Frames of a carrier take the place of four vertices: an attach point, a rotation. */
-enum { ATH_CARRIER_FRAMES = 4 };
+/* The frames of an attach cache, an attach point and a rotation, take the place of four vertices. */
+enum { ATH_ATTACH_CACHE_FRAMES = 4 };
 
 /* Completes first, subtree and depth of the branches and counts their pieces; 0 when they are no valid hierarchy. */
 ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
 ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
 
-/* Fills pieces and nodes, and height, longest and carrier_rows of `plan`, whose branches and counts are set. Carriers
- * are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has come. `memory`:
- * scratch, vertex_count. */
+/* Fills pieces and nodes, and height, longest and attach_cache_rows of `plan`, whose branches and counts are set.
+ * Attach caches are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has come.
+ * `memory`: scratch, vertex_count. */
 ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */

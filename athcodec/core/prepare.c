@@ -109,7 +109,7 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
     work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
-    work->motion.carriers = (double *)ath_take(&arena, (uint64_t)file->plan.carrier_rows * 3 * T * sizeof(double));
+    work->motion.attach_caches = (double *)ath_take(&arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
     return arena.used;
 }
 
