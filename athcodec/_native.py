@@ -42,7 +42,7 @@ class CorePlan(ctypes.Structure):
 class Stream(ctypes.Structure):
     """ath_stream."""
 
-    _fields_ = [("step", c_double), ("omega", c_double), ("temporal", c_void_p), ("temporal_rank", c_int32),
+    _fields_ = [("step", c_double), ("rotation_step_factor", c_double), ("temporal", c_void_p), ("temporal_rank", c_int32),
                 ("reserved", c_int32)]
 
 

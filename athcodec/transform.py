@@ -211,7 +211,7 @@ class SegmentMotion:
         for c_stream, stream in zip(self._c_streams, self.streams):
             temporal = self.cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
             self._temporal.append(temporal)
-            c_stream.step, c_stream.omega = stream.step, stream.omega
+            c_stream.step, c_stream.rotation_step_factor = stream.step, stream.omega
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
                              attach_caches=self._attach_caches.ctypes.data, frames=self.frames)

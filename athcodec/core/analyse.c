@@ -108,9 +108,9 @@ static void to_quaternion(const double R[9], double q[4])
     for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
 }
 
-/* The piece's own rotation against its predicted one, as omega over time, unwrapped. `local`: its vertices relative to
+/* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its vertices relative to
  * the attach point, in the predicted frame. */
-static void fit_omega(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local, double *omega)
+static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local, double *omega)
 {
     const double *a = ath_rest_attach(plan, piece);
     double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
@@ -190,7 +190,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
-    double omega_step = ath_omega_step(plan, piece, base);
+    double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
@@ -201,9 +201,9 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         ath_move_point(T, scratch->track, scratch->at.point);
     }
     to_local(T, piece, &scratch->at, source, local);
-    if (omega_step > 0.0) {
-        fit_omega(plan, T, piece, local, scratch->track);
-        code_track(base, T, omega_step, dead_zone, scratch->track, rows->omega);
+    if (rotation_step > 0.0) {
+        fit_rotation(plan, T, piece, local, scratch->track);
+        code_track(base, T, rotation_step, dead_zone, scratch->track, rows->rotation);
         ath_turn(T, scratch->track, scratch->at.rotation);
         to_local(T, piece, &scratch->at, source, local);
     }

@@ -414,7 +414,7 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 {
     if (chunk.size < 8 || chunk.bytes[4] > 4) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes);
-    head->omega = (double)(1 << chunk.bytes[4] >> 1);
+    head->rotation_step_factor = (double)(1 << chunk.bytes[4] >> 1);
     head->bits = chunk.bytes[5];
     head->rank = (int32_t)u16_at(chunk.bytes + 6);
     head->basis = *body = rest_of(chunk, 8);

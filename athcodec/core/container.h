@@ -61,7 +61,7 @@ typedef struct {
 typedef int32_t ath_time_method;
 
 typedef struct {
-    double step, omega;
+    double step, rotation_step_factor;
     int32_t bits, rank;
     ath_bytes basis;
 } ath_stems_head;

@@ -25,7 +25,7 @@ ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_inte
 {
     ath_piece_rows rows;
     rows.modes = ath_row(integers->coefficients, plan->pieces[p].first, frames);
-    rows.omega = ath_row(integers->tracks, 2 * p, frames);
+    rows.rotation = ath_row(integers->tracks, 2 * p, frames);
     rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
     rows.counts = 0;
     rows.shape_count = integers->shape_counts ? integers->shape_counts[p] : 0;

@@ -368,8 +368,8 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
 }
 
-/* omega is weighted by its lever, so that its error moves the piece's vertices like any other coefficient's. */
-double ath_omega_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
+/* The rotation is weighted by its lever, so that its error moves the piece's vertices like any other coefficient's. */
+double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
 {
     const double *a = ath_rest_attach(plan, piece);
     double lever2 = 0.0;
@@ -377,8 +377,8 @@ double ath_omega_step(const ath_plan *plan, const ath_piece *piece, const ath_st
         const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t k = 0; k < 3; k++) lever2 = lever2 + (x0[k] - a[k]) * (x0[k] - a[k]);
     }
-    if (!(lever2 > 0.0) || !(stream->omega > 0.0)) return 0.0;
-    return stream->omega * stream->step / ath_sqrt(lever2 * 2.0 / 3.0);
+    if (!(lever2 > 0.0) || !(stream->rotation_step_factor > 0.0)) return 0.0;
+    return stream->rotation_step_factor * stream->step / ath_sqrt(lever2 * 2.0 / 3.0);
 }
 
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
@@ -404,14 +404,14 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     int32_t T = motion->frames;
     const ath_piece *piece = plan->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
-    double omega_step = ath_omega_step(plan, piece, base);
+    double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->track);
         ath_move_point(T, scratch->track, scratch->at.point);
     }
-    if (omega_step > 0.0) {
-        inverse_track(base, T, count_of(rows, OMEGA_SLOT, base), omega_step, rows->omega, scratch->track);
+    if (rotation_step > 0.0) {
+        inverse_track(base, T, count_of(rows, ROTATION_SLOT, base), rotation_step, rows->rotation, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
     }
 }

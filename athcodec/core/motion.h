@@ -7,7 +7,7 @@
 /* How the integers of one level and segment are to be read. */
 typedef struct ath_stream {
     double step;             /* quantisation step, scene units */
-    double omega;            /* step factor of rotation tracks, 0: none are coded */
+    double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;  /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
     int32_t reserved;
@@ -24,7 +24,7 @@ typedef struct ath_motion {
 } ath_motion;
 
 /* Rows of integers over temporal frequency, 3 x frames each. */
-enum { SHIFT_SLOT = ATH_PIECE_VERTICES, OMEGA_SLOT, ATH_SLOTS };
+enum { SHIFT_SLOT = ATH_PIECE_VERTICES, ROTATION_SLOT, ATH_SLOTS };
 
 /* Learned shapes are made of a piece's first modes, three axes each. */
 enum { ATH_SHAPE_MODES = 16, ATH_SHAPE_NUMBERS = 3 * ATH_SHAPE_MODES };
@@ -32,7 +32,7 @@ enum { ATH_SHAPE_MODES = 16, ATH_SHAPE_NUMBERS = 3 * ATH_SHAPE_MODES };
 /* The integers of one piece. */
 typedef struct {
     int32_t *modes;        /* rank rows */
-    int32_t *omega, *shift;
+    int32_t *rotation, *shift;
     int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
     int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
     const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
@@ -83,7 +83,7 @@ void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
 void ath_turn_towards(const double H[9], double size2, double R[9]);
-double ath_omega_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
+double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
 /* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all 0. */

@@ -59,8 +59,8 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     if (level == ath_base_level(piece)) {
         if (ath_has_shift(piece))
             note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
-        if (ath_omega_step(plan, piece, stream) > 0.0)
-            note_count(rows, OMEGA_SLOT, code_row(coder, model, frames, rank, OMEGA_SLOT, -1, rows->omega));
+        if (ath_rotation_step(plan, piece, stream) > 0.0)
+            note_count(rows, ROTATION_SLOT, code_row(coder, model, frames, rank, ROTATION_SLOT, -1, rows->rotation));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
     if (piece->level == level) {

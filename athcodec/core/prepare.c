@@ -105,7 +105,7 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
     work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->plan.longest * row);
-    work->piece.omega = (int32_t *)ath_take(&arena, row);
+    work->piece.rotation = (int32_t *)ath_take(&arena, row);
     work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
     work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
@@ -211,7 +211,7 @@ static void ready_motion(ath_work *work)
     memset(work->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->node.step = &work->node_step;
     memset(work->piece.modes, 0, (size_t)work->file->plan.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
-    memset(work->piece.omega, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.rotation, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     memset(work->piece.shift, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
@@ -313,7 +313,7 @@ static int open_stems(ath_work *work, stems_reader *reader, ath_stream *stream)
     int result = ath_parse_stems(bytes_of(reader->chunk), work->motion.frames, &head, &body);
     if (result != ATH_OK) return result;
     stream->step = head.step;
-    stream->omega = head.omega;
+    stream->rotation_step_factor = head.rotation_step_factor;
     if (head.bits) result = read_temporal(work, &head, reader, stream);
     coefficient_model_init(reader->model, work->motion.frames, reader->history);
     coder_start(&reader->coder, body.bytes, body.size);
@@ -374,7 +374,7 @@ static void clear_piece(ath_work *work, const ath_piece *piece)
     memset(work->shape_integers, 0, (size_t)work->piece.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->piece.shape_count = 0;
     clear_row(work->piece.shift, T, work->counts + SHIFT_SLOT);
-    clear_row(work->piece.omega, T, work->counts + OMEGA_SLOT);
+    clear_row(work->piece.rotation, T, work->counts + ROTATION_SLOT);
 }
 
 /* The shapes that the level adds to those of the piece. */
