@@ -32,8 +32,8 @@ SHEET, LOOSE, WHOLE = 1, 2, 4
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
 PIECE = np.dtype(
-    [(name, "<i8") for name in ("modes", "basis", "carrier")]
-    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_carried "
+    [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
+    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_attached "
                                   "reserved").split()]
 )
 NODE = np.dtype(
@@ -42,11 +42,11 @@ NODE = np.dtype(
 )
 
 
-class PlanStruct(ctypes.Structure):
-    """ath_shape."""
+class CorePlan(ctypes.Structure):
+    """ath_plan."""
 
     _fields_ = [(name, c_int32) for name in ("vertex_count", "branch_count", "piece_count", "node_count")]
-    _fields_ += [("carrier_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
+    _fields_ += [("attach_cache_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
     _fields_ += [(name, c_void_p) for name in ("branches", "pieces", "nodes", "rest", "bases")]
 
 
@@ -60,7 +60,7 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "carriers", "work")]
+    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work")]
     _fields_ += [("frames", c_int32), ("reserved", c_int32)]
 
 
@@ -87,7 +87,7 @@ _PLAYING = {  # core/ath.h
     "ath_times": (c_void_p, [c_void_p]),
     "ath_clips": (c_void_p, [c_void_p]),
     "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
-    "ath_rest_wide": (None, [c_void_p, c_int, c_void_p, c_size_t]),
+    "ath_rest_float64": (None, [c_void_p, c_int, c_void_p, c_size_t]),
     "ath_chunks": (c_void_p, [c_void_p]),
     "ath_check_chunk": (c_int, [c_void_p, c_int32, c_void_p]),
     "ath_errors": (c_void_p, [c_void_p]),
@@ -103,34 +103,34 @@ _PLAYING = {  # core/ath.h
     "ath_segment_size": (c_size_t, [c_void_p, c_int32]),
     "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
     "ath_positions": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
-    "ath_positions_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
-    "ath_matrices_wide": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
+    "ath_positions_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
+    "ath_matrices_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
     "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
 _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
-    "ath_plan": (None, [POINTER(PlanStruct), c_void_p, c_void_p, c_void_p, c_int]),
+    "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_plan_nodes": (None, [POINTER(PlanStruct), c_void_p]),
+    "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
-    "ath_carrier_size": (c_size_t, [c_int64, c_int32]),
+    "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [c_int32, c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
                                c_double, c_void_p, c_void_p, c_void_p]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
-    "ath_analyse": (None, [POINTER(PlanStruct), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(PlanStruct), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,
+    "ath_analyse": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,
                                  c_void_p, c_double]),
-    "ath_pose": (None, [POINTER(PlanStruct), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int,
+    "ath_pose": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int,
                         c_void_p]),
-    "ath_pose_nodes": (None, [POINTER(PlanStruct), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p,
+    "ath_pose_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p,
                               c_int, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
@@ -143,12 +143,12 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_int32, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
-    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(PlanStruct), c_void_p, c_void_p, c_void_p,
+    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_void_p, c_void_p,
                                     c_int32]),
     "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
-    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(PlanStruct), POINTER(Motion), POINTER(Integers),
+    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                    c_int32]),
-    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(PlanStruct), POINTER(Motion), POINTER(Integers),
+    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                      c_int32]),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
 }

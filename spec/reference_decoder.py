@@ -120,7 +120,7 @@ class Header:
     level_count: int
     full_level_count: int
     clip_count: int
-    wide: bool
+    is_float64: bool
     max_error: float
 
     @property
@@ -638,13 +638,13 @@ def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, 
     return number, length
 
 
-def decode_exact_rest(stream: bytes, branches: list[Branch], wide: bool) -> list[list[float]]:
+def decode_exact_rest(stream: bytes, branches: list[Branch], is_float64: bool) -> list[list[float]]:
     coder, model, rest, before = RangeDecoder(stream), ExactModel(), [], [0, 0, 0]
     for branch in branches:
         for i in range(branch.count):
             expected, point = predict_rest(branch, rest, i), []
             for k in range(3):
-                number, before[k] = code_exact(coder, model, 64 if wide else 32, expected[k], before[k])
+                number, before[k] = code_exact(coder, model, 64 if is_float64 else 32, expected[k], before[k])
                 point.append(number)
             rest.append(point)
     coder.finish()
@@ -721,7 +721,7 @@ def decode_temporal(stream: bytes, rank: int, frames: int, bits: int) -> list[li
     return basis
 
 
-SLOTS, SHIFT_SLOT, OMEGA_SLOT = 66, 64, 65
+SLOTS, SHIFT_SLOT, ROTATION_SLOT = 66, 64, 65
 
 
 class CoefficientModel:
@@ -1130,7 +1130,7 @@ class LevelStream:
     """How the integers of a level's STEMS are read."""
 
     step: float
-    omega: float  # rotation factor
+    rotation_step_factor: float
     waves: np.ndarray  # (rank, frames)
 
 
@@ -1144,7 +1144,7 @@ class Motion:
     shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
     coefficients: dict[int, list] = field(default_factory=dict)  # by piece.first + mode
     shift: dict[int, list] = field(default_factory=dict)  # by piece
-    omega: dict[int, list] = field(default_factory=dict)  # by piece
+    rotation: dict[int, list] = field(default_factory=dict)  # by piece
     node_rows: dict[int, list] = field(default_factory=dict)  # by node
     node_shift: dict[int, list] = field(default_factory=dict)  # by node
     node_step: dict[int, float] = field(default_factory=dict)  # by node
@@ -1203,8 +1203,8 @@ def decode_stems(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
         if level == piece.base_level:
             if piece.has_shift:
                 motion.shift[piece.number], _ = decode_row(coder, model, frames, rank, SHIFT_SLOT)
-            if omega_step(plan, piece, motion.streams[level]) > 0.0:
-                motion.omega[piece.number], _ = decode_row(coder, model, frames, rank, OMEGA_SLOT)
+            if rotation_step(plan, piece, motion.streams[level]) > 0.0:
+                motion.rotation[piece.number], _ = decode_row(coder, model, frames, rank, ROTATION_SLOT)
         start = stop = 0
         if level == piece.low_level:
             stop = min(piece.low_modes, len(plan.basis(piece)))
@@ -1364,13 +1364,13 @@ def shift_step(piece: Piece, stream: LevelStream) -> float:
     return stream.step / math.sqrt(float(piece.count))
 
 
-def omega_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
+def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
     """0.0: no rotation is coded."""
     d = plan.from_attach(piece).ravel()
     lever2 = in_order(d * d)
-    if not lever2 > 0.0 or not stream.omega > 0.0:
+    if not lever2 > 0.0 or not stream.rotation_step_factor > 0.0:
         return 0.0
-    return stream.omega * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
+    return stream.rotation_step_factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
 
 
 class Pose:
@@ -1414,9 +1414,9 @@ class Pose:
         c, R = self.attach_frame(piece)
         if piece.has_shift:
             c = c + over_time(self.motion.shift.get(piece.number), shift_step(piece, stream), stream.waves)
-        step = omega_step(self.plan, piece, stream)
+        step = rotation_step(self.plan, piece, stream)
         if step > 0.0:
-            x, y, z = 0.25 * over_time(self.motion.omega.get(piece.number), step, stream.waves)
+            x, y, z = 0.25 * over_time(self.motion.rotation.get(piece.number), step, stream.waves)
             R = mat_mul(R, rotation(x, y, z))
         return c, R
 
@@ -1834,7 +1834,7 @@ class AthFile:
 
     @property
     def position_type(self) -> np.dtype:
-        return np.dtype("<f8" if self.header.wide else "<f4")
+        return np.dtype("<f8" if self.header.is_float64 else "<f4")
 
     @cached_property
     def deepest(self) -> int:

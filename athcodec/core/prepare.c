@@ -104,21 +104,21 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
-    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->shape.longest * row);
-    work->piece.omega = (int32_t *)ath_take(&arena, row);
+    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->plan.longest * row);
+    work->piece.rotation = (int32_t *)ath_take(&arena, row);
     work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
-    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->shape.longest, frames) * sizeof(double));
-    work->motion.carriers = (double *)ath_take(&arena, (uint64_t)file->shape.carrier_rows * 3 * T * sizeof(double));
+    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
+    work->motion.attach_caches = (double *)ath_take(&arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
     return arena.used;
 }
 
 static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, number = file->info.wide ? sizeof(double) : sizeof(float);
+    uint64_t T = (uint64_t)frames, number = file->info.is_float64 ? sizeof(double) : sizeof(float);
     segment->frames = frames;
-    segment->wide = file->info.wide;
+    segment->is_float64 = file->info.is_float64;
     ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
     ath_take(&arena, sizeof *segment);
     segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
@@ -157,7 +157,7 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
     for (int32_t d = 0; d <= level; d++)
         for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
             checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
-    return checks + heads + file->shape.piece_count + 1;
+    return checks + heads + file->plan.piece_count + 1;
 }
 
 static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
@@ -194,7 +194,7 @@ static int find_chunks(ath_work *work)
         if (result == ATH_OK) result = check_fed(work, shapes);
     }
     work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
-                                           work->file->shape.height + 1);
+                                           work->file->plan.height + 1);
     work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
@@ -205,13 +205,13 @@ static void ready_motion(ath_work *work)
     work->motion.frames = work->segment->frames;
     work->motion.streams = work->streams;
     work->motion.cosines = work->file->cosines[work->segment->frames];
-    work->scratch = ath_motion_scratch(&work->file->shape, &work->motion);
+    work->scratch = ath_motion_scratch(&work->file->plan, &work->motion);
     work->piece.counts = work->counts;
     work->piece.shapes = work->unit_shapes;
     memset(work->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->node.step = &work->node_step;
-    memset(work->piece.modes, 0, (size_t)work->file->shape.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
-    memset(work->piece.omega, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.modes, 0, (size_t)work->file->plan.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.rotation, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     memset(work->piece.shift, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
@@ -313,7 +313,7 @@ static int open_stems(ath_work *work, stems_reader *reader, ath_stream *stream)
     int result = ath_parse_stems(bytes_of(reader->chunk), work->motion.frames, &head, &body);
     if (result != ATH_OK) return result;
     stream->step = head.step;
-    stream->omega = head.omega;
+    stream->rotation_step_factor = head.rotation_step_factor;
     if (head.bits) result = read_temporal(work, &head, reader, stream);
     coefficient_model_init(reader->model, work->motion.frames, reader->history);
     coder_start(&reader->coder, body.bytes, body.size);
@@ -374,7 +374,7 @@ static void clear_piece(ath_work *work, const ath_piece *piece)
     memset(work->shape_integers, 0, (size_t)work->piece.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->piece.shape_count = 0;
     clear_row(work->piece.shift, T, work->counts + SHIFT_SLOT);
-    clear_row(work->piece.omega, T, work->counts + OMEGA_SLOT);
+    clear_row(work->piece.rotation, T, work->counts + ROTATION_SLOT);
 }
 
 /* The shapes that the level adds to those of the piece. */
@@ -395,9 +395,9 @@ static int read_piece(ath_work *work, int32_t p, int32_t level)
 {
     stems_reader *reader = work->stems + level;
     ath_coder coder = reader->coder;
-    if (work->shapes[level].chunk && read_shapes(work, work->file->shape.pieces + p, level) != ATH_OK)
+    if (work->shapes[level].chunk && read_shapes(work, work->file->plan.pieces + p, level) != ATH_OK)
         return ATH_BAD_CHUNK;
-    code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level,
+    code_piece(&coder, reader->model, &work->file->plan, work->streams + level, work->motion.frames, p, level,
                &work->piece);
     reader->coder = coder;
     return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
@@ -430,7 +430,7 @@ static void store_piece(ath_work *work, const ath_piece *piece, const double *pl
     ath_segment *segment = work->segment;
     size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
     const double *origin = work->file->info.origin;
-    if (segment->wide)
+    if (segment->is_float64)
         store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
     else
         store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
@@ -439,7 +439,7 @@ static void store_piece(ath_work *work, const ath_piece *piece, const double *pl
 static void correct(ath_segment *segment, size_t at, int32_t steps, double step)
 {
     if (steps == 0) return;
-    if (segment->wide) {
+    if (segment->is_float64) {
         double *position = (double *)segment->positions + at;
         *position = ath_corrected(*position, steps, step);
     } else {
@@ -468,11 +468,11 @@ static int read_exact_point(ath_work *work, size_t at)
     exact_reader *reader = &work->exact_level;
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
-        known[k] = work->segment->wide ? ((const double *)work->segment->positions)[at + k]
+        known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
                                        : (double)((const float *)work->segment->positions)[at + k];
-    if (!code_exact_point(&reader->coder, reader->model, work->segment->wide, known, reader->length, number)) return 0;
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number)) return 0;
     for (size_t k = 0; k < 3; k++) {
-        if (work->segment->wide)
+        if (work->segment->is_float64)
             ((double *)work->segment->positions)[at + k] = number[k];
         else
             ((float *)work->segment->positions)[at + k] = (float)number[k];
@@ -493,8 +493,8 @@ static int make_exact(ath_work *work, const ath_piece *piece)
 
 static int show_piece(ath_work *work, int32_t p)
 {
-    const ath_piece *piece = work->file->shape.pieces + p;
-    const double *placed = ath_pose_piece(&work->file->shape, &work->motion, p, &work->piece, &work->scratch);
+    const ath_piece *piece = work->file->plan.pieces + p;
+    const double *placed = ath_pose_piece(&work->file->plan, &work->motion, p, &work->piece, &work->scratch);
     store_piece(work, piece, placed);
     if (work->corrections.chunk) correct_piece(work, piece);
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
@@ -507,7 +507,7 @@ static void show_node(ath_work *work, int32_t n)
     ath_segment *segment = work->segment;
     size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
     double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
-    ath_node_map(&work->file->shape, &work->motion, n, &work->piece, &work->node, &work->scratch);
+    ath_node_map(&work->file->plan, &work->motion, n, &work->piece, &work->node, &work->scratch);
     for (size_t t = 0; t < T; t++) {
         double *map = maps + t * nodes * ATH_MAP;
         for (size_t k = 0; k < 9; k++) map[k] = work->scratch.at.rotation[k * T + t];
@@ -517,11 +517,11 @@ static void show_node(ath_work *work, int32_t n)
 
 static int read_node(ath_work *work, int32_t n)
 {
-    const ath_node *node = work->file->shape.nodes + n;
+    const ath_node *node = work->file->plan.nodes + n;
     affines_reader *reader = work->affines + node->level;
     if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->motion.frames * sizeof *work->node.rows);
-    int valid = code_node(&reader->coder, reader->model, &work->file->shape, work->motion.frames, n, &work->node);
+    int valid = code_node(&reader->coder, reader->model, &work->file->plan, work->motion.frames, n, &work->node);
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 
@@ -554,16 +554,16 @@ static int finish(ath_work *work)
 /* One piece, and the node that begins with it. */
 static int do_piece(ath_work *work)
 {
-    const ath_shape *shape = &work->file->shape;
+    const ath_plan *plan = &work->file->plan;
     int32_t p = work->next++, result = ATH_OK;
-    if (p == shape->piece_count) return finish(work);
-    const ath_piece *piece = shape->pieces + p;
+    if (p == plan->piece_count) return finish(work);
+    const ath_piece *piece = plan->pieces + p;
     if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
     if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
-    if (result == ATH_OK && work->next_node < shape->node_count && shape->nodes[work->next_node].piece == p) {
+    if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
         result = read_node(work, n);
-        if (result == ATH_OK && ath_is_shown(shape->nodes + n, work->level)) show_node(work, n);
+        if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->level)) show_node(work, n);
     }
     if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
     clear_piece(work, piece);

@@ -21,9 +21,10 @@ from athcodec._native import (
     PIECE,
     PIECE_VERTICES,
     SEGMENT_FRAMES,
+    CorePlan,
     Integers,
     Motion,
-    PlanStruct,
+    CorePlan,
     Stream,
     address,
     lib,
@@ -63,11 +64,11 @@ class Plan:
         node_count = lib.ath_count_nodes(address(branches, BRANCH, 1), len(branches))
         self.pieces = np.zeros(piece_count, PIECE)
         self.nodes = np.zeros(node_count, NODE)
-        self.core = PlanStruct(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
+        self.core = CorePlan(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
                            node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
                            nodes=self.nodes.ctypes.data)
         memory = np.empty(vertex_count, np.int32)
-        lib.ath_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
+        lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         self.rest = self.bases = None
 
     @property
@@ -170,7 +171,7 @@ class SegmentMotion:
         self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
         self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(core.node_count, np.int32)
-        self._carriers = np.empty(lib.ath_carrier_size(core.carrier_rows, frames))
+        self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
         self.cosines = cosine_basis(frames)
         self._bind()
 
@@ -183,7 +184,7 @@ class SegmentMotion:
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-                             carriers=self._carriers.ctypes.data, frames=self.frames)
+                             attach_caches=self._attach_caches.ctypes.data, frames=self.frames)
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
         if self.learned_modes is not None:
