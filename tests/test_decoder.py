@@ -341,7 +341,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
         for _ in range(10):
             decoder.file.check()
             for name in ("attributes", "joined_metadata", "faces", "edges"):
-                vars(decoder).pop(name)   # remembered otherwise
+                vars(decoder.file).pop(name)  # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata == full_clip.metadata
 

@@ -21,7 +21,6 @@ from athcodec._native import (
     PIECE,
     PIECE_VERTICES,
     SEGMENT_FRAMES,
-    CorePlan,
     Integers,
     Motion,
     CorePlan,
