@@ -60,14 +60,21 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work")]
-    _fields_ += [("frames", c_int32), ("reserved", c_int32)]
+    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "decoded")]
+    _fields_ += [("frames", c_int32), ("ratio", c_int32)]
+
+
+class Coarse(ctypes.Structure):
+    """ath_coarse."""
+
+    _fields_ = [(name, c_void_p) for name in ("placed", "tracks", "extents")]
 
 
 class Integers(ctypes.Structure):
     """ath_integers."""
 
-    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps", "shape_counts",
+    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps", "predicted",
+                                              "predicted_tracks", "shape_counts",
                                               "shape_first", "shapes", "duals")]
 
 
@@ -148,6 +155,8 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
     "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                    c_int32]),
+    "ath_encode_refinement": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion),
+                                        POINTER(Integers), c_int32]),
     "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                      c_int32]),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),

@@ -61,31 +61,24 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
         }
 }
 
-/* Quantises a track of three axes and replaces it by what the decoder will have. */
+/* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
 static void code_track(const ath_stream *stream, int32_t T, double step, double dead_zone, double *track,
-                       int32_t *quantised)
+                       const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     memset(quantised, 0, 3 * (size_t)T * sizeof *quantised);
-    for (int32_t axis = 0; axis < 3; axis++)
-        if (forward_temporal(stream, T, step, dead_zone, track + axis * T, units[axis]))
-            for (int32_t k = 0; k < stream->temporal_rank; k++)
-                quantised[axis * T + k] = quantise(units[axis][k], dead_zone);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        if (!forward_temporal(stream, T, step, predicted ? 0.0 : dead_zone, track + axis * T, units[axis]))
+            memset(units[axis], 0, sizeof units[axis]);
+        for (int32_t k = 0; k < stream->temporal_rank; k++) {
+            if (predicted) units[axis][k] -= (double)predicted[axis * T + k];
+            quantised[axis * T + k] = quantise(units[axis][k], dead_zone);
+        }
+    }
     drop_lone_ones(T, stream->temporal_rank, units, quantised);
+    for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
         ath_inverse_temporal(stream, T, stream->temporal_rank, step, quantised + axis * T, track + axis * T);
-}
-
-/* out = R^T (x - c) */
-ATH_HOT static void into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
-{
-    const double *R = at->rotation, *c = at->point;
-    for (int32_t t = 0; t < T; t++) {
-        double dx = x[t] - c[t], dy = x[T + t] - c[T + t], dz = x[2 * T + t] - c[2 * T + t];
-        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz;
-        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz;
-        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz;
-    }
 }
 
 /* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
@@ -133,21 +126,6 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     }
 }
 
-ATH_HOT static void project(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local,
-                            double *ATH_RESTRICT rows)
-{
-    for (int32_t m = 0; m < piece->rank; m++) {
-        const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
-        double *row = rows + (size_t)m * 3 * (size_t)T;
-        for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
-        for (int32_t v = 0; v < piece->count; v++) {
-            double weight = mode[v];
-            const double *x = local + (size_t)v * 3 * (size_t)T;
-            for (int32_t i = 0; i < 3 * T; i++) row[i] += weight * x[i];
-        }
-    }
-}
-
 /* Replaces the tracks of the first modes by those of the shapes; there is nothing in the rows that are left over. */
 static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, const double *duals,
                       const ath_scratch *scratch)
@@ -168,25 +146,13 @@ static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
                      const double *source, double *local)
 {
     for (int32_t i = 0; i < piece->count; i++)
-        into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
-}
-
-static void subtract_rest(const ath_plan *plan, int32_t T, const ath_piece *piece, double *local)
-{
-    const double *a = ath_rest_attach(plan, piece);
-    for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(plan, piece->first + i);
-        for (int32_t axis = 0; axis < 3; axis++) {
-            double d = x0[axis] - a[axis], *row = local + ((size_t)i * 3 + (size_t)axis) * (size_t)T;
-            for (int32_t t = 0; t < T; t++) row[t] -= d;
-        }
-    }
+        ath_into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
 }
 
 /* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
-                           const ath_piece_rows *rows, const ath_scratch *scratch, const double *source,
-                           double dead_zone, double *local)
+                           const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
+                           const double *source, double dead_zone, double *local)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
@@ -195,18 +161,61 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     if (ath_has_shift(piece)) {
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
         const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
+        double step = ath_shift_step(piece, base);
         for (int32_t i = 0; i < 3 * T; i++)
             scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
-        code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->shift);
+        if (before) ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->predicted_shift);
+        code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
         ath_move_point(T, scratch->track, scratch->at.point);
+        if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
     }
     to_local(T, piece, &scratch->at, source, local);
     if (rotation_step > 0.0) {
         fit_rotation(plan, T, piece, local, scratch->track);
-        code_track(base, T, rotation_step, dead_zone, scratch->track, rows->rotation);
+        if (before)
+            ath_predict_track(base, T, before->frequencies, rotation_step, motion->ratio, before->rotation,
+                              rows->predicted_rotation);
+        code_track(base, T, rotation_step, dead_zone, scratch->track, rows->predicted_rotation, rows->rotation);
         ath_turn(T, scratch->track, scratch->at.rotation);
-        to_local(T, piece, &scratch->at, source, local);
+        if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
     }
+}
+
+static int32_t frequencies_of(const int32_t *row, int32_t T)
+{
+    int32_t count = 0;
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = T; k > count; k--)
+            if (row[axis * T + k - 1] != 0) count = k;
+    return count;
+}
+
+/* What the next layer predicts from. */
+static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
+                       const ath_scratch *scratch, const double *placed)
+{
+    const ath_coarse *decoded = motion->decoded;
+    size_t T = (size_t)motion->frames;
+    memcpy(decoded->placed + (size_t)piece->first * 3 * T, placed, (size_t)piece->count * 3 * T * sizeof(double));
+    memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
+    memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
+    int32_t *extents = decoded->extents + 2 * p;
+    extents[0] = ath_max(frequencies_of(rows->shift, motion->frames), frequencies_of(rows->rotation, motion->frames));
+    extents[1] = 0;
+    for (int32_t r = 0; r < piece->rank; r++) {
+        int32_t count = frequencies_of(ath_row(rows->modes, r, motion->frames), motion->frames);
+        extents[0] = ath_max(extents[0], count);
+        if (count > 0) extents[1] = rows->shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
+    }
+}
+
+static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *motion, int32_t p)
+{
+    const ath_coarse *layer = motion->before;
+    size_t T = (size_t)motion->frames;
+    ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
+                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p], layer->extents[2 * p + 1]};
+    return before;
 }
 
 static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t p,
@@ -214,16 +223,22 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
 {
     const ath_piece *piece = plan->pieces + p;
     ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
+    ath_piece_before before;
     int32_t T = motion->frames;
-    analyse_tracks(plan, motion, piece, &rows, scratch, source, dead_zone, scratch->placed);
-    subtract_rest(plan, T, piece, scratch->placed);
-    project(plan, T, piece, scratch->placed, scratch->rows);
+    if (motion->before) before = piece_before(plan, motion, p);
+    if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
+    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, dead_zone, scratch->placed);
+    if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
+    ath_to_local(plan, T, piece, &scratch->at, source + (size_t)piece->first * 3 * (size_t)T, scratch->placed);
+    ath_project(plan, T, piece, piece->rank, scratch->placed, scratch->rows);
     if (rows.shape_count > 0)
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
     for (int32_t r = 0; r < piece->rank; r++)
         code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
-                   scratch->rows + (size_t)r * 3 * (size_t)T, ath_row(rows.modes, r, T));
-    ath_pose_rows(plan, motion, p, &rows, scratch);
+                   scratch->rows + (size_t)r * 3 * (size_t)T,
+                   rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
+    const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
+    if (motion->decoded) note_piece(motion, piece, p, &rows, scratch, placed);
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
@@ -251,7 +266,7 @@ static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, 
     for (int32_t v = node->first; v < node->first + node->count; v++) {
         const double *x0 = ath_rest_of(plan, v);
         double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
-        into_rest_space(T, &scratch->at, source + (size_t)v * 3 * (size_t)T, local);
+        ath_into_rest_space(T, &scratch->at, source + (size_t)v * 3 * (size_t)T, local);
         for (int32_t axis = 0; axis < 3; axis++)
             for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
                 local[t] -= d[axis];
@@ -306,8 +321,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, ath_row(rows->rows, r, T));
-    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_row(rows->rows, 3, T));
+        code_track(&stream, T, step, dead_zone, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
+    if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,

@@ -105,6 +105,21 @@ int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath
     return written(&coder, !rows->invalid);
 }
 
+int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan, const ath_motion *motion,
+                              const ath_integers *integers, int32_t level)
+{
+    ath_coder coder;
+    refinement_model *rows = (refinement_model *)model;
+    coder_start(&coder, bytes, capacity);
+    refinement_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        ath_piece_rows piece = ath_rows_of_piece(plan, integers, motion->frames, p);
+        code_refined_tracks(&coder, rows, plan, motion->streams + level, motion, plan->pieces + p, &piece);
+        code_refined_modes(&coder, rows, motion->streams + level, motion, plan->pieces + p, &piece);
+    }
+    return written(&coder, !rows->rows.invalid);
+}
+
 int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                            const ath_motion *motion, const ath_integers *integers, int32_t level)
 {
@@ -144,7 +159,7 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
 
 size_t ath_model_size(void)
 {
-    size_t size = sizeof(affine_model) + history_size(ATH_SEGMENT_FRAMES);
+    size_t size = sizeof(refinement_model) + refinement_history_size(ATH_SEGMENT_FRAMES); /* larger than that of maps */
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
     if (size < sizeof(shape_model)) size = sizeof(shape_model);
     if (size < sizeof(exact_model)) size = sizeof(exact_model);

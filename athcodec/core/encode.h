@@ -14,6 +14,8 @@ typedef struct ath_integers {
     int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
     int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
     int32_t *node_steps;   /* node_count: exponents of half-octave steps */
+    int32_t *predicted;        /* of a refinement, as large as coefficients and tracks; else null */
+    int32_t *predicted_tracks;
     const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
     const int64_t *shape_first;  /* piece_count: where its shapes stand in those below */
     const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
@@ -28,6 +30,9 @@ ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_inte
     rows.rotation = ath_row(integers->tracks, 2 * p, frames);
     rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
     rows.counts = 0;
+    rows.predicted_modes = integers->predicted ? ath_row(integers->predicted, plan->pieces[p].first, frames) : 0;
+    rows.predicted_rotation = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p, frames) : 0;
+    rows.predicted_shift = integers->predicted ? ath_row(integers->predicted_tracks, 2 * p + 1, frames) : 0;
     rows.shape_count = integers->shape_counts ? integers->shape_counts[p] : 0;
     rows.shapes = rows.shape_count > 0 ? integers->shapes + integers->shape_first[p] * ATH_SHAPE_NUMBERS : 0;
     return rows;
@@ -112,6 +117,8 @@ ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t cap
                                  int32_t frames, int is_float64, const void *positions, const void *source);
 ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                  const ath_motion *motion, const ath_integers *integers, int32_t level);
+ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                      const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                    const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,

@@ -10,7 +10,7 @@ static size_t scratch_rows(int32_t longest, int32_t frames) { return (size_t)ath
 
 size_t ath_motion_work(int32_t longest, int32_t frames)
 {
-    return 2 * scratch_rows(longest, frames) + (3 + 9 + 3) * (size_t)frames;
+    return 2 * scratch_rows(longest, frames) + (3 + 9 + 3 + 6) * (size_t)frames;
 }
 
 size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames) { return (size_t)attach_cache_rows * 3 * (size_t)frames; }
@@ -24,6 +24,8 @@ ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
     scratch.at.point = scratch.placed + rows;
     scratch.at.rotation = scratch.at.point + 3 * (size_t)motion->frames;
     scratch.track = scratch.at.rotation + 9 * (size_t)motion->frames;
+    scratch.rotation = scratch.track + 3 * (size_t)motion->frames;
+    scratch.shift = scratch.rotation + 3 * (size_t)motion->frames;
     return scratch;
 }
 
@@ -618,4 +620,130 @@ void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, con
             map_of_modes(plan, motion, node, piece_rows, scratch, E);
     }
     compose(motion->frames, E, scratch->at.rotation);
+}
+
+/* ---- refinements ---- */
+
+/* Products of one track with waves k to k + PREDICTED - 1: each sum runs over the frames in order, side by side. */
+enum { PREDICTED = 8 };
+
+ATH_HOT static void project_waves(int32_t T, const double *waves, const double *track, double sums[PREDICTED])
+{
+    double sum[PREDICTED] = {0.0};
+    for (int32_t t = 0; t < T; t++)
+        for (int32_t i = 0; i < PREDICTED; i++) sum[i] = sum[i] + waves[i * T + t] * track[t];
+    for (int32_t i = 0; i < PREDICTED; i++) sums[i] = sum[i];
+}
+
+static double wave_product(int32_t T, const double *wave, const double *track)
+{
+    double sum = 0.0;
+    for (int32_t t = 0; t < T; t++) sum = sum + wave[t] * track[t];
+    return sum;
+}
+
+static int32_t nearest_or_none(double units, int32_t ratio)
+{
+    double magnitude = units < 0.0 ? -units : units;
+    if (!(magnitude >= 0.5 * (double)ratio)) return 0;
+    int32_t whole = magnitude >= 536870911.0 ? 536870911 : (int32_t)(magnitude + 0.5);
+    return units < 0.0 ? -whole : whole;
+}
+
+void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, double step, int32_t ratio,
+                       const double *track, int32_t *predicted)
+{
+    int32_t count = ath_min(frequencies, stream->temporal_rank);
+    memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
+    for (int32_t axis = 0; axis < 3; axis++) {
+        const double *row = track + axis * T;
+        int32_t k = 0, any = 0;
+        for (int32_t t = 0; t < T && !any; t++) any = row[t] != 0.0;
+        if (!any) continue;
+        for (; k + PREDICTED <= count; k += PREDICTED) {
+            double sums[PREDICTED];
+            project_waves(T, stream->temporal + (size_t)k * (size_t)T, row, sums);
+            for (int32_t i = 0; i < PREDICTED; i++) predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, ratio);
+        }
+        for (; k < count; k++)
+            predicted[axis * T + k] =
+                nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / step, ratio);
+    }
+}
+
+/* out = R^T (x - c) */
+ATH_HOT void ath_into_rest_space(int32_t T, const ath_frames *at, const double *x, double *ATH_RESTRICT out)
+{
+    const double *R = at->rotation, *c = at->point;
+    for (int32_t t = 0; t < T; t++) {
+        double dx = x[t] - c[t], dy = x[T + t] - c[T + t], dz = x[2 * T + t] - c[2 * T + t];
+        out[t] = R[t] * dx + R[3 * T + t] * dy + R[6 * T + t] * dz;
+        out[T + t] = R[T + t] * dx + R[4 * T + t] * dy + R[7 * T + t] * dz;
+        out[2 * T + t] = R[2 * T + t] * dx + R[5 * T + t] * dy + R[8 * T + t] * dz;
+    }
+}
+
+void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_frames *at, const double *placed,
+                  double *local)
+{
+    const double *a = ath_rest_attach(plan, piece);
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *x0 = ath_rest_of(plan, piece->first + i);
+        double *own = local + (size_t)i * 3 * (size_t)T;
+        ath_into_rest_space(T, at, placed + (size_t)i * 3 * (size_t)T, own);
+        for (int32_t axis = 0; axis < 3; axis++) {
+            double d = x0[axis] - a[axis];
+            for (int32_t t = axis * T; t < (axis + 1) * T; t++) own[t] = own[t] - d;
+        }
+    }
+}
+
+ATH_HOT void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,
+                         double *ATH_RESTRICT rows)
+{
+    for (int32_t m = 0; m < count; m++) {
+        const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+        double *row = rows + (size_t)m * 3 * (size_t)T;
+        for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
+        for (int32_t v = 0; v < piece->count; v++) {
+            double weight = mode[v];
+            const double *x = local + (size_t)v * 3 * (size_t)T;
+            for (int32_t i = 0; i < 3 * T; i++) row[i] = row[i] + weight * x[i];
+        }
+    }
+}
+
+/* Three tracks of shapes at a time: the products of the modes with each. */
+static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r, const double *modes,
+                         double *track)
+{
+    for (int32_t i = 0; i < 3 * T; i++) track[i] = 0.0;
+    for (int32_t s = 3 * r; s < ath_min(3 * r + 3, rows->shape_count); s++)
+        for (int32_t j = 0; j < 3 * ath_shape_modes(piece); j++) {
+            double weight = rows->shapes[s * ATH_SHAPE_NUMBERS + j], *own = track + (s - 3 * r) * T;
+            const double *mode = modes + (size_t)j * (size_t)T;
+            for (int32_t t = 0; t < T; t++) own[t] = own[t] + weight * mode[t];
+        }
+}
+
+void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       const ath_scratch *scratch, ath_piece_rows *rows)
+{
+    int32_t T = motion->frames, modes = before->frequencies > 0 ? before->modes : 0;
+    if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
+    if (modes > 0) {
+        ath_to_local(plan, T, piece, &scratch->at, before->placed, scratch->placed);
+        ath_project(plan, T, piece, modes, scratch->placed, scratch->rows);
+    }
+    for (int32_t r = 0; r < modes; r++) {
+        const ath_stream *stream = ath_mode_stream(motion, piece, r);
+        const double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
+        if (ath_is_shape_row(piece, rows, r)) {
+            shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
+            track = scratch->track;
+        }
+        ath_predict_track(stream, T, before->frequencies, ath_row_step(motion, piece, rows, r), motion->ratio, track,
+                          ath_row(rows->predicted_modes, r, T));
+    }
+    for (int32_t r = modes; r < piece->rank; r++) memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
 }

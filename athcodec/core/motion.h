@@ -13,14 +13,23 @@ typedef struct ath_stream {
     int32_t reserved;
 } ath_stream;
 
+/* The layer before, from which a refinement predicts: what all pieces have become there. */
+typedef struct ath_coarse {
+    double *placed;   /* vertex_count x 3 x frames: positions less the origin */
+    double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
+    int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
+} ath_coarse;
+
 /* What the pieces and nodes of one segment are placed with. */
 typedef struct ath_motion {
     const ath_stream *streams; /* one per level, 0 to height + 1 */
     const double *cosines;     /* frames x frames */
     double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
+    const ath_coarse *before;  /* of a refinement; else null */
+    ath_coarse *decoded;       /* encoder: filled for the next layer; may be null */
     int32_t frames;
-    int32_t reserved;
+    int32_t ratio;             /* of a refinement: the steps of the layer before over this one's */
 } ath_motion;
 
 /* Rows of integers over temporal frequency, 3 x frames each. */
@@ -36,7 +45,15 @@ typedef struct {
     int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
     int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
     const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
+    int32_t *predicted_modes, *predicted_rotation, *predicted_shift; /* of a refinement, as large as the rows; else null */
 } ath_piece_rows;
+
+/* A piece as the layer before has it. */
+typedef struct {
+    const double *placed;            /* count x 3 x frames */
+    const double *rotation, *shift;  /* 3 x frames */
+    int32_t frequencies, modes;      /* that its rows reach; 0 frequencies: nothing is predicted from it */
+} ath_piece_before;
 
 /* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
 typedef struct {
@@ -55,6 +72,7 @@ typedef struct {
     double *placed; /* as many: positions */
     ath_frames at;
     double *track;  /* 3 x frames */
+    double *rotation, *shift; /* 3 x frames: what a refinement is to know of these tracks, one behind the other */
 } ath_scratch;
 
 ATH_ENCODER_API size_t ath_motion_work(int32_t longest, int32_t frames);
@@ -76,6 +94,21 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
 void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
+/* Integers of three axes over temporal frequency that a track would have in steps of `step`, nearest, where they are at least
+ * half of `ratio`, the steps of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
+void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, double step, int32_t ratio,
+                       const double *track, int32_t *predicted);
+/* The same for the modes of a piece, from its vertices in the layer before seen from its attach frame now (scratch->at). */
+void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       const ath_scratch *scratch, ath_piece_rows *rows);
+/* out = R^T (x - c), 3 x frames */
+void ath_into_rest_space(int32_t frames, const ath_frames *at, const double *x, double *out);
+/* Vertices of a piece in its attach frame, less those of the rest pose. */
+void ath_to_local(const ath_plan *plan, int32_t frames, const ath_piece *piece, const ath_frames *at, const double *placed,
+                  double *local);
+/* Tracks of `count` modes from that, 3 x frames each. */
+void ath_project(const ath_plan *plan, int32_t frames, const ath_piece *piece, int32_t count, const double *local,
+                 double *rows);
 void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step, const int32_t *quantised,
                           double *row);
 /* x := c + R x, 3 x frames. */

@@ -3,7 +3,7 @@
 #ifndef ATH_MOTION_STREAMS_H
 #define ATH_MOTION_STREAMS_H
 
-#include "coefficient_model.h"
+#include "refinement_model.h"
 
 /* ---- shapes ---- */
 
@@ -70,6 +70,38 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
     for (int32_t m = from; m < to; m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         above_count = code_row(coder, model, frames, rank, m, above_count, ath_row(rows->modes, m, frames));
+        note_count(rows, m, above_count);
+    }
+}
+
+/* What the stream of a refinement holds of a piece, once its predictions are known: tracks first, then modes, whose
+ * predictions need the attach frame that the tracks make. */
+static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
+                               int32_t slot, const int32_t *predicted, const ath_piece_rows *rows, int32_t *row)
+{
+    row_prediction prediction = {predicted, 0, motion->frames, (uint32_t)motion->ratio};
+    note_count(rows, slot, code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row));
+}
+
+static void code_refined_tracks(ath_coder *coder, refinement_model *model, const ath_plan *plan, const ath_stream *stream,
+                                const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows)
+{
+    if (ath_has_shift(piece))
+        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows, rows->shift);
+    if (ath_rotation_step(plan, piece, stream) > 0.0)
+        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows, rows->rotation);
+}
+
+static void code_refined_modes(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
+                               const ath_piece *piece, const ath_piece_rows *rows)
+{
+    int32_t T = motion->frames, above_count = -1;
+    row_prediction prediction = {0, 0, T, (uint32_t)motion->ratio};
+    for (int32_t m = 0; m < piece->rank; m++) {
+        if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
+        prediction.row = ath_row(rows->predicted_modes, m, T);
+        prediction.below = m + 1 < piece->rank ? prediction.row + 3 * T : 0;
+        above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction, ath_row(rows->modes, m, T));
         note_count(rows, m, above_count);
     }
 }

@@ -23,6 +23,7 @@ from athcodec._native import (
     SEGMENT_FRAMES,
     Integers,
     Motion,
+    Coarse,
     CorePlan,
     Stream,
     address,
@@ -54,7 +55,7 @@ class Plan:
     branches: (B,) of _native.BRANCH in file order. rest: (N, 3) float64, less the origin.
     """
 
-    def __init__(self, branches: np.ndarray, vertex_count: int, pool: ThreadPool = SERIAL):
+    def __init__(self, branches: np.ndarray, vertex_count: int, pool: ThreadPool = SERIAL, refined: bool = False):
         self.branches, self.pool = branches, pool
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
@@ -68,6 +69,8 @@ class Plan:
                            nodes=self.nodes.ctypes.data)
         memory = np.empty(vertex_count, np.int32)
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
+        if refined:
+            self.pieces["level"], self.pieces["low_level"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
         self.rest = self.bases = None
 
     @property
@@ -160,7 +163,8 @@ class LevelStream:
 class SegmentMotion:
     """The quantised motion of one segment."""
 
-    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], learned_modes: LearnedModes | None = None):
+    def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], learned_modes: LearnedModes | None = None,
+                 before: SegmentMotion | None = None, ratio: int = 1, layered: bool = False):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
             raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
                              f"frames, {plan.level_count} streams")
@@ -172,6 +176,15 @@ class SegmentMotion:
         self.node_steps = np.zeros(core.node_count, np.int32)
         self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
         self.cosines = cosine_basis(frames)
+        self.before, self.ratio = before, ratio
+        if before is not None:
+            self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
+        self.coarse = None
+        if layered:
+            self.placed = np.zeros((plan.vertex_count, 3, frames))
+            self.placed_tracks = np.zeros(self.tracks.shape)
+            self.extents = np.zeros((core.piece_count, 2), np.int32)
+            self.coarse = Coarse(self.placed.ctypes.data, self.placed_tracks.ctypes.data, self.extents.ctypes.data)
         self._bind()
 
     def _bind(self) -> None:
@@ -183,9 +196,14 @@ class SegmentMotion:
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
         self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-                             attach_caches=self._attach_caches.ctypes.data, frames=self.frames)
+                             attach_caches=self._attach_caches.ctypes.data, frames=self.frames, ratio=self.ratio,
+                             before=None if self.before is None else addressof(self.before.coarse),
+                             decoded=None if self.coarse is None else addressof(self.coarse))
         self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
                                  self.node_steps.ctypes.data)
+        if self.before is not None:
+            self.integers.predicted = self.predicted.ctypes.data
+            self.integers.predicted_tracks = self.predicted_tracks.ctypes.data
         if self.learned_modes is not None:
             for name, array in (("shape_counts", self.learned_modes.counts), ("shape_first", self.learned_modes.first),
                                 ("shapes", self.learned_modes.units), ("duals", self.learned_modes.duals)):

@@ -66,6 +66,12 @@ def encode_stems(segment: SegmentMotion, level: int) -> bytes:
                          segment.integers, level)
 
 
+def encode_refinement(segment: SegmentMotion, level: int) -> bytes:
+    """Coefficients and tracks of a refinement."""
+    return encode_stream("ath_encode_refinement", 4096 + segment.coefficients.size, segment.plan.core, segment.motion,
+                         segment.integers, level)
+
+
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:
     """Maps of the nodes of one level."""
     return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.core, segment.motion,

@@ -1,0 +1,150 @@
+/* The context model of refined tracks (FORMAT.md, "Refined rows"), compiled once for each direction.
+ *
+ * A refinement knows from the layer before what each integer is about: where that is not 0, the integer is spread over the
+ * ratio of the steps around it; where it is 0, the integer is small, the more so the quieter its surroundings are. */
+#ifndef ATH_REFINEMENT_MODEL_H
+#define ATH_REFINEMENT_MODEL_H
+
+#include "coefficient_model.h"
+
+enum { REFINED_SIZES = 4, REFINED_SURROUNDINGS = 3, REFINED_SIGNS = 3 };
+
+typedef struct {
+    coefficient_model rows; /* counts, and what is remembered of rows: of the differences */
+    number_model numbers[REFINED_SIZES][REFINED_SURROUNDINGS];
+    ath_context sign[REFINED_SIGNS];
+    uint32_t *history;      /* as that of rows, of the integers themselves */
+    uint32_t sums[2][SUMS_BEFORE + ATH_SEGMENT_FRAMES + 1];
+} refinement_model;
+
+ATH_INLINE size_t refinement_history_size(int32_t frames) { return 2 * history_size(frames); }
+
+/* `history`: refinement_history_size(frames) bytes. */
+static void refinement_model_init(refinement_model *model, int32_t frames, uint32_t *history)
+{
+    memset(model->sums, 0, sizeof model->sums);
+    coefficient_model_init(&model->rows, frames, history);
+    model->history = history + (size_t)ATH_SLOTS * (size_t)frames;
+    memset(model->history, 0, history_size(frames));
+    for (int32_t i = 0; i < REFINED_SIZES; i++)
+        for (int32_t j = 0; j < REFINED_SURROUNDINGS; j++) number_model_init(&model->numbers[i][j]);
+    for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
+}
+
+/* Steps of the layer before that a prediction stands for. */
+ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio) { return (magnitude_of(predicted) + ratio / 2) / ratio; }
+
+/* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */
+typedef struct {
+    const int32_t *row, *below;
+    int32_t frames;
+    uint32_t ratio;
+} row_prediction;
+
+ATH_INLINE uint32_t coarse_at(const row_prediction *p, const int32_t *row, int32_t axis, int32_t k)
+{
+    return k < p->frames ? coarse_steps(row[axis * p->frames + k], p->ratio) : 0;
+}
+
+/* How loud the layer before is around an integer, where that is not known otherwise yet. */
+static uint32_t loudness(const row_prediction *p, int32_t axis, int32_t k)
+{
+    uint32_t loud = 2 * (2 * coarse_at(p, p->row, axis, k + 1) + coarse_at(p, p->row, axis, k + 2)), below = 0;
+    for (int32_t other = 0; other < 3; other++) {
+        loud += coarse_at(p, p->row, other, k + 1);
+        if (other > axis) loud += coarse_at(p, p->row, other, k);
+        if (p->below) below += coarse_at(p, p->below, other, k);
+    }
+    return p->below ? loud + 2 * below + coarse_at(p, p->below, axis, k + 1) : loud;
+}
+
+static int32_t differing_frequencies(const int32_t *row, const int32_t *predicted, int32_t frames)
+{
+    int32_t count = 0;
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = frames; k > count; k--)
+            if (row[axis * frames + k - 1] != predicted[axis * frames + k - 1]) count = k;
+    return count;
+}
+
+/* What neighbours that are coded lead one to expect, in 1/16: of one axis and frequency, from a row's magnitudes. */
+ATH_INLINE uint32_t expected_of(const uint32_t near[3], const uint32_t *sums, const uint32_t *above, int32_t above_count,
+                                uint32_t history, uint32_t beside, int32_t axis, int32_t k)
+{
+    uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
+    uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over;
+    uint32_t around = axis == 0 ? history : (beside * 16 / (uint32_t)axis + history) / 2;
+    return ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
+}
+
+static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction, int32_t axis,
+                                       int32_t k, uint32_t of_differences, uint32_t of_integers, int32_t difference)
+{
+    int32_t predicted = prediction->row[axis * prediction->frames + k], around;
+    uint32_t steps = coarse_steps(predicted, prediction->ratio), size = steps < REFINED_SIZES ? steps : REFINED_SIZES - 1;
+    uint32_t expected = of_differences;
+    if (steps == 0) {
+        uint32_t loud = loudness(prediction, axis, k);
+        expected = of_integers + 2 * loud;
+        around = loud == 0 ? 0 : loud < 3 ? 1 : 2;
+    } else {
+        around = of_integers < 12 * steps ? 0 : of_integers < 40 * steps ? 1 : 2;
+    }
+    uint32_t magnitude = code_unsigned(coder, &model->numbers[size][around], expected, magnitude_of(difference));
+    if (magnitude == 0) return 0;
+    int negative = predicted < 0;
+    if (predicted == 0)
+        negative = coder_raw_bit(coder, difference < 0);
+    else
+        negative ^= coder_bit(coder, &model->sign[magnitude == 1 ? 0 : magnitude < 4 ? 1 : 2], (difference < 0) != negative);
+    return negative ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+ATH_INLINE void shift_near(uint32_t near[3], int32_t value)
+{
+    near[2] = near[1];
+    near[1] = near[0];
+    near[0] = clipped(value);
+}
+
+/* As code_row; the row becomes its prediction and the differences that are coded. */
+static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, int32_t rank, int32_t slot, int32_t above_count,
+                                const row_prediction *prediction, int32_t *row)
+{
+    coefficient_model *model = &refinement->rows;
+    int32_t frames = prediction->frames;
+    const int32_t *predicted = prediction->row;
+    const uint32_t *history = model->history + (size_t)slot * (size_t)frames;
+    uint32_t *own_history = refinement->history + (size_t)slot * (size_t)frames;
+    const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE, *own_above = refinement->sums[model->turn] + SUMS_BEFORE;
+    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}}, own_last[3][3] = {{0}};
+    uint32_t *own_sums = refinement->sums[model->turn] + SUMS_BEFORE;
+    int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
+                               ENCODING ? differing_frequencies(row, predicted, frames) : 0);
+    for (int32_t k = 0; k < count; k++) {
+        uint32_t beside = 0, own_beside = 0;
+        for (int32_t axis = 0; axis < 3; axis++) {
+            int32_t at = axis * frames + k;
+            uint32_t of_differences = expected_of(last[axis], sums, above, above_count, history[k], beside, axis, k);
+            uint32_t of_integers = expected_of(own_last[axis], own_sums, own_above, above_count, own_history[k], own_beside, axis, k);
+            int32_t difference = code_refined_difference(coder, refinement, prediction, axis, k, of_differences, of_integers,
+                                                         row[at] - predicted[at]);
+            if (!ENCODING) row[at] = predicted[at] + difference;
+            shift_near(last[axis], difference);
+            shift_near(own_last[axis], row[at]);
+            beside += last[axis][0];
+            own_beside += own_last[axis][0];
+        }
+        sums[k] = beside;
+        own_sums[k] = own_beside;
+    }
+    for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
+        memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
+    memset(sums + count, 0, (size_t)(frames + 1 - count) * sizeof *sums);
+    memset(own_sums + count, 0, (size_t)(frames + 1 - count) * sizeof *own_sums);
+    remember_row(model, slot, frames, count, sums);
+    for (int32_t k = 0; k < frames; k++) own_history[k] = own_history[k] - (own_history[k] + 3) / 4 + own_sums[k] * 4 / 3;
+    return count;
+}
+
+#endif
