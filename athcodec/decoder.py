@@ -138,6 +138,7 @@ class Decoder:
     level_count = _OfFile(lambda file: file.level_count)
     full_level_count = _OfFile(lambda file: file.full_level_count)
     deepest = _OfFile(lambda file: file.deepest)
+    complete = _OfFile(lambda file: file.complete)
     missing = _OfFile(lambda file: file.missing)
     max_error_bound = _OfFile(lambda file: file.max_error_bound)
     dtype = _OfFile(lambda file: file.dtype)
@@ -250,7 +251,7 @@ class Decoder:
     # ---- motion ----
 
     def positions(self, frames: int | slice | None = None, level: int | None = None,
-                  dtype: npt.DTypeLike = None) -> np.ndarray:
+                  dtype: npt.DTypeLike | None = None) -> np.ndarray:
         """Positions of all vertices in one or several frames.
 
         Parameters
@@ -286,7 +287,7 @@ class Decoder:
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
-    def blocks(self, level: int | None = None, dtype: npt.DTypeLike = None,
+    def blocks(self, level: int | None = None, dtype: npt.DTypeLike | None = None,
                frames: int | slice | None = None) -> Iterator[tuple[int, np.ndarray]]:
         """The same, one segment in memory at a time.
 

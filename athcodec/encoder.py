@@ -24,11 +24,11 @@ from athcodec import container as ct
 from athcodec import entropy
 from athcodec import quantize as qz
 from athcodec.ath import Ath, Survey, Thresholds, survey
+from athcodec.ath_file import Level
 from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
 from athcodec.coding import Settings, Shape, Source, code_segment, threads
 from athcodec.crew import Crew, default_jobs
-from athcodec.ath_file import Level
 from athcodec.decoder import Decoder
 from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, candidates, with_branches

@@ -175,7 +175,7 @@ class _AnySystem:
         """All at once, where the file system can."""
         if not ranges:
             return []
-        starts, stops = [offset for offset, _ in ranges], [sum(each) for each in ranges]
+        starts, stops = [offset for offset, _ in ranges], [offset + size for offset, size in ranges]
         parts = self._try(lambda: self._system.cat_ranges([self._path] * len(ranges), starts, stops, on_error="raise"),
                           len(ranges))
         for (offset, size), data in zip(ranges, parts, strict=True):
@@ -232,7 +232,7 @@ class _Http:
             async with slots:
                 return await self._fetch(offset, size)
 
-        tasks = [asyncio.ensure_future(one(*each)) for each in ranges]
+        tasks = [asyncio.ensure_future(one(*wanted)) for wanted in ranges]
         try:
             return await asyncio.gather(*tasks)
         finally:

@@ -13,11 +13,11 @@ from typing import Any
 import athcodec
 from athcodec import discovery
 from athcodec.ath import Thresholds
+from athcodec.ath_file import Level
 from athcodec.atomic_files import check_target
 from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
-from athcodec.ath_file import Level
 from athcodec.decoder import Decoder
 from athcodec.encoder import DEFAULT_REL_ERROR
 from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
@@ -89,7 +89,7 @@ def with_sources(decoder: Decoder, args: argparse.Namespace,
                for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
     if len(sources) != len(played):
         raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
-    return [(each, path, clip) for each, (path, clip) in zip(played, sources)]
+    return [(decoder, path, clip) for decoder, (path, clip) in zip(played, sources)]
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
