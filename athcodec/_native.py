@@ -31,8 +31,8 @@ NODE = np.dtype(
 )
 
 
-class Shape(ctypes.Structure):
-    """ath_shape."""
+class CorePlan(ctypes.Structure):
+    """ath_plan."""
 
     _fields_ = [(name, c_int32) for name in ("vertex_count", "branch_count", "piece_count", "node_count")]
     _fields_ += [("carrier_rows", c_int64), ("height", c_int32), ("longest", c_int32)]
@@ -100,13 +100,13 @@ _PLAYING = {  # core/ath.h
 _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_count_pieces": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_count_nodes": (c_int32, [c_void_p, c_int32]),
-    "ath_plan": (None, [POINTER(Shape), c_void_p, c_void_p, c_void_p, c_int]),
+    "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_plan_nodes": (None, [POINTER(Shape), c_void_p]),
+    "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_carrier_size": (c_size_t, [c_int64, c_int32]),
@@ -114,12 +114,12 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_differences": (None, [c_int32, c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
                                c_double, c_void_p, c_void_p, c_void_p]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
-    "ath_analyse": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,
+    "ath_analyse": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
+    "ath_analyse_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,
                                  c_void_p, c_double]),
-    "ath_pose": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int,
+    "ath_pose": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int,
                         c_void_p]),
-    "ath_pose_nodes": (None, [POINTER(Shape), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p,
+    "ath_pose_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p,
                               c_int, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
@@ -132,12 +132,12 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_int32, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
-    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), c_void_p, c_void_p, c_void_p,
+    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_void_p, c_void_p,
                                     c_int32]),
     "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
-    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
+    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                    c_int32]),
-    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(Shape), POINTER(Motion), POINTER(Integers),
+    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
                                      c_int32]),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
 }

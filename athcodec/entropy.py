@@ -55,19 +55,19 @@ def encode_shapes(plan: Plan, shapes: Shapes | None) -> dict[int, bytes]:
         return {}
     arrays = (address(shapes.counts, np.int32, len(plan.pieces)), address(shapes.first, np.int64, len(plan.pieces)),
               address(shapes.integers, np.int32, shapes.integers.size))
-    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.shape, *arrays, level)
+    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * shapes.integers.size, plan.core, *arrays, level)
             for level in shapes.levels(plan).tolist()}
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
     """Coefficients and tracks of one level."""
-    return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.shape, segment.motion,
+    return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.core, segment.motion,
                          segment.integers, level)
 
 
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:
     """Maps of the nodes of one level."""
-    return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.shape, segment.motion,
+    return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.core, segment.motion,
                          segment.integers, level)
 
 

@@ -21,9 +21,9 @@ from athcodec._native import (
     PIECE,
     PIECE_VERTICES,
     SEGMENT_FRAMES,
+    CorePlan,
     Integers,
     Motion,
-    Shape,
     Stream,
     address,
     lib,
@@ -85,17 +85,17 @@ class Plan:
         node_count = lib.ath_count_nodes(address(branches, BRANCH, 1), len(branches))
         self.pieces = np.zeros(piece_count, PIECE)
         self.nodes = np.zeros(node_count, NODE)
-        self.shape = Shape(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
+        self.core = CorePlan(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
                            node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
                            nodes=self.nodes.ctypes.data)
         memory = np.empty(vertex_count, np.int32)
-        lib.ath_plan(self.shape, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
+        lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         self.rest = self.bases = None
 
     @property
     def height(self) -> int:
         """Depth of the deepest node; levels run from 0 to height + 1."""
-        return self.shape.height
+        return self.core.height
 
     @property
     def level_count(self) -> int:
@@ -121,8 +121,8 @@ class Plan:
 
         for fill in fill_modes, fill_sheets:
             self.crew.each(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
-        self.shape.rest, self.shape.bases = at, self.bases.ctypes.data
-        lib.ath_plan_nodes(self.shape, self.nodes.ctypes.data)
+        self.core.rest, self.core.bases = at, self.bases.ctypes.data
+        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
 
     @cached_property
     def shares(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
@@ -196,12 +196,12 @@ class SegmentMotion:
             raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {MAX_SEGMENT} frames, "
                              f"{plan.level_count} streams")
         self.plan, self.frames, self.streams, self.shapes = plan, frames, streams, shapes
-        shape = plan.shape
+        core = plan.core
         self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
-        self.tracks = np.zeros((shape.piece_count, 2, 3, frames), np.int32)
-        self.node_tracks = np.zeros((shape.node_count, 4, 3, frames), np.int32)
-        self.node_steps = np.zeros(shape.node_count, np.int32)
-        self._carriers = np.empty(lib.ath_carrier_size(shape.carrier_rows, frames))
+        self.tracks = np.zeros((core.piece_count, 2, 3, frames), np.int32)
+        self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
+        self.node_steps = np.zeros(core.node_count, np.int32)
+        self._carriers = np.empty(lib.ath_carrier_size(core.carrier_rows, frames))
         self.cosines = cosine_basis(frames)
         self._bind()
 
@@ -233,7 +233,7 @@ class SegmentMotion:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
         at = self._source(source)
         self._piecewise(lambda motion, first, stop: lib.ath_analyse(
-            self.plan.shape, motion, self.integers, first, stop, at, dead_zone))
+            self.plan.core, motion, self.integers, first, stop, at, dead_zone))
 
     def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
@@ -242,7 +242,7 @@ class SegmentMotion:
         """
         at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
         self._nodewise(lambda motion, first, stop: lib.ath_analyse_nodes(
-            self.plan.shape, motion, self.integers, first, stop, at, steps, dead_zone))
+            self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone))
 
     def clear_nodes(self) -> None:
         """Forgets the maps of the nodes."""
@@ -263,7 +263,7 @@ class SegmentMotion:
         """The call with scratch memory of its own."""
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
-            work = np.empty(lib.ath_motion_work(self.plan.shape.longest, self.frames))
+            work = np.empty(lib.ath_motion_work(self.plan.core.longest, self.frames))
             motion.work = work.ctypes.data
             call(motion, first, stop)
 
@@ -277,9 +277,9 @@ class SegmentMotion:
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
         self._piecewise(lambda motion, first, stop: lib.ath_pose(
-            self.plan.shape, motion, self.integers, first, stop, *into))
+            self.plan.core, motion, self.integers, first, stop, *into))
         self._nodewise(lambda motion, first, stop: lib.ath_pose_nodes(
-            self.plan.shape, motion, self.integers, first, stop, *into))
+            self.plan.core, motion, self.integers, first, stop, *into))
         return positions
 
 

@@ -7,16 +7,20 @@ The functions are declared here from the header alone, as a program would, apart
 from __future__ import annotations
 
 import ctypes
+import re
 import threading
 from ctypes import (POINTER, byref, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint8, c_uint16,
                     c_uint32, c_uint64, c_void_p)
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import athcodec
+from athcodec import container as ct
 from athcodec import errors
 from athcodec._library import load_library
+from files import Parts, with_header
 
 OK, BAD_CHECKSUM, LIMIT_EXCEEDED = 0, 5, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
@@ -146,11 +150,38 @@ class Memory:
         assert (self._block[self._start + self.size:] == GUARD).all(), "written behind the memory"
 
 
-def front(data: bytes, limits: Limits | None = None) -> tuple[int, int, int]:
+def front(data: bytes, limits: Limits | None = None, fault: Fault | None = None) -> tuple[int, int, int]:
     """Result, bytes that are needed, memory that ath_open needs."""
     needed, memory = c_size_t(), c_size_t()
-    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory), None)
+    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory),
+                            fault and byref(fault))
     return result, needed.value, memory.value
+
+
+def text_of(fault: Fault) -> str:
+    text = ctypes.create_string_buffer(256)
+    assert core.ath_fault_text(byref(fault), text, len(text)) == len(text.value)
+    return text.value.decode()
+
+
+def refusal(data: bytes, limits: Limits | None = None) -> str:
+    """What ath_front says of a file, or ath_open where that accepts it: the result's name and the sentence."""
+    fault = Fault()
+    result, _, size = front(data, limits, fault)
+    if result == OK:
+        memory = Memory(size)
+        result = core.ath_open(memory.address, size, data, len(data), limits and byref(limits), byref(fault))
+        memory.check()
+    assert fault.code == result != OK
+    return f"{core.ath_result_name(result).decode()} {text_of(fault)}"
+
+
+def limits_with(**fields: int) -> Limits:
+    limits = Limits()
+    core.ath_default_limits(byref(limits))
+    for name, value in fields.items():
+        setattr(limits, name, value)
+    return limits
 
 
 class Player:
@@ -327,11 +358,95 @@ def test_levels_and_segments_that_a_file_does_not_have_are_bad_arguments(player)
 def test_a_file_beyond_a_limit_is_refused_before_it_is_opened(data):
     fields = {"vertices": 5, "frames": 5, "branches": 1, "chunks": 2, "memory_bytes": 1000}
     for field, limit in fields.items():
-        limits = Limits()
-        core.ath_default_limits(byref(limits))
-        assert front(data, limits)[0] == OK
-        setattr(limits, field, limit)
-        assert front(data, limits)[0] == LIMIT_EXCEEDED
+        assert front(data, limits_with())[0] == OK
+        assert front(data, limits_with(**{field: limit}))[0] == LIMIT_EXCEEDED
+
+
+@pytest.fixture(scope="module")
+def parts(full_ath) -> Parts:
+    return Parts.of(full_ath.read_bytes())
+
+
+@pytest.mark.parametrize("fields, sentence", [
+    ({"vertex_count": 0}, "BAD_HEADER header: got Vertex_Count 0; expected 1 to 67108864"),
+    ({"frame_count": 2**32 - 1}, "LIMIT_EXCEEDED header: got Frame_Count 4294967295; the limit is 1048576"),
+    ({"branch_count": 9, "vertex_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
+    ({"frame_count": 600, "segment_count": 2}, "BAD_HEADER header: got Segment_Count 2; expected 3 to 600"),
+    ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 2 to 32"),
+    ({"full_level_count": 3, "level_count": 4}, "BAD_HEADER header: got Level_Count 4; expected 1 to 3"),
+    ({"clip_count": 0}, "BAD_HEADER header: got Clip_Count 0; expected 1 to 255"),
+    ({"flags": 2}, "BAD_HEADER header: got Flags 2; expected 0 to 1"),
+    ({"reserved": 2**52}, "BAD_HEADER header: got Reserved 4503599627370496; expected 0"),
+    ({"max_error": float("nan")}, "BAD_HEADER header: got Max_Error nan; expected a finite length"),
+    ({"max_error": -1.25e-7}, "BAD_HEADER header: got Max_Error -1.25000e-7; expected a finite length"),
+    ({"max_error": float("-inf")}, "BAD_HEADER header: got Max_Error -inf; expected a finite length"),
+    ({"clip_count": 2}, "BAD_CHUNK_TABLE chunk table: got no CLIPS; expected one"),
+])
+def test_a_refused_header_is_described_by_the_field_and_the_values_found_and_allowed(fields, sentence, parts):
+    assert refusal(with_header(parts.file(), **fields)) == sentence
+
+
+def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allowed(parts):
+    data = parts.file()
+    length, tables_end = len(data), parts.chunks[0][0].offset
+    assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
+    assert refusal(data[:8] + b"\1\0\5\0" + data[12:]) == (
+        "UNSUPPORTED_VERSION file: got format version 1.5; expected 0.4")
+    assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 64"
+    assert refusal(data[:100]) == f"MISSING chunk table: got 36 bytes; expected {tables_end - 64}"
+    assert refusal(data[:tables_end]).startswith(f"MISSING prelude: got {tables_end} bytes; expected ")
+    assert re.fullmatch("BAD_CHECKSUM header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}",
+                        refusal(data[:64] + b"\7" + data[65:]))
+    assert refusal(with_header(data, file_length=length + 1)) == (
+        f"BAD_CHUNK_TABLE chunk table: got chunks that end at byte {length}; expected {length + 1}")
+    assert refusal(data, limits_with(memory_bytes=1000)).startswith("LIMIT_EXCEEDED header: got a need of ")
+    assert refusal(data, limits_with(table_bytes=99)) == (
+        f"LIMIT_EXCEEDED chunk table: got {tables_end - 64} bytes; the limit is 99")
+    assert refusal(data, limits_with(hierarchy_depth=1)).startswith("LIMIT_EXCEEDED chunk HIERARCHY at byte ")
+
+
+def test_a_refused_chunk_is_described_by_its_place_and_the_values_found_and_allowed(parts):
+    def with_last(**change) -> bytes:
+        """With other fields of the entry of AFFINES of level 1, segment 1."""
+        chunks = list(parts.chunks)
+        i = parts.index(ct.AFFINES, 1, 1)
+        chunks[i] = replace(chunks[i][0], **change), chunks[i][1]
+        return parts.with_chunks(chunks)
+
+    chunk, _ = parts.chunks[parts.index(ct.AFFINES, 1, 1)]
+    levels, segments, place = parts.header.level_count, parts.header.segment_count, f"at byte {chunk.offset}"
+    where = f"chunk AFFINES of level 1, segment 1 {place}"
+    assert refusal(with_last(level=9)) == (
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 9, segment 1 {place}: got level 9; expected 0 to {levels - 1}")
+    assert refusal(with_last(segment=99)) == (
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 99 {place}: got segment 99; expected 0 to {segments - 1}")
+    assert refusal(with_last(kind=30)) == (f"UNKNOWN_CHUNK chunk kind 0x001e of level 1, segment 1 {place}: "
+                                           "got a required kind; expected one that this decoder knows")
+    assert refusal(with_last(segment=0)).startswith(
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 0 {place}: got entry ")
+    assert refusal(parts.file(), limits_with(chunk_bytes=1)).startswith("LIMIT_EXCEEDED chunk ")
+    assert refusal(parts.with_chunks([entry for entry in parts.chunks if entry[0] != chunk])) == (
+        "BAD_CHUNK_TABLE chunk table: got no AFFINES of level 1, segment 1; expected one")
+    assert refusal(with_last(kind=ct.EXACT)) == (
+        f"BAD_CHUNK_TABLE {where.replace('AFFINES', 'EXACT')}: got a chunk that the hierarchy does not ask for; "
+        "expected none")
+    broken, rest = bytearray(parts.file()), parts.chunks[parts.index(ct.REST)][0]
+    broken[rest.offset + 40] ^= 1
+    assert re.fullmatch(f"BAD_CHECKSUM chunk REST at byte {rest.offset}: got checksum 0x[0-9a-f]{{8}}; "
+                        f"expected {rest.checksum:#010x}", refusal(bytes(broken)))
+    assert re.fullmatch(r"BAD_CHUNK chunk REST at byte \d+: got content that does not decode; expected a valid stream",
+                        refusal(parts.with_payload(ct.REST, bytes(40))))
+
+
+def test_a_sentence_longer_than_the_room_for_it_is_cut_and_its_length_returned(data):
+    fault = Fault()
+    front(data[:12], None, fault)
+    whole = b"header: got 12 bytes; expected 64"
+    for room in range(len(whole) + 2):
+        text = ctypes.create_string_buffer(b"\xa5" * 99, 99)
+        assert core.ath_fault_text(byref(fault), text, room) == len(whole)
+        assert text.raw[room:] == b"\xa5" * (99 - room)
+        assert room == 0 or text.value == whole[: room - 1]
 
 
 # ---- bytes ----

@@ -445,14 +445,17 @@ def test_a_damaged_chunk_is_named_and_can_be_fed_anew(sample_ath, tmp_path):
 OPEN = "answer(thrown(() => AthFile.open(read(path))));"
 
 
-@pytest.mark.parametrize("at, name, in_chunk", [
-    (0, "NOT_AN_ATH_FILE", False), (8, "UNSUPPORTED_VERSION", False), (70, "BAD_CHECKSUM", False),
-    (-1, "BAD_CHECKSUM", True)])
-def test_a_file_that_cannot_be_opened_is_an_error_with_a_code(sample_ath, tmp_path, at, name, in_chunk):
-    """at: the byte that is damaged; -1: one of the hierarchy."""
+@pytest.mark.parametrize("at, name, in_chunk, sentence", [
+    (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
+    (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.4; expected 0.4"),
+    (70, "BAD_CHECKSUM", False, "header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
+    (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}")])
+def test_a_file_that_cannot_be_opened_is_an_error_with_a_code(sample_ath, tmp_path, at, name, in_chunk, sentence):
+    """at: the byte that is damaged; -1: one of the hierarchy. The sentence is that of C and of Python."""
     at = first_chunk(sample_ath.read_bytes()) + 20 if at < 0 else at
     error = run_node(tmp_path, OPEN, damaged(sample_ath, tmp_path, at))
     assert error["type"] == "AthError" and error["codeName"] == name and (error["chunk"] >= 0) == in_chunk
+    assert re.fullmatch(f"{name}: {sentence}", error["message"])
 
 
 MISUSE = """
@@ -534,7 +537,7 @@ def test_a_module_that_the_sources_do_not_make_is_noticed(tmp_path):
     copy = tmp_path / "athcodec"
     for name in ("core", "viewer"):
         shutil.copytree(VIEWER.parent / name, copy / name)
-    source = copy / "core" / "play.c"
+    source = copy / "core" / "fault.c"
     source.write_text(source.read_text("utf-8").replace('"INVALID"', '"DAMAGED"'), "utf-8")
     done = check_build(copy / "viewer")
     assert done.returncode == 1 and "WebAssembly" in done.stderr and "build_decoder.py" in done.stderr

@@ -110,14 +110,14 @@ static void to_quaternion(const double R[9], double q[4])
 
 /* The piece's own rotation against its predicted one, as omega over time, unwrapped. `local`: its vertices relative to
  * the attach point, in the predicted frame. */
-static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local, double *omega)
+static void fit_omega(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local, double *omega)
 {
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     for (int32_t t = 0; t < T; t++) {
         double H[9] = {0}, size2 = 0.0;
         for (int32_t i = 0; i < piece->count; i++) {
-            const double *x0 = ath_rest_of(shape, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
+            const double *x0 = ath_rest_of(plan, piece->first + i), *x = local + (size_t)i * 3 * (size_t)T;
             for (int32_t k = 0; k < 3; k++) {
                 double d = x0[k] - a[k];
                 size2 += d * d;
@@ -133,11 +133,11 @@ static void fit_omega(const ath_shape *shape, int32_t T, const ath_piece *piece,
     }
 }
 
-ATH_HOT static void project(const ath_shape *shape, int32_t T, const ath_piece *piece, const double *local,
+ATH_HOT static void project(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local,
                             double *ATH_RESTRICT rows)
 {
     for (int32_t m = 0; m < piece->rank; m++) {
-        const double *mode = shape->bases + piece->basis + (size_t)m * (size_t)piece->count;
+        const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
         double *row = rows + (size_t)m * 3 * (size_t)T;
         for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
         for (int32_t v = 0; v < piece->count; v++) {
@@ -171,11 +171,11 @@ static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
         into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
 }
 
-static void subtract_rest(const ath_shape *shape, int32_t T, const ath_piece *piece, double *local)
+static void subtract_rest(const ath_plan *plan, int32_t T, const ath_piece *piece, double *local)
 {
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(shape, piece->first + i);
+        const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t axis = 0; axis < 3; axis++) {
             double d = x0[axis] - a[axis], *row = local + ((size_t)i * 3 + (size_t)axis) * (size_t)T;
             for (int32_t t = 0; t < T; t++) row[t] -= d;
@@ -184,17 +184,17 @@ static void subtract_rest(const ath_shape *shape, int32_t T, const ath_piece *pi
 }
 
 /* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. */
-static void analyse_tracks(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_rows *rows, const ath_scratch *scratch, const double *source,
                            double dead_zone, double *local)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
-    double omega_step = ath_omega_step(shape, piece, base);
-    ath_attach(shape, motion, piece, scratch->at);
+    double omega_step = ath_omega_step(plan, piece, base);
+    ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
-        const double *a = ath_rest_attach(shape, piece), *x0 = ath_rest_of(shape, piece->first);
+        const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
         for (int32_t i = 0; i < 3 * T; i++)
             scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
         code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->shift);
@@ -202,36 +202,36 @@ static void analyse_tracks(const ath_shape *shape, const ath_motion *motion, con
     }
     to_local(T, piece, &scratch->at, source, local);
     if (omega_step > 0.0) {
-        fit_omega(shape, T, piece, local, scratch->track);
+        fit_omega(plan, T, piece, local, scratch->track);
         code_track(base, T, omega_step, dead_zone, scratch->track, rows->omega);
         ath_turn(T, scratch->track, scratch->at.rotation);
         to_local(T, piece, &scratch->at, source, local);
     }
 }
 
-static void analyse_piece(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t p,
+static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t p,
                           const ath_scratch *scratch, const double *source, double dead_zone)
 {
-    const ath_piece *piece = shape->pieces + p;
-    ath_piece_rows rows = ath_rows_of_piece(shape, integers, motion->frames, p);
+    const ath_piece *piece = plan->pieces + p;
+    ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
     int32_t T = motion->frames;
-    analyse_tracks(shape, motion, piece, &rows, scratch, source, dead_zone, scratch->placed);
-    subtract_rest(shape, T, piece, scratch->placed);
-    project(shape, T, piece, scratch->placed, scratch->rows);
+    analyse_tracks(plan, motion, piece, &rows, scratch, source, dead_zone, scratch->placed);
+    subtract_rest(plan, T, piece, scratch->placed);
+    project(plan, T, piece, scratch->placed, scratch->rows);
     if (rows.shape_count > 0)
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
     for (int32_t r = 0; r < piece->rank; r++)
         code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
                    scratch->rows + (size_t)r * 3 * (size_t)T, ath_row(rows.modes, r, T));
-    ath_pose_rows(shape, motion, p, &rows, scratch);
+    ath_pose_rows(plan, motion, p, &rows, scratch);
 }
 
-void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
                  int32_t stop, const double *source, double dead_zone)
 {
-    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++)
-        analyse_piece(shape, motion, integers, p, &scratch, source, dead_zone);
+        analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
 }
 
 void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
@@ -241,15 +241,15 @@ void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
 
 /* Means over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of
  * e * w_r, track 3 the mean of e, `centre` the mean of w. */
-static void node_moments(const ath_shape *shape, const ath_node *node, int32_t T, const ath_scratch *scratch,
+static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
                          const double *source, double *tracks, double centre[3])
 {
-    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
     double *local = scratch->placed, weight = 1.0 / (double)node->count;
     memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
     centre[0] = centre[1] = centre[2] = 0.0;
     for (int32_t v = node->first; v < node->first + node->count; v++) {
-        const double *x0 = ath_rest_of(shape, v);
+        const double *x0 = ath_rest_of(plan, v);
         double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
         into_rest_space(T, &scratch->at, source + (size_t)v * 3 * (size_t)T, local);
         for (int32_t axis = 0; axis < 3; axis++)
@@ -291,16 +291,16 @@ static int32_t half_octaves(double step)
     return step >= 1.4142135623730951 ? exponent + 1 : exponent;
 }
 
-static void analyse_node(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
+static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
                          const ath_node_rows *rows, const ath_scratch *scratch, const double *source,
                          double level_step, double dead_zone)
 {
-    const ath_piece *piece = shape->pieces + node->piece;
+    const ath_piece *piece = plan->pieces + node->piece;
     int32_t T = motion->frames;
     double *tracks = scratch->rows, centre[3];
     int free_base = ath_has_shift(piece);
-    ath_attach(shape, motion, piece, scratch->at);
-    node_moments(shape, node, T, scratch, source, tracks, centre);
+    ath_attach(plan, motion, piece, scratch->at);
+    node_moments(plan, node, T, scratch, source, tracks, centre);
     fit_node(node, free_base, T, tracks, centre);
     *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
     double step = ath_node_step(*rows->step);
@@ -310,13 +310,13 @@ static void analyse_node(const ath_shape *shape, const ath_motion *motion, const
     if (free_base) code_track(&stream, T, step, dead_zone, tracks + 9 * T, ath_row(rows->rows, 3, T));
 }
 
-void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
                        int32_t stop, const double *source, const double *level_steps, double dead_zone)
 {
-    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++) {
-        const ath_node *node = shape->nodes + n;
+        const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
-        if (node->coded) analyse_node(shape, motion, node, &rows, &scratch, source, level_steps[node->level], dead_zone);
+        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], dead_zone);
     }
 }

@@ -50,7 +50,7 @@ int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_
     return written(&coder, code_temporal(&coder, (number_model *)model, rank, frames, limit, (int32_t *)basis));
 }
 
-int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                           const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers, int32_t level)
 {
     ath_coder coder;
@@ -58,8 +58,8 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     shape_model_init(model);
-    for (int32_t p = 0; p < shape->piece_count && valid; p++)
-        valid = code_shapes(&coder, model, shape->pieces + p, level, shape_counts[p],
+    for (int32_t p = 0; p < plan->piece_count && valid; p++)
+        valid = code_shapes(&coder, model, plan->pieces + p, level, shape_counts[p],
                             integers + shape_first[p] * ATH_SHAPE_NUMBERS) >= 0;
     return written(&coder, valid);
 }
@@ -91,21 +91,21 @@ int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t 
     return written(&coder, valid);
 }
 
-int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape, const ath_motion *motion,
+int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan, const ath_motion *motion,
                          const ath_integers *integers, int32_t level)
 {
     ath_coder coder;
     coefficient_model *rows = (coefficient_model *)model;
     coder_start(&coder, bytes, capacity);
     coefficient_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
-    for (int32_t p = 0; p < shape->piece_count; p++) {
-        ath_piece_rows piece = ath_rows_of_piece(shape, integers, motion->frames, p);
-        code_piece(&coder, rows, shape, motion->streams + level, motion->frames, p, level, &piece);
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        ath_piece_rows piece = ath_rows_of_piece(plan, integers, motion->frames, p);
+        code_piece(&coder, rows, plan, motion->streams + level, motion->frames, p, level, &piece);
     }
     return written(&coder, !rows->invalid);
 }
 
-int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                            const ath_motion *motion, const ath_integers *integers, int32_t level)
 {
     ath_coder coder;
@@ -113,10 +113,10 @@ int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const a
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     affine_model_init(maps, motion->frames, (uint32_t *)(maps + 1));
-    for (int32_t n = 0; n < shape->node_count && valid; n++) {
+    for (int32_t n = 0; n < plan->node_count && valid; n++) {
         ath_node_rows node = ath_rows_of_node(integers, motion->frames, n);
-        if (shape->nodes[n].coded && shape->nodes[n].level == level)
-            valid = code_node(&coder, maps, shape, motion->frames, n, &node);
+        if (plan->nodes[n].coded && plan->nodes[n].level == level)
+            valid = code_node(&coder, maps, plan, motion->frames, n, &node);
     }
     return written(&coder, valid);
 }

@@ -20,11 +20,11 @@ typedef struct ath_integers {
     const double *duals;         /* likewise: what takes modes to a shape's track */
 } ath_integers;
 
-ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_shape *shape, const ath_integers *integers, int32_t frames,
+ATH_INLINE ath_piece_rows ath_rows_of_piece(const ath_plan *plan, const ath_integers *integers, int32_t frames,
                                             int32_t p)
 {
     ath_piece_rows rows;
-    rows.modes = ath_row(integers->coefficients, shape->pieces[p].first, frames);
+    rows.modes = ath_row(integers->coefficients, plan->pieces[p].first, frames);
     rows.omega = ath_row(integers->tracks, 2 * p, frames);
     rows.shift = ath_row(integers->tracks, 2 * p + 1, frames);
     rows.counts = 0;
@@ -60,19 +60,19 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
  * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
  * its number of vertices: the same error in all of them together costs the same everywhere. Carriers are to be kept
- * (ath_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment, each with
+ * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment, each with
  * scratch memory of its own, once the pieces that theirs hang on are done. */
-ATH_ENCODER_API void ath_analyse(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                          int32_t first, int32_t stop, const double *source, double dead_zone);
-ATH_ENCODER_API void ath_analyse_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                int32_t first, int32_t stop, const double *source, const double *level_steps,
                                double dead_zone);
 
 /* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (wide) double.
  * By ranges of pieces, which keep the rule above, and then of nodes. */
-ATH_ENCODER_API void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                       int32_t first, int32_t stop, int32_t level, const double origin[3], int wide, void *positions);
-ATH_ENCODER_API void ath_pose_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers,
+ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                             int32_t first, int32_t stop, int32_t level, const double origin[3], int wide,
                             void *positions);
 
@@ -104,15 +104,15 @@ ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t cap
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
                                     int32_t limit, const int32_t *basis);
 /* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
-ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                   const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
                                   int32_t level);
 /* positions, source: vertex-major, float or (wide) double. */
 ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                  int32_t frames, int wide, const void *positions, const void *source);
-ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                  const ath_motion *motion, const ath_integers *integers, int32_t level);
-ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_shape *shape,
+ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                    const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                        int32_t frames, const int32_t *corrections, int64_t count);

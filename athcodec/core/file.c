@@ -203,31 +203,31 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_in
     return check_depth(file, limits, fault);
 }
 
-static void plan(ath_file *file)
+static void build_plan(ath_file *file)
 {
-    ath_shape *shape = &file->shape;
-    shape->vertex_count = (int32_t)file->header.vertex_count;
-    shape->branch_count = (int32_t)file->header.branch_count;
-    shape->branches = file->branches;
-    shape->pieces = file->pieces;
-    shape->nodes = file->nodes;
-    shape->piece_count = ath_count_pieces(file->branches, shape->branch_count, shape->vertex_count);
-    shape->node_count = ath_count_nodes(file->branches, shape->branch_count);
-    ath_plan(shape, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
+    ath_plan *plan = &file->plan;
+    plan->vertex_count = (int32_t)file->header.vertex_count;
+    plan->branch_count = (int32_t)file->header.branch_count;
+    plan->branches = file->branches;
+    plan->pieces = file->pieces;
+    plan->nodes = file->nodes;
+    plan->piece_count = ath_count_pieces(file->branches, plan->branch_count, plan->vertex_count);
+    plan->node_count = ath_count_nodes(file->branches, plan->branch_count);
+    ath_build_plan(plan, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
 }
 
 /* Which levels have which chunks. */
 static void plan_levels(ath_file *file)
 {
-    const ath_shape *shape = &file->shape;
+    const ath_plan *plan = &file->plan;
     file->stems_levels = 0;
     memset(file->affine_levels, 0, sizeof file->affine_levels);
-    for (int32_t p = 0; p < shape->piece_count; p++) {
-        file->stems_levels |= 1u << shape->pieces[p].level;
-        if (shape->pieces[p].low_level >= 0) file->stems_levels |= 1u << shape->pieces[p].low_level;
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        file->stems_levels |= 1u << plan->pieces[p].level;
+        if (plan->pieces[p].low_level >= 0) file->stems_levels |= 1u << plan->pieces[p].low_level;
     }
-    for (int32_t n = 0; n < shape->node_count; n++) {
-        const ath_node *node = shape->nodes + n;
+    for (int32_t n = 0; n < plan->node_count; n++) {
+        const ath_node *node = plan->nodes + n;
         for (int32_t level = node->level; node->coded && level <= node->last; level++)
             file->affine_levels[level] |= 1u << node->level;
     }
@@ -238,8 +238,8 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
     if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
     if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
-    if (kind == ATH_CORRECTIONS) return d <= level && d == file->shape.height + 1;
-    return kind == ATH_EXACT && d == level && d == file->shape.height + 2;
+    if (kind == ATH_CORRECTIONS) return d <= level && d == file->plan.height + 1;
+    return kind == ATH_EXACT && d == level && d == file->plan.height + 2;
 }
 
 static int is_wanted(const ath_file *file, const ath_chunk *chunk)
@@ -353,7 +353,7 @@ static void set_info(ath_file *file, uint64_t prelude)
 /* One level more than the lossy ones gives the very positions of the source. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
-    int32_t lossy = file->shape.height + 2, found = file->info.full_level_count;
+    int32_t lossy = file->plan.height + 2, found = file->info.full_level_count;
     if (found == lossy || found == lossy + 1) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
@@ -364,17 +364,17 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if (result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
     if (result == ATH_OK) result = read_hierarchy(file, limits, fault);
     if (result != ATH_OK) return result;
-    plan(file);
-    file->info.node_count = file->shape.node_count;
+    build_plan(file);
+    file->info.node_count = file->plan.node_count;
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
-    file->shape.rest = file->rest;
-    file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->shape.piece_count, file->rest, file->gaps,
+    file->plan.rest = file->rest;
+    file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
                                                    (int32_t *)file->scratch);
-    ath_plan_nodes(&file->shape, file->nodes);
+    ath_plan_nodes(&file->plan, file->nodes);
     return ATH_OK;
 }
 
@@ -445,8 +445,8 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     ath_file counted = *file;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
-    ath_basis_fill(file->pieces, file->shape.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
-    file->shape.bases = file->bases;
+    ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
+    file->plan.bases = file->bases;
     for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
         if (file->cosines[frames]) ath_cosine_basis(frames, file->cosines[frames]);
     return ATH_OK;
@@ -671,13 +671,13 @@ int32_t ath_ready_level(const ath_file *file, int32_t segment)
 /* Walks over the parts in order; `parts` may be null. */
 static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32_t count[3])
 {
-    const ath_shape *shape = &file->shape;
+    const ath_plan *plan = &file->plan;
     ath_part run = {0, 0, -1, 0};
     int32_t n = 0;
     count[0] = count[1] = count[2] = 0;
-    for (int32_t p = 0; p <= shape->piece_count; p++) {
-        const ath_piece *piece = shape->pieces + p;
-        int exact = p < shape->piece_count && piece->level <= level;
+    for (int32_t p = 0; p <= plan->piece_count; p++) {
+        const ath_piece *piece = plan->pieces + p;
+        int exact = p < plan->piece_count && piece->level <= level;
         if (run.count > 0 && !exact) {
             if (parts) parts[count[0]] = run;
             count[0]++;
@@ -689,9 +689,9 @@ static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32
         }
         if (exact) run.count += piece->count;
         if (exact) count[2] += piece->count;
-        while (n < shape->node_count && shape->nodes[n].piece < p) n++;
-        if (n == shape->node_count || shape->nodes[n].piece != p || !ath_is_shown(shape->nodes + n, level)) continue;
-        ath_part node = {shape->nodes[n].first, shape->nodes[n].count, shape->nodes[n].branch, count[1]};
+        while (n < plan->node_count && plan->nodes[n].piece < p) n++;
+        if (n == plan->node_count || plan->nodes[n].piece != p || !ath_is_shown(plan->nodes + n, level)) continue;
+        ath_part node = {plan->nodes[n].first, plan->nodes[n].count, plan->nodes[n].branch, count[1]};
         if (parts) parts[count[0]] = node;
         count[0]++;
         count[1]++;

@@ -8,7 +8,7 @@
 struct ath_file {
     ath_header header;
     ath_info info;
-    ath_shape shape;
+    ath_plan plan;
     ath_chunk *chunks;
     float *errors;               /* level_count x segment_count x (max, rms) */
     ath_clip *clips;
@@ -37,7 +37,7 @@ const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t leve
 /* Whether it stores the level behind the last lossy one. */
 ATH_INLINE int ath_file_is_lossless(const ath_file *file)
 {
-    return file->header.level_count > file->shape.height + 2;
+    return file->header.level_count > file->plan.height + 2;
 }
 /* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);

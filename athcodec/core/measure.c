@@ -71,16 +71,16 @@ static void store(const double *placed, int32_t first, int32_t count, int32_t T,
     }
 }
 
-static void pose_node(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t n,
+static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t n,
                       const ath_scratch *scratch, const double origin[3], int wide, void *positions)
 {
-    const ath_node *node = shape->nodes + n;
-    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
-    ath_piece_rows piece_rows = ath_rows_of_piece(shape, integers, motion->frames, node->piece);
+    const ath_node *node = plan->nodes + n;
+    const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
+    ath_piece_rows piece_rows = ath_rows_of_piece(plan, integers, motion->frames, node->piece);
     ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
-    ath_node_map(shape, motion, n, &piece_rows, &rows, scratch);
+    ath_node_map(plan, motion, n, &piece_rows, &rows, scratch);
     for (int32_t v = node->first; v < node->first + node->count; v++) {
-        const double *x0 = ath_rest_of(shape, v);
+        const double *x0 = ath_rest_of(plan, v);
         for (int32_t axis = 0; axis < 3; axis++)
             for (int32_t t = 0; t < motion->frames; t++) scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
         ath_move(motion->frames, &scratch->at, scratch->placed);
@@ -88,26 +88,26 @@ static void pose_node(const ath_shape *shape, const ath_motion *motion, const at
     }
 }
 
-void ath_pose(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
               int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
 {
-    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
-        const ath_piece *piece = shape->pieces + p;
-        ath_piece_rows rows = ath_rows_of_piece(shape, integers, motion->frames, p);
+        const ath_piece *piece = plan->pieces + p;
+        ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
         if (piece->level > level) continue;
-        const double *placed = ath_pose_piece(shape, motion, p, &rows, &scratch);
+        const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
         store(placed, piece->first, piece->count, motion->frames, origin, wide, positions);
     }
 }
 
-void ath_pose_nodes(const ath_shape *shape, const ath_motion *motion, const ath_integers *integers, int32_t first,
+void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
                     int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
 {
-    ath_scratch scratch = ath_motion_scratch(shape, motion);
+    ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++)
-        if (ath_is_shown(shape->nodes + n, level))
-            pose_node(shape, motion, integers, n, &scratch, origin, wide, positions);
+        if (ath_is_shown(plan->nodes + n, level))
+            pose_node(plan, motion, integers, n, &scratch, origin, wide, positions);
 }
 
 static double position_at(int wide, const void *positions, size_t at)

@@ -15,9 +15,9 @@ size_t ath_motion_work(int32_t longest, int32_t frames)
 
 size_t ath_carrier_size(int64_t carrier_rows, int32_t frames) { return (size_t)carrier_rows * 3 * (size_t)frames; }
 
-ath_scratch ath_motion_scratch(const ath_shape *shape, const ath_motion *motion)
+ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
 {
-    size_t rows = scratch_rows(shape->longest, motion->frames);
+    size_t rows = scratch_rows(plan->longest, motion->frames);
     ath_scratch scratch;
     scratch.rows = motion->work;
     scratch.placed = scratch.rows + rows;
@@ -106,23 +106,23 @@ ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const doubl
 
 static void copy_rows(double *to, const double *from, size_t count) { memcpy(to, from, count * sizeof(double)); }
 
-static void attach_root(const ath_shape *shape, int32_t T, const ath_piece *piece, ath_frames at)
+static void attach_root(const ath_plan *plan, int32_t T, const ath_piece *piece, ath_frames at)
 {
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     for (int32_t t = 0; t < T; t++) {
         for (int32_t axis = 0; axis < 3; axis++) at.point[axis * T + t] = a[axis];
         for (int32_t k = 0; k < 9; k++) at.rotation[k * T + t] = k % 4 == 0 ? 1.0 : 0.0;
     }
 }
 
-void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, ath_frames at)
+void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, ath_frames at)
 {
     int32_t T = motion->frames;
     if (piece->parent < 0) {
-        attach_root(shape, T, piece, at);
+        attach_root(plan, T, piece, at);
         return;
     }
-    const ath_piece *parent = shape->pieces + piece->parent;
+    const ath_piece *parent = plan->pieces + piece->parent;
     ath_frames base = carried_frames(motion, parent);
     const double *here = carried_vertex(motion, parent, piece->attach);
     copy_rows(at.point, here, 3 * (size_t)T);
@@ -131,8 +131,8 @@ void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piec
         int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, last);
         const double *from = before < parent->first ? base.point : carried_vertex(motion, parent, before);
         const double *to = carried_vertex(motion, parent, after);
-        const double *rest_from = before < parent->first ? ath_rest_attach(shape, parent) : ath_rest_of(shape, before);
-        const double *rest_to = ath_rest_of(shape, after);
+        const double *rest_from = before < parent->first ? ath_rest_attach(plan, parent) : ath_rest_of(plan, before);
+        const double *rest_to = ath_rest_of(plan, after);
         double tangent[3], length2 = 0.0;
         for (int32_t k = 0; k < 3; k++) {
             tangent[k] = rest_to[k] - rest_from[k];
@@ -275,17 +275,17 @@ static void weigh_terms(const ath_piece *piece, const ath_piece_rows *rows, cons
 }
 
 /* placed = c + R (x0 - a + sum over terms of weight * track), shapes first, tracks of zeros left out. */
-ATH_HOT static void place(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                           const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     placing_terms terms = terms_of(piece, rows, T, used, scratch->rows);
     double weight[3][ATH_TERMS];
     for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(shape, piece->first + i);
+        const double *x0 = ath_rest_of(plan, piece->first + i);
         double *out = scratch->placed + i * 3 * T;
-        weigh_terms(piece, rows, &terms, shape->bases + piece->basis, i, weight);
+        weigh_terms(piece, rows, &terms, plan->bases + piece->basis, i, weight);
         for (int32_t axis = 0; axis < 3; axis++)
             lanes_sum(T, terms.count, weight[axis], terms.track[axis], x0[axis] - a[axis], out + axis * T);
         ath_move(T, &scratch->at, out);
@@ -330,14 +330,14 @@ void ath_turn_towards(const double H[9], double size2, double R[9])
 }
 
 /* How a sheet as a whole has turned: the rotation nearest to its decoded vertices, its own R as the prior. */
-static void turn_with_sheet(const ath_shape *shape, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
+static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
                             double *rotation)
 {
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     for (int32_t t = 0; t < T; t++) {
         double H[9] = {0}, R[9], size2 = 0.0;
         for (int32_t i = 0; i < piece->count; i++) {
-            const double *x0 = ath_rest_of(shape, piece->first + i);
+            const double *x0 = ath_rest_of(plan, piece->first + i);
             const double *x = scratch->placed + (size_t)i * 3 * (size_t)T;
             for (int32_t k = 0; k < 3; k++) {
                 double d = x0[k] - a[k];
@@ -356,25 +356,25 @@ static void turn_with_sheet(const ath_shape *shape, int32_t T, const ath_piece *
     }
 }
 
-static void carry(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
+static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
     if (piece->carrier < 0) return;
     ath_frames at = carried_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
     if (piece->flags & ATH_SHEET)
-        turn_with_sheet(shape, T, piece, scratch, at.rotation);
+        turn_with_sheet(plan, T, piece, scratch, at.rotation);
     else
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
 }
 
 /* omega is weighted by its lever, so that its error moves the piece's vertices like any other coefficient's. */
-double ath_omega_step(const ath_shape *shape, const ath_piece *piece, const ath_stream *stream)
+double ath_omega_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
 {
-    const double *a = ath_rest_attach(shape, piece);
+    const double *a = ath_rest_attach(plan, piece);
     double lever2 = 0.0;
     for (int32_t i = 0; i < piece->count; i++) {
-        const double *x0 = ath_rest_of(shape, piece->first + i);
+        const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t k = 0; k < 3; k++) lever2 = lever2 + (x0[k] - a[k]) * (x0[k] - a[k]);
     }
     if (!(lever2 > 0.0) || !(stream->omega > 0.0)) return 0.0;
@@ -398,14 +398,14 @@ static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stre
     return rows->counts ? rows->counts[slot] : stream->temporal_rank;
 }
 
-void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                        const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
-    const ath_piece *piece = shape->pieces + p;
+    const ath_piece *piece = plan->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
-    double omega_step = ath_omega_step(shape, piece, base);
-    ath_attach(shape, motion, piece, scratch->at);
+    double omega_step = ath_omega_step(plan, piece, base);
+    ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->track);
         ath_move_point(T, scratch->track, scratch->at.point);
@@ -424,13 +424,13 @@ static void inverse_row(const ath_motion *motion, const ath_piece *piece, const 
                   ath_row(rows->modes, r, motion->frames), track);
 }
 
-static const double *place_used(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece,
+static const double *place_used(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                                 const ath_piece_rows *rows, const uint8_t *used, const ath_scratch *scratch)
 {
     ath_scratch here = *scratch;
     if (piece->carrier >= 0) here.placed = carried_vertices(motion, piece);
-    place(shape, motion, piece, rows, used, &here);
-    carry(shape, motion, piece, &here);
+    place(plan, motion, piece, rows, used, &here);
+    carry(plan, motion, piece, &here);
     return here.placed;
 }
 
@@ -439,29 +439,29 @@ static double *row_of(const ath_motion *motion, const ath_scratch *scratch, int3
     return scratch->rows + (size_t)m * 3 * (size_t)motion->frames;
 }
 
-const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                             const ath_scratch *scratch)
 {
-    const ath_piece *piece = shape->pieces + p;
+    const ath_piece *piece = plan->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
     for (int32_t m = 0; m < piece->rank; m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
-    return place_used(shape, motion, piece, rows, used, scratch);
+    return place_used(plan, motion, piece, rows, used, scratch);
 }
 
-const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch)
 {
-    const ath_piece *piece = shape->pieces + p;
+    const ath_piece *piece = plan->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
-    ath_turned_attach(shape, motion, p, rows, scratch);
+    ath_turned_attach(plan, motion, p, rows, scratch);
     for (int32_t m = 0; m < piece->rank; m++) {
         used[m] = 0;
         if (rows->counts && rows->counts[m] == 0) continue;
         inverse_row(motion, piece, rows, m, row_of(motion, scratch, m));
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
     }
-    return place_used(shape, motion, piece, rows, used, scratch);
+    return place_used(plan, motion, piece, rows, used, scratch);
 }
 
 /* ---- nodes ---- */
@@ -494,12 +494,12 @@ ATH_HOT static void add_outer(int32_t T, const double *track, const double funct
 }
 
 /* g = mean over the node's vertices of mode(x) (x0 - a), through the whitening twice: the affine part of a mode. */
-static void affine_part(const ath_shape *shape, const ath_node *node, const double *mode, double g[3])
+static void affine_part(const ath_plan *plan, const ath_node *node, const double *mode, double g[3])
 {
-    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
     double moment[3] = {0.0, 0.0, 0.0};
     for (int32_t i = 0; i < node->count; i++) {
-        const double *x0 = ath_rest_of(shape, node->first + i);
+        const double *x0 = ath_rest_of(plan, node->first + i);
         for (int32_t k = 0; k < 3; k++) moment[k] = moment[k] + mode[i] * (x0[k] - a[k]);
     }
     for (int32_t k = 0; k < 3; k++) g[k] = 0.0;
@@ -526,13 +526,13 @@ static void coded_map(const ath_motion *motion, const ath_node *node, const ath_
     }
 }
 
-static void map_of_modes(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
+static void map_of_modes(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
                          const ath_piece_rows *rows, const ath_scratch *scratch, double *E)
 {
-    const ath_piece *piece = shape->pieces + node->piece;
+    const ath_piece *piece = plan->pieces + node->piece;
     for (int32_t m = 0; m < ath_min(piece->low_modes, piece->rank); m++) {
         double g[3];
-        affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
+        affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
         inverse_row(motion, piece, rows, m, scratch->track);
         add_outer(motion->frames, scratch->track, g, E);
     }
@@ -547,14 +547,14 @@ static void map_of_shape(int32_t modes, double functionals[][3], const double *n
             for (int32_t k = 0; k < 3; k++) G[3 * i + k] = G[3 * i + k] + numbers[3 * m + i] * functionals[m][k];
 }
 
-static void map_of_shapes(const ath_shape *shape, const ath_motion *motion, const ath_node *node,
+static void map_of_shapes(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
                           const ath_piece_rows *rows, const ath_scratch *scratch, double *E)
 {
-    const ath_piece *piece = shape->pieces + node->piece;
+    const ath_piece *piece = plan->pieces + node->piece;
     int32_t T = motion->frames, count = ath_min(rows->shape_count, ath_base_shapes(piece));
     double functionals[ATH_SHAPE_MODES][3];
     for (int32_t m = 0; m < ath_shape_modes(piece); m++)
-        affine_part(shape, node, shape->bases + piece->basis + (size_t)m * (size_t)piece->count, functionals[m]);
+        affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, functionals[m]);
     for (int32_t s = 0; s < count; s++) {
         double G[9];
         const double *track = scratch->track + s % 3 * T;
@@ -601,21 +601,21 @@ ATH_HOT static void compose(int32_t T, const double *E, double *ATH_RESTRICT R)
     }
 }
 
-void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
+void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch)
 {
-    const ath_node *node = shape->nodes + n;
+    const ath_node *node = plan->nodes + n;
     double *E = scratch->rows;
     for (int32_t i = 0; i < 9 * motion->frames; i++) E[i] = 0.0;
     if (node->coded) {
-        ath_attach(shape, motion, shape->pieces + node->piece, scratch->at);
-        coded_map(motion, node, rows, scratch, ath_has_shift(shape->pieces + node->piece), E);
+        ath_attach(plan, motion, plan->pieces + node->piece, scratch->at);
+        coded_map(motion, node, rows, scratch, ath_has_shift(plan->pieces + node->piece), E);
     } else {
-        ath_turned_attach(shape, motion, node->piece, piece_rows, scratch);
+        ath_turned_attach(plan, motion, node->piece, piece_rows, scratch);
         if (piece_rows->shape_count > 0)
-            map_of_shapes(shape, motion, node, piece_rows, scratch, E);
+            map_of_shapes(plan, motion, node, piece_rows, scratch, E);
         else
-            map_of_modes(shape, motion, node, piece_rows, scratch, E);
+            map_of_modes(plan, motion, node, piece_rows, scratch, E);
     }
     compose(motion->frames, E, scratch->at.rotation);
 }

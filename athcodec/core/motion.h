@@ -60,20 +60,20 @@ typedef struct {
 ATH_ENCODER_API size_t ath_motion_work(int32_t longest, int32_t frames);
 ATH_ENCODER_API size_t ath_carrier_size(int64_t carrier_rows, int32_t frames);
 
-ath_scratch ath_motion_scratch(const ath_shape *shape, const ath_motion *motion);
-void ath_attach(const ath_shape *shape, const ath_motion *motion, const ath_piece *piece, ath_frames at);
+ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion);
+void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, ath_frames at);
 /* Attach frame of a piece with its own tracks applied, in scratch->at. */
-void ath_turned_attach(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                        const ath_scratch *scratch);
 /* Places a piece from its coefficients over time (scratch->rows) in its attach frame (scratch->at), and keeps what the
  * pieces that hang on it need. Rows that are all 0 are left out. Returns its vertices, count x 3 x frames. */
-const double *ath_pose_rows(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                             const ath_scratch *scratch);
 /* The same from its integers. */
-const double *ath_pose_piece(const ath_shape *shape, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch);
 /* The node's map x = point + rotation (x0 - a), left in scratch->at. */
-void ath_node_map(const ath_shape *shape, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
+void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
 void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step, const int32_t *quantised,
@@ -83,7 +83,7 @@ void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
 void ath_turn_towards(const double H[9], double size2, double R[9]);
-double ath_omega_step(const ath_shape *shape, const ath_piece *piece, const ath_stream *stream);
+double ath_omega_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
 /* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all 0. */

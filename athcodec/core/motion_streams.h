@@ -51,15 +51,15 @@ static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)
 }
 
 /* What the stream of one level holds of a piece. */
-static void code_piece(ath_coder *coder, coefficient_model *model, const ath_shape *shape, const ath_stream *stream,
+static void code_piece(ath_coder *coder, coefficient_model *model, const ath_plan *plan, const ath_stream *stream,
                        int32_t frames, int32_t p, int32_t level, const ath_piece_rows *rows)
 {
-    const ath_piece *piece = shape->pieces + p;
+    const ath_piece *piece = plan->pieces + p;
     int32_t from = 0, to = 0, above_count = -1, rank = stream->temporal_rank;
     if (level == ath_base_level(piece)) {
         if (ath_has_shift(piece))
             note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
-        if (ath_omega_step(shape, piece, stream) > 0.0)
+        if (ath_omega_step(plan, piece, stream) > 0.0)
             note_count(rows, OMEGA_SLOT, code_row(coder, model, frames, rank, OMEGA_SLOT, -1, rows->omega));
     }
     if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
@@ -89,17 +89,17 @@ static void affine_model_init(affine_model *model, int32_t frames, uint32_t *his
     model->step_before = 0;
 }
 
-static int code_node(ath_coder *coder, affine_model *model, const ath_shape *shape, int32_t frames, int32_t n,
+static int code_node(ath_coder *coder, affine_model *model, const ath_plan *plan, int32_t frames, int32_t n,
                      const ath_node_rows *rows)
 {
-    const ath_node *node = shape->nodes + n;
+    const ath_node *node = plan->nodes + n;
     int32_t before = model->step_before, above_count = -1;
     int32_t change = code_signed(coder, &model->step, 32, *rows->step - before);
     if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
     *rows->step = model->step_before = before + change;
     for (int32_t r = 0; r < node->rank; r++)
         above_count = code_row(coder, &model->rows, frames, frames, r, above_count, ath_row(rows->rows, r, frames));
-    if (ath_has_shift(shape->pieces + node->piece))
+    if (ath_has_shift(plan->pieces + node->piece))
         code_row(coder, &model->rows, frames, frames, SHIFT_SLOT, -1, ath_row(rows->rows, 3, frames));
     return !model->rows.invalid;
 }

@@ -78,36 +78,36 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
 
 /* Carriers on a stack: in depth-first order those on top are done with first. One goes when its last piece has been
  * attached, before that piece is kept itself, so that a long chain never holds more than one. */
-static void place_carriers(ath_shape *shape, ath_piece *pieces, int32_t *stack, int keep)
+static void place_carriers(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
 {
     int64_t used = 0;
     int32_t height = 0;
-    shape->carrier_rows = 0;
-    shape->longest = 0;
-    for (int32_t p = 0; p < shape->piece_count; p++) shape->longest = ath_max(shape->longest, pieces[p].count);
-    for (int32_t p = 0; p < shape->piece_count; p++)
+    plan->carrier_rows = 0;
+    plan->longest = 0;
+    for (int32_t p = 0; p < plan->piece_count; p++) plan->longest = ath_max(plan->longest, pieces[p].count);
+    for (int32_t p = 0; p < plan->piece_count; p++)
         if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_carried = p;
-    for (int32_t p = 0; p < shape->piece_count; p++) {
+    for (int32_t p = 0; p < plan->piece_count; p++) {
         while (!keep && height > 0 && pieces[stack[height - 1]].last_carried <= p) used = pieces[stack[--height]].carrier;
         if (pieces[p].last_carried < 0) continue;
         stack[height++] = p;
         pieces[p].carrier = used;
         used += pieces[p].count + ATH_CARRIER_FRAMES;
-        if (used > shape->carrier_rows) shape->carrier_rows = used;
+        if (used > plan->carrier_rows) plan->carrier_rows = used;
     }
 }
 
 /* A leaf that is one short stem needs no map of its own: its first modes come with its node's level. */
-static void plan_node(const ath_shape *shape, ath_piece *pieces, ath_node *node, int32_t b, int32_t piece)
+static void plan_node(const ath_plan *plan, ath_piece *pieces, ath_node *node, int32_t b, int32_t piece)
 {
-    const ath_branch *branch = shape->branches + b;
+    const ath_branch *branch = plan->branches + b;
     memset(node, 0, sizeof *node);
     node->branch = b;
     node->piece = piece;
     node->first = branch->first;
-    node->count = subtree_vertices(shape->branches, b);
+    node->count = subtree_vertices(plan->branches, b);
     node->level = branch->depth;
-    node->last = branch->flags & ATH_WHOLE ? shape->height : branch->depth;
+    node->last = branch->flags & ATH_WHOLE ? plan->height : branch->depth;
     node->coded = branch->subtree > 1 || branch->count > ATH_PIECE_VERTICES;
     if (!node->coded) {
         pieces[piece].low_level = node->level;
@@ -115,36 +115,36 @@ static void plan_node(const ath_shape *shape, ath_piece *pieces, ath_node *node,
     }
 }
 
-void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep)
+void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep)
 {
-    const ath_branch *branches = shape->branches;
+    const ath_branch *branches = plan->branches;
     int32_t next_piece = 0, node = 0, following = 0;
-    shape->height = 0;
-    for (int32_t b = 0; b < shape->branch_count; b = next_node(branches, b))
-        shape->height = ath_max(shape->height, branches[b].depth);
-    for (int32_t b = 0; b < shape->branch_count; b++) {
-        int32_t parts = pieces_of(branches[b].count), level = shape->height + 1;
+    plan->height = 0;
+    for (int32_t b = 0; b < plan->branch_count; b = next_node(branches, b))
+        plan->height = ath_max(plan->height, branches[b].depth);
+    for (int32_t b = 0; b < plan->branch_count; b++) {
+        int32_t parts = pieces_of(branches[b].count), level = plan->height + 1;
         split_branch(branches, b, pieces, next_piece, memory);
         if (b == following) {
-            plan_node(shape, pieces, nodes + node++, b, next_piece);
+            plan_node(plan, pieces, nodes + node++, b, next_piece);
             following = next_node(branches, b);
             if (!(branches[b].flags & ATH_WHOLE)) level = branches[b].depth + 1;
         }
         for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].level = level;
         next_piece += parts;
     }
-    place_carriers(shape, pieces, memory, keep);
+    place_carriers(plan, pieces, memory, keep);
 }
 
 /* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes
  * with the most left first, orthonormalised under the second moments; directions of no extent are left out. */
-static void whiten(const ath_shape *shape, ath_node *node)
+static void whiten(const ath_plan *plan, ath_node *node)
 {
-    const double *a = ath_rest_attach(shape, shape->pieces + node->piece);
+    const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
     double moment[9] = {0}, largest = 0.0;
     int used[3] = {0, 0, 0};
     for (int32_t v = node->first; v < node->first + node->count; v++) {
-        const double *x0 = ath_rest_of(shape, v);
+        const double *x0 = ath_rest_of(plan, v);
         for (int32_t i = 0; i < 3; i++)
             for (int32_t j = 0; j < 3; j++) moment[3 * i + j] = moment[3 * i + j] + (x0[i] - a[i]) * (x0[j] - a[j]);
     }
@@ -175,10 +175,10 @@ static void whiten(const ath_shape *shape, ath_node *node)
     }
 }
 
-void ath_plan_nodes(const ath_shape *shape, ath_node *nodes)
+void ath_plan_nodes(const ath_plan *plan, ath_node *nodes)
 {
-    for (int32_t n = 0; n < shape->node_count; n++) {
+    for (int32_t n = 0; n < plan->node_count; n++) {
         memset(nodes[n].whitening, 0, sizeof nodes[n].whitening);
-        whiten(shape, nodes + n);
+        whiten(plan, nodes + n);
     }
 }

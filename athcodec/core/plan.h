@@ -33,7 +33,7 @@ typedef struct ath_node {
     int32_t rank;         /* of the rest vertices about the attach point */
 } ath_node;
 
-typedef struct ath_shape {
+typedef struct ath_plan {
     int32_t vertex_count, branch_count, piece_count, node_count;
     int64_t carrier_rows; /* memory of carriers, in vertices */
     int32_t height;       /* deepest node: levels run from 0 to height + 1 */
@@ -43,7 +43,7 @@ typedef struct ath_shape {
     const ath_node *nodes;
     const double *rest;   /* vertex_count x 3, relative to the origin */
     const double *bases;
-} ath_shape;
+} ath_plan;
 
 /* Frames of a carrier take the place of four vertices: an attach point, a rotation. */
 enum { ATH_CARRIER_FRAMES = 4 };
@@ -52,10 +52,10 @@ enum { ATH_CARRIER_FRAMES = 4 };
 ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t vertex_count);
 ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
 
-/* Fills pieces and nodes, and height, longest and carrier_rows of `shape`, whose branches and counts are set. Carriers
+/* Fills pieces and nodes, and height, longest and carrier_rows of `plan`, whose branches and counts are set. Carriers
  * are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has come. `memory`:
  * scratch, vertex_count. */
-ATH_ENCODER_API void ath_plan(ath_shape *shape, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
+ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
@@ -76,7 +76,7 @@ void ath_rest_basis(int32_t n, double *basis, double *work);
  * n: at most ATH_PIECE_VERTICES. */
 ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, double *values, double *vectors);
 /* Completes the nodes, once the rest pose is known. */
-ATH_ENCODER_API void ath_plan_nodes(const ath_shape *shape, ath_node *nodes);
+ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
 
 /* frames x frames: row k is the k-th function of the orthonormal DCT-II. */
 ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
@@ -84,15 +84,15 @@ ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
 /* tan(x / 2) for 0 <= x < pi, by the series of the cosines. */
 double ath_tan_of_half(double x);
 
-ATH_INLINE const double *ath_rest_of(const ath_shape *shape, int32_t vertex)
+ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex)
 {
-    return shape->rest + 3 * (size_t)vertex;
+    return plan->rest + 3 * (size_t)vertex;
 }
 
 /* Rest position of the point that a piece hangs on. */
-ATH_INLINE const double *ath_rest_attach(const ath_shape *shape, const ath_piece *piece)
+ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *piece)
 {
-    return ath_rest_of(shape, piece->attach >= 0 ? piece->attach : piece->first);
+    return ath_rest_of(plan, piece->attach >= 0 ? piece->attach : piece->first);
 }
 
 ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level)

@@ -104,12 +104,12 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
-    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->shape.longest * row);
+    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->plan.longest * row);
     work->piece.omega = (int32_t *)ath_take(&arena, row);
     work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
-    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->shape.longest, frames) * sizeof(double));
-    work->motion.carriers = (double *)ath_take(&arena, (uint64_t)file->shape.carrier_rows * 3 * T * sizeof(double));
+    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
+    work->motion.carriers = (double *)ath_take(&arena, (uint64_t)file->plan.carrier_rows * 3 * T * sizeof(double));
     return arena.used;
 }
 
@@ -157,7 +157,7 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
     for (int32_t d = 0; d <= level; d++)
         for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
             checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
-    return checks + heads + file->shape.piece_count + 1;
+    return checks + heads + file->plan.piece_count + 1;
 }
 
 static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
@@ -194,7 +194,7 @@ static int find_chunks(ath_work *work)
         if (result == ATH_OK) result = check_fed(work, shapes);
     }
     work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
-                                           work->file->shape.height + 1);
+                                           work->file->plan.height + 1);
     work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
@@ -205,12 +205,12 @@ static void ready_motion(ath_work *work)
     work->motion.frames = work->segment->frames;
     work->motion.streams = work->streams;
     work->motion.cosines = work->file->cosines[work->segment->frames];
-    work->scratch = ath_motion_scratch(&work->file->shape, &work->motion);
+    work->scratch = ath_motion_scratch(&work->file->plan, &work->motion);
     work->piece.counts = work->counts;
     work->piece.shapes = work->unit_shapes;
     memset(work->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
     work->node.step = &work->node_step;
-    memset(work->piece.modes, 0, (size_t)work->file->shape.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
+    memset(work->piece.modes, 0, (size_t)work->file->plan.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
     memset(work->piece.omega, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     memset(work->piece.shift, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
@@ -395,9 +395,9 @@ static int read_piece(ath_work *work, int32_t p, int32_t level)
 {
     stems_reader *reader = work->stems + level;
     ath_coder coder = reader->coder;
-    if (work->shapes[level].chunk && read_shapes(work, work->file->shape.pieces + p, level) != ATH_OK)
+    if (work->shapes[level].chunk && read_shapes(work, work->file->plan.pieces + p, level) != ATH_OK)
         return ATH_BAD_CHUNK;
-    code_piece(&coder, reader->model, &work->file->shape, work->streams + level, work->motion.frames, p, level,
+    code_piece(&coder, reader->model, &work->file->plan, work->streams + level, work->motion.frames, p, level,
                &work->piece);
     reader->coder = coder;
     return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
@@ -493,8 +493,8 @@ static int make_exact(ath_work *work, const ath_piece *piece)
 
 static int show_piece(ath_work *work, int32_t p)
 {
-    const ath_piece *piece = work->file->shape.pieces + p;
-    const double *placed = ath_pose_piece(&work->file->shape, &work->motion, p, &work->piece, &work->scratch);
+    const ath_piece *piece = work->file->plan.pieces + p;
+    const double *placed = ath_pose_piece(&work->file->plan, &work->motion, p, &work->piece, &work->scratch);
     store_piece(work, piece, placed);
     if (work->corrections.chunk) correct_piece(work, piece);
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
@@ -507,7 +507,7 @@ static void show_node(ath_work *work, int32_t n)
     ath_segment *segment = work->segment;
     size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
     double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
-    ath_node_map(&work->file->shape, &work->motion, n, &work->piece, &work->node, &work->scratch);
+    ath_node_map(&work->file->plan, &work->motion, n, &work->piece, &work->node, &work->scratch);
     for (size_t t = 0; t < T; t++) {
         double *map = maps + t * nodes * ATH_MAP;
         for (size_t k = 0; k < 9; k++) map[k] = work->scratch.at.rotation[k * T + t];
@@ -517,11 +517,11 @@ static void show_node(ath_work *work, int32_t n)
 
 static int read_node(ath_work *work, int32_t n)
 {
-    const ath_node *node = work->file->shape.nodes + n;
+    const ath_node *node = work->file->plan.nodes + n;
     affines_reader *reader = work->affines + node->level;
     if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->motion.frames * sizeof *work->node.rows);
-    int valid = code_node(&reader->coder, reader->model, &work->file->shape, work->motion.frames, n, &work->node);
+    int valid = code_node(&reader->coder, reader->model, &work->file->plan, work->motion.frames, n, &work->node);
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 
@@ -554,16 +554,16 @@ static int finish(ath_work *work)
 /* One piece, and the node that begins with it. */
 static int do_piece(ath_work *work)
 {
-    const ath_shape *shape = &work->file->shape;
+    const ath_plan *plan = &work->file->plan;
     int32_t p = work->next++, result = ATH_OK;
-    if (p == shape->piece_count) return finish(work);
-    const ath_piece *piece = shape->pieces + p;
+    if (p == plan->piece_count) return finish(work);
+    const ath_piece *piece = plan->pieces + p;
     if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
     if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
-    if (result == ATH_OK && work->next_node < shape->node_count && shape->nodes[work->next_node].piece == p) {
+    if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
         result = read_node(work, n);
-        if (result == ATH_OK && ath_is_shown(shape->nodes + n, work->level)) show_node(work, n);
+        if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->level)) show_node(work, n);
     }
     if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
     clear_piece(work, piece);

@@ -28,6 +28,8 @@ const CHUNK = {
 const CHUNK_SIZE = 32;
 const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth"];
 const PART = ["first", "count", "branch", "index"];
+const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // and what the sentence says
+const FAULT_SIZE = 56, FAULT_TEXT = 256;
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
 const TYPES = {
@@ -180,24 +182,31 @@ class Core {
     return new AthError(code, this.text(this.c.ath_result_name(code)), message, more);
   }
 
-  // Looks at ever more of the front: {code, needed, memory, at}; `at` is a copy of the prelude if code is OK.
-  front(bytes) {
-    let available = 0, needed = HEADER_SIZE, code, memory;
-    do {
-      available = Math.min(bytes.length, Math.max(needed, HEADER_SIZE));
-      const at = this.put(bytes.subarray(0, available));
-      [code, needed, memory] = this.with(8, (sizes) =>
-        [this.c.ath_front(at, available, 0, sizes, sizes + 4), ...this.copy(Uint32Array, sizes, 2)]);
-      if (code === OK) return { code, needed, memory, at };
-      this.give(at);
-    } while (code === MISSING && needed <= bytes.length);
-    return { code, needed, memory, at: 0 };
+  // The error of an ath_fault_info.
+  faultError(at, more) {
+    const { code, chunk } = this.struct(FAULT, at);
+    const message = this.with(FAULT_TEXT, (text) => {
+      this.c.ath_fault_text(at, text, FAULT_TEXT);
+      return this.text(text);
+    });
+    return this.error(code, message, { chunk, ...more });
   }
 
-  frontError({ code, needed }, available) {
-    const what = `the front of the file: got ${available} bytes`;
-    return code === MISSING ? this.error(code, `${what}, expected at least ${needed}`, { needed })
-      : this.error(code, what);
+  // Looks at more and more of the front: {needed, error, memory, at}; `at` is a copy of the prelude if error is null.
+  front(bytes) {
+    return this.with(FAULT_SIZE + 8, (fault) => {
+      const sizes = fault + FAULT_SIZE;
+      let needed = HEADER_SIZE, code, memory;
+      do {
+        const available = Math.min(bytes.length, Math.max(needed, HEADER_SIZE));
+        const at = this.put(bytes.subarray(0, available));
+        code = this.c.ath_front(at, available, 0, sizes, sizes + 4, fault);
+        [needed, memory] = this.copy(Uint32Array, sizes, 2);
+        if (code === OK) return { needed, error: null, memory, at };
+        this.give(at);
+      } while (code === MISSING && needed <= bytes.length);
+      return { needed, error: this.faultError(fault, code === MISSING ? { needed } : {}) };
+    });
   }
 }
 
@@ -302,9 +311,9 @@ export class AthFile {
   static front(bytes) {
     shared ??= new Core();
     const front = shared.front(asBytes(bytes));
-    if (front.code === OK) shared.give(front.at);
-    if (front.code !== OK && front.code !== MISSING) throw shared.frontError(front, bytes.length);
-    return { ready: front.code === OK, needed: front.needed };
+    if (front.error && front.error.code !== MISSING) throw front.error;
+    if (!front.error) shared.give(front.at);
+    return { ready: !front.error, needed: front.needed };
   }
 
   static open(bytes) {
@@ -316,13 +325,12 @@ export class AthFile {
   #open(bytes) {
     const core = new Core(), c = core.c;
     const front = core.front(bytes);
-    if (front.code !== OK) throw core.frontError(front, bytes.length);
+    if (front.error) throw front.error;
     this.#own = core;
     this.#at = core.take(front.memory);
-    const code = c.ath_open(this.#at, front.memory, front.at, front.needed, 0);
+    this.#checkFault((fault) => c.ath_open(this.#at, front.memory, front.at, front.needed, 0, fault));
     this.info = this.#info();
     this.#chunks = this.#chunkTable();
-    if (code !== OK) throw this.#chunkError(code, c.ath_fault(this.#at));
     this.clips = this.#clipTable();
     const size = c.ath_build_size(this.#at) >>> 0;
     this.#check(c.ath_build(this.#at, core.take(size), size), `the bases of the motion, ${size} bytes`);
@@ -370,11 +378,21 @@ export class AthFile {
     if (code !== OK) throw this.#core.error(code, what);
   }
 
-  #chunkError(code, index) {
-    if (index < 0) return this.#core.error(code, "header, chunk table, hierarchy: got what does not match");
-    const { kind, level, segment, offset, length } = this.#chunks[index];
-    const what = `chunk ${index} (kind ${kind}, level ${level}, segment ${segment})`;
-    return this.#core.error(code, `${what}: got ${length} damaged bytes at ${offset}`, { chunk: index });
+  // What `call` returns, given room for a fault, unless it is an error that the fault tells.
+  #checkFault(call, allowed = OK) {
+    return this.#core.with(FAULT_SIZE, (fault) => {
+      const code = call(fault);
+      if (code !== OK && code !== allowed) throw this.#core.faultError(fault);
+      return code;
+    });
+  }
+
+  #checkWork(code, work) {
+    if (code === OK) return;
+    throw this.#core.with(FAULT_SIZE, (fault) => {
+      this.#c.ath_work_fault(work, fault);
+      return this.#core.faultError(fault);
+    });
   }
 
   #level(level) {
@@ -454,9 +472,7 @@ export class AthFile {
   chunkBytes(index) {
     const c = this.#c;
     whole(index, 0, this.info.chunkCount - 1, "index");
-    const code = c.ath_check_chunk(this.#at, index);
-    if (code === MISSING) return null;
-    if (code !== OK) throw this.#chunkError(code, index);
+    if (this.#checkFault((fault) => c.ath_check_chunk(this.#at, index, fault), MISSING) === MISSING) return null;
     const at = (c.ath_chunks(this.#at) >>> 0) + index * CHUNK_SIZE;
     return this.#core.copy(Uint8Array, this.#core.view(Uint32Array, at, 1)[0], this.#chunks[index].length);
   }
@@ -565,10 +581,11 @@ export class AthFile {
     const step = (steps) => {
       const code = this.#c.ath_prepare_step(work, steps);
       if (code === MORE) return null;
-      if (code !== OK) {
-        const fault = c.ath_work_fault(work);
+      try {
+        this.#checkWork(code, work);
+      } catch (error) {
         fail();
-        throw this.#chunkError(code, fault);
+        throw error;
       }
       end();
       return this.#prepared(segment, level, at);
@@ -576,8 +593,9 @@ export class AthFile {
     this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
     try {
       at = core.take(size);
-      this.#check(c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size),
-        `segment ${segment} at level ${level}: got a part of its bytes, expected all that ranges() lists`);
+      const code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      if (code === MISSING) this.#checkWork(code, work);
+      this.#check(code, `segment ${segment} at level ${level}`);
     } catch (error) {
       fail();
       throw error;

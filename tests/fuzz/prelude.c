@@ -41,32 +41,32 @@ static void check_branches(const ath_branch *branches, int32_t count, int32_t ve
 }
 
 /* Pieces and nodes of a hierarchy over a rest pose that may be anything finite. */
-static void plan(ath_branch *branches, int32_t branch_count, int32_t vertices, const double *rest)
+static void build_plan(ath_branch *branches, int32_t branch_count, int32_t vertices, const double *rest)
 {
-    ath_shape shape;
-    memset(&shape, 0, sizeof shape);
-    shape.vertex_count = vertices;
-    shape.branch_count = branch_count;
-    shape.branches = branches;
-    shape.rest = rest;
-    shape.piece_count = ath_count_pieces(branches, branch_count, vertices);
-    shape.node_count = ath_count_nodes(branches, branch_count);
-    size_t table_size = ath_basis_table_size(shape.piece_count);
-    ath_piece *pieces = fuzz_memory((size_t)shape.piece_count * sizeof *pieces, 0xa5);
-    ath_node *nodes = fuzz_memory((size_t)shape.node_count * sizeof *nodes, 0xa5);
+    ath_plan plan;
+    memset(&plan, 0, sizeof plan);
+    plan.vertex_count = vertices;
+    plan.branch_count = branch_count;
+    plan.branches = branches;
+    plan.rest = rest;
+    plan.piece_count = ath_count_pieces(branches, branch_count, vertices);
+    plan.node_count = ath_count_nodes(branches, branch_count);
+    size_t table_size = ath_basis_table_size(plan.piece_count);
+    ath_piece *pieces = fuzz_memory((size_t)plan.piece_count * sizeof *pieces, 0xa5);
+    ath_node *nodes = fuzz_memory((size_t)plan.node_count * sizeof *nodes, 0xa5);
     int32_t *memory = fuzz_memory((size_t)vertices * sizeof *memory, 0xa5);
     int32_t *table = fuzz_memory(table_size * sizeof *table, 0xa5);
     uint8_t *gaps = fuzz_memory((size_t)vertices, 0xa5);
-    shape.pieces = pieces;
-    shape.nodes = nodes;
-    ath_plan(&shape, pieces, nodes, memory, 0);
-    if (shape.height + 2 <= ATH_LEVELS) {
-        int64_t count = ath_basis_layout(pieces, shape.piece_count, rest, gaps, table);
+    plan.pieces = pieces;
+    plan.nodes = nodes;
+    ath_build_plan(&plan, pieces, nodes, memory, 0);
+    if (plan.height + 2 <= ATH_LEVELS) {
+        int64_t count = ath_basis_layout(pieces, plan.piece_count, rest, gaps, table);
         REQUIRE(count <= 2 * (int64_t)ATH_PIECE_VERTICES * vertices, "bases are bounded by the vertices");
         double *bases = fuzz_memory((size_t)count * sizeof *bases, 0xa5);
         double *work = fuzz_memory(ATH_BASIS_WORK * sizeof *work, 0xa5);
-        ath_basis_fill(pieces, shape.piece_count, rest, gaps, work, bases);
-        ath_plan_nodes(&shape, nodes);
+        ath_basis_fill(pieces, plan.piece_count, rest, gaps, work, bases);
+        ath_plan_nodes(&plan, nodes);
         free(work);
         free(bases);
     }
@@ -148,7 +148,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         int result = decode_pose(model, body, branches, branch_count, data, rest);
         int finite = result == ATH_OK && all_finite(rest, 3 * (size_t)vertices);
         REQUIRE(finite || result != ATH_OK || !(method & 1), "exact numbers are finite");
-        if (finite) plan(branches, branch_count, vertices, rest);
+        if (finite) build_plan(branches, branch_count, vertices, rest);
     }
     free(rest);
     free(vertex_source);
