@@ -46,7 +46,6 @@ KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "MET
 _HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
 _CHUNK = struct.Struct("<HBBIII")
 _ERRORS = struct.Struct("<ff")
-_CHECKSUM_AT = 12
 
 
 @dataclass(frozen=True)

@@ -343,9 +343,12 @@ class Decoder:
             node_matrices = core.matrices(ready, in_file, len(nodes))
             core.positions(ready, in_file, positions, core_file.FILE_ORDER)
         try:
-            maps = stem_maps(file.hierarchy, core.rest(), positions[None])
-        except np.linalg.LinAlgError:
-            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant") from None
+            with np.errstate(over="ignore", invalid="ignore"):
+                maps = stem_maps(file.hierarchy, core.rest(), positions[None])
+        except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
+            maps = np.array(np.nan)
+        if not np.isfinite(maps).all():
+            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant")
         first = np.concatenate([nodes["first"], file.branches["first"][stems]])
         count = np.concatenate([nodes["count"], file.branches["count"][stems]])
         branch = file.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
@@ -375,14 +378,12 @@ class Decoder:
         """
         parts, vertex_source = self.affines(frame, level), self.hierarchy.vertex_source
         full = self.positions(frame, self.deepest, np.float64)[vertex_source]
+        if not np.isfinite(full).all():
+            raise BadChunk(f"frame {frame}: got positions that are not finite; expected those of a plant")
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
             rows = slice(first, first + count)
-            try:
-                inverse = np.linalg.pinv(matrix[:, :3])
-            except np.linalg.LinAlgError:
-                raise BadChunk(f"frame {frame}: got a matrix without an inverse; expected one of a plant") from None
-            out[vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ inverse.T
+            out[vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ np.linalg.pinv(matrix[:, :3]).T
         return out
 
     def _checked_level(self, level: int | None) -> int:
