@@ -193,7 +193,7 @@ class File:
     def rest(self, order: int = FILE_ORDER) -> np.ndarray:
         """(N, 3) float64."""
         out = np.empty((self.info.vertex_count, 3))
-        lib.ath_rest_wide(self._file, order, out.ctypes.data, out.strides[0])
+        lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0])
         return out
 
     def chunks(self) -> np.ndarray:
@@ -268,14 +268,14 @@ class File:
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
-        show = lib.ath_positions_wide if out.dtype == np.float64 else lib.ath_positions
+        show = lib.ath_positions_float64 if out.dtype == np.float64 else lib.ath_positions
         self._check(show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data,
                          out.strides[0]))
 
     def matrices(self, segment: Segment, frame: float, node_count: int) -> np.ndarray:
         """(nodes, 3, 4) float64: maps of the cut's nodes from rest positions to positions."""
         out = np.empty((node_count, 3, 4))
-        self._check(lib.ath_matrices_wide(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame,
+        self._check(lib.ath_matrices_float64(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame,
                                           out.ctypes.data, 12 * out.itemsize))
         return out
 

@@ -10,7 +10,7 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
     strict      opens strictly; no answer
     open        opens for streaming, as all that follow; no answer
     0, 1, ...   positions of that level: frames of all clips x vertices x 3 numbers, little-endian, in source
-                order, binary64 where Wide is set, else binary32
+                order, binary64 where Is_Float64 is set, else binary32
     rest        the rest pose: vertices x 3 numbers of Rest_Type, little-endian, in source order
     time        the time of every frame, clip by clip, binary64, little-endian
     clips       what CLIPS says of every clip, written anew from what the decoder knows of it: frames,
@@ -255,7 +255,7 @@ const { AthFile, AthError, ready } = await import(jobs.module);
 await ready;
 const items = {
   open: () => new Uint8Array(0),
-  rest: (file) => file.rest("source", { out: new (file.info.restWide ? Float64Array : Float32Array)(
+  rest: (file) => file.rest("source", { out: new (file.info.restIsFloat64 ? Float64Array : Float32Array)(
     3 * file.info.vertexCount) }),
   time: (file) => file.times(),
   clips: (file) => Buffer.concat(file.clips.map((clip, i) => entry(file, clip, i))),
@@ -266,7 +266,7 @@ const entry = (file, { name, frameCount, segmentCount, loop }, clip) => {
   return Buffer.concat([head, text, Buffer.from(seams.map((_, level) => file.seamError(clip, level)).buffer)]);
 };
 const positions = (file, level) => {
-  const numbers = file.info.wide ? Float64Array : Float32Array, size = 3 * file.info.vertexCount;
+  const numbers = file.info.isFloat64 ? Float64Array : Float32Array, size = 3 * file.info.vertexCount;
   const all = new numbers(size * file.info.frameCount);
   for (let s = 0; s < file.info.segmentCount; s++) {
     const segment = file.prepare(s, level);

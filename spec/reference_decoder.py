@@ -120,7 +120,7 @@ class Header:
     level_count: int
     full_level_count: int
     clip_count: int
-    wide: bool
+    is_float64: bool
     max_error: float
 
     @property
@@ -638,13 +638,13 @@ def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, 
     return number, length
 
 
-def decode_exact_rest(stream: bytes, branches: list[Branch], wide: bool) -> list[list[float]]:
+def decode_exact_rest(stream: bytes, branches: list[Branch], is_float64: bool) -> list[list[float]]:
     coder, model, rest, before = RangeDecoder(stream), ExactModel(), [], [0, 0, 0]
     for branch in branches:
         for i in range(branch.count):
             expected, point = predict_rest(branch, rest, i), []
             for k in range(3):
-                number, before[k] = code_exact(coder, model, 64 if wide else 32, expected[k], before[k])
+                number, before[k] = code_exact(coder, model, 64 if is_float64 else 32, expected[k], before[k])
                 point.append(number)
             rest.append(point)
     coder.finish()
@@ -1834,7 +1834,7 @@ class AthFile:
 
     @property
     def position_type(self) -> np.dtype:
-        return np.dtype("<f8" if self.header.wide else "<f4")
+        return np.dtype("<f8" if self.header.is_float64 else "<f4")
 
     @cached_property
     def deepest(self) -> int:

@@ -33,9 +33,9 @@ class Info(ctypes.Structure):
     _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
                 ("origin", c_double * 3)]
     _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
-                                              "level_count full_level_count node_count chunk_count wide").split()]
+                                              "level_count full_level_count node_count chunk_count is_float64").split()]
     _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lambda_", c_uint32),
-                 ("rest_wide", c_int32)]
+                 ("rest_is_float64", c_int32)]
 
 
 class Clip(ctypes.Structure):
@@ -110,7 +110,7 @@ _SIGNATURES = {
     "ath_frame_at": (c_double, [c_void_p, c_int32, c_double, c_int]),
     "ath_blend_at": (Blend, [c_void_p, c_double]),
     "ath_positions": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
-    "ath_positions_wide": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
+    "ath_positions_float64": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
     "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
     "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
     "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
@@ -688,7 +688,7 @@ def test_orders_strides_and_widths_hold_the_same_positions(player):
         show = player.at(prepared, 3.25)
         vertices, wide = Memory(20 * count), Memory(32 * count)
         assert core.ath_positions(*show, SOURCE_ORDER, vertices.address, 20) == OK
-        assert core.ath_positions_wide(*show, SOURCE_ORDER, wide.address, 32) == OK
+        assert core.ath_positions_float64(*show, SOURCE_ORDER, wide.address, 32) == OK
         for memory in (vertices, wide):
             memory.check()
         for table in (vertices.bytes.view(np.float32).reshape(-1, 5), wide.bytes.view(np.float64).reshape(-1, 4)):

@@ -77,7 +77,7 @@ class Info(ctypes.Structure):
     _fields_ += [("max_error", c_double), ("origin", c_double * 3)]
     _fields_ += [(name, c_int32) for name in (
         "vertex_count", "branch_count", "frame_count", "segment_count", "clip_count", "level_count",
-        "full_level_count", "node_count", "chunk_count", "wide")]
+        "full_level_count", "node_count", "chunk_count", "is_float64")]
     _fields_ += [("more", c_int32 * 16)]
 
 
@@ -139,7 +139,7 @@ class Native:
         return out
 
     def positions(self, segments, frame: float, order: int = 1, dtype=np.float32) -> np.ndarray:
-        name = "ath_positions" if dtype == np.float32 else "ath_positions_wide"
+        name = "ath_positions" if dtype == np.float32 else "ath_positions_float64"
         return self.show(name, (self.info.vertex_count, 3), dtype, segments, frame, c_int(order))
 
     def level_error(self, level: int, first: int) -> dict:
@@ -199,7 +199,7 @@ def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_a
     if request.param == "wide":
         clip = awkward(seed=8, branches=9, frames=40, dtype=np.float64, offset=1e3, motion="sway")
         athcodec.encode(clip, path, rel_error=1e-5, segment_frames=16, effort="fast")
-        assert Native(path.read_bytes()).info.wide == 1
+        assert Native(path.read_bytes()).info.is_float64 == 1
     elif request.param == "exact rest":
         athcodec.encode(plant(seed=2, roots=2, offset=50.0), path, exact_rest=True, effort="fast")
     else:
@@ -250,7 +250,7 @@ def test_every_level_shows_the_bits_of_the_c_library_at_and_between_frames(any_a
                 native.positions(segments, t, order=0),
                 native.show("ath_matrices", (nodes, 12), np.float32, segments, t),
                 native.show("ath_exact", (exact, 3), np.float32, segments, t),
-                native.show("ath_matrices_wide", (nodes, 12), np.float64, segments, t)) for t in times]})
+                native.show("ath_matrices_float64", (nodes, 12), np.float64, segments, t)) for t in times]})
     assert run_node(tmp_path, SHOW, any_ath, json.dumps(times)) == wanted
 
 
@@ -261,7 +261,7 @@ const seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, NaN];
 answer({
   info: [info.fileLength, info.preludeLength, info.maxError, info.origin, info.vertexCount,
          info.branchCount, info.frameCount, info.segmentCount, info.clipCount, info.levelCount, info.fullLevelCount,
-         info.nodeCount, info.chunkCount, info.wide],
+         info.nodeCount, info.chunkCount, info.isFloat64],
   branches: digest(...each(info.branchCount, (i) => Int32Array.of(
     b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i]))),
   times: [...file.times()],
@@ -281,12 +281,12 @@ def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
     lib, file, info = native.lib, native.file, native.info
     rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))
     lib.ath_rest(file, 1, c_void_p(rest.ctypes.data), c_size_t(12))
-    lib.ath_rest_wide(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
+    lib.ath_rest_float64(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
     wanted = {
         "info": [info.file_length, info.prelude_length, info.max_error, list(info.origin), info.vertex_count,
                  info.branch_count, info.frame_count, info.segment_count, info.clip_count, info.level_count,
-                 info.full_level_count, info.node_count, info.chunk_count, bool(info.wide)],
+                 info.full_level_count, info.node_count, info.chunk_count, bool(info.is_float64)],
         "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 32 * info.branch_count))),
         "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
         "rest": [digest(rest), digest(wide)],

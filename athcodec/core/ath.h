@@ -209,10 +209,10 @@ typedef struct ath_info {
     int32_t level_count;     /* stored levels: 0 to level_count - 1 */
     int32_t full_level_count;
     int32_t node_count, chunk_count;
-    int32_t wide;            /* 1: positions are double in the file's own arithmetic, else float */
+    int32_t is_float64;            /* 1: positions are double in the file's own arithmetic, else float */
     float epsilon, xi;       /* the thresholds by which nodes were accepted */
     uint32_t eta, lambda;
-    int32_t rest_wide;       /* 1: the rest pose is double, else float */
+    int32_t rest_is_float64;       /* 1: the rest pose is double, else float */
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);
@@ -258,10 +258,10 @@ ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
-/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_wide is 0 the source's numbers were floats:
+/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's numbers were floats:
  * what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
-ATH_API void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t stride);
+ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
 
 /* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result may be
  * null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
@@ -378,7 +378,7 @@ ATH_API ath_blend ath_blend_at(const ath_file *file, double frame);
 /* All vertices, `stride` bytes apart; those of nodes are moved by their matrices. */
 ATH_API int ath_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                           ath_order order, float *xyz, size_t stride);
-ATH_API int ath_positions_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                                double frame, ath_order order, double *xyz, size_t stride);
 
 /* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
@@ -386,11 +386,11 @@ ATH_API int ath_positions_wide(const ath_file *file, const ath_segment *const *s
  * there are no matrices, at level 0 nothing but. */
 ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                          float *matrices, size_t stride);
-ATH_API int ath_matrices_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+ATH_API int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                               double frame, double *matrices, size_t stride);
 ATH_API int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                       float *xyz, size_t stride);
-ATH_API int ath_exact_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+ATH_API int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                            double frame, double *xyz, size_t stride);
 /* The level that these show, which says how many matrices and exact vertices there are; -1: none has the frame. */
 ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,

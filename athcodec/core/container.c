@@ -87,7 +87,7 @@ static void parse_header(const uint8_t *bytes, ath_header *header)
     header->level_count = bytes[44];
     header->full_level_count = bytes[45];
     header->clip_count = bytes[46];
-    header->wide = bytes[47] & 1;
+    header->is_float64 = bytes[47] & 1;
     header->max_error = f64_at(bytes + 48);
 }
 
@@ -332,7 +332,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
     if (chunk.size < 36 || chunk.bytes[0] > 1 || chunk.bytes[1] > 1 || u16_at(chunk.bytes + 2) != 0) return ATH_BAD_CHUNK;
     head->exact = chunk.bytes[0];
-    head->wide = chunk.bytes[1];
+    head->is_float64 = chunk.bytes[1];
     head->step = f64_at(chunk.bytes + 28);
     *body = rest_of(chunk, 36);
     int valid = is_step(head->step);

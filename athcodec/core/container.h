@@ -10,7 +10,7 @@ typedef struct {
     double max_error;
     uint32_t checksum;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, clip_count, wide;
+    int32_t level_count, full_level_count, clip_count, is_float64;
 } ath_header;
 
 /* Fill in the fault and return its code; of a fault of a chunk with its place in the table. */
@@ -47,7 +47,7 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, wide;
+    int32_t exact, is_float64;
 } ath_rest_head;
 
 typedef struct {

@@ -58,11 +58,11 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
 }
 
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
-                          int32_t branch_count, int wide, double *rest)
+                          int32_t branch_count, int is_float64, double *rest)
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    return finished(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, wide, rest));
+    return finished(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, rest));
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)

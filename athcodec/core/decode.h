@@ -12,9 +12,9 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source);
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
                     double step, double *rest);
-/* Positions as stored, floats or (wide) doubles, the origin not taken off. All are finite. */
+/* Positions as stored, floats or (is_float64) doubles, the origin not taken off. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
-                          int32_t branch_count, int wide, double *rest);
+                          int32_t branch_count, int is_float64, double *rest);
 /* Finite; whether they increase is for the caller to see. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
 /* rank x frames integers; `limit` stands for 1. */

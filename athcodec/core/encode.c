@@ -28,11 +28,11 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
 }
 
 int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                              int32_t branch_count, int wide, const double *rest)
+                              int32_t branch_count, int is_float64, const double *rest)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, wide, (double *)rest));
+    return written(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, (double *)rest));
 }
 
 int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count, const double *times)
@@ -64,12 +64,12 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     return written(&coder, valid);
 }
 
-static double number_at(const void *numbers, int wide, size_t at)
+static double number_at(const void *numbers, int is_float64, size_t at)
 {
-    return wide ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
+    return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
 }
 
-int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames, int wide,
+int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames, int is_float64,
                          const void *positions, const void *source)
 {
     ath_coder coder;
@@ -83,10 +83,10 @@ int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t 
             double known[3], number[3];
             for (size_t k = 0; k < 3; k++) {
                 size_t at = (v * 3 + k) * (size_t)frames + t;
-                known[k] = number_at(positions, wide, at);
-                number[k] = number_at(source, wide, at);
+                known[k] = number_at(positions, is_float64, at);
+                number[k] = number_at(source, is_float64, at);
             }
-            valid = code_exact_point(&coder, model, wide, known, length, number);
+            valid = code_exact_point(&coder, model, is_float64, known, length, number);
         }
     return written(&coder, valid);
 }

@@ -20,13 +20,13 @@ static void exact_model_init(exact_model *model)
         for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
-/* The bits of a number, as a double where `wide`, else as a float. */
-static uint64_t bits_of(double number, int wide)
+/* The bits of a number, as a double where `is_float64`, else as a float. */
+static uint64_t bits_of(double number, int is_float64)
 {
     uint64_t bits;
     uint32_t narrow_bits;
     float narrow;
-    if (wide) {
+    if (is_float64) {
         memcpy(&bits, &number, sizeof bits);
         return bits;
     }
@@ -35,12 +35,12 @@ static uint64_t bits_of(double number, int wide)
     return narrow_bits;
 }
 
-static double number_of(uint64_t bits, int wide)
+static double number_of(uint64_t bits, int is_float64)
 {
     uint32_t narrow_bits = (uint32_t)bits;
     double number;
     float narrow;
-    if (wide) {
+    if (is_float64) {
         memcpy(&number, &bits, sizeof number);
         return number;
     }
@@ -48,9 +48,9 @@ static double number_of(uint64_t bits, int wide)
     return (double)narrow;
 }
 
-static int is_finite(uint64_t bits, int wide)
+static int is_finite(uint64_t bits, int is_float64)
 {
-    uint64_t exponent = wide ? (uint64_t)0x7FF << 52 : (uint64_t)0xFF << 23;
+    uint64_t exponent = is_float64 ? (uint64_t)0x7FF << 52 : (uint64_t)0xFF << 23;
     return (bits & exponent) != exponent;
 }
 
@@ -79,25 +79,25 @@ static uint64_t code_difference(ath_coder *coder, exact_model *model, int32_t bi
 }
 
 /* A number under what it is expected to be; `length`: that of the difference before. */
-static int code_exact(ath_coder *coder, exact_model *model, int wide, double expected, int32_t *length, double *number)
+static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length, double *number)
 {
-    uint64_t sign = (uint64_t)1 << (wide ? 63 : 31), bits = bits_of(expected, wide);
-    uint64_t from = ordered_of(is_finite(bits, wide) ? bits : 0, sign), difference = 0;
-    if (ENCODING) difference = (ordered_of(bits_of(*number, wide), sign) - from) & (sign | (sign - 1));
+    uint64_t sign = (uint64_t)1 << (is_float64 ? 63 : 31), bits = bits_of(expected, is_float64);
+    uint64_t from = ordered_of(is_finite(bits, is_float64) ? bits : 0, sign), difference = 0;
+    if (ENCODING) difference = (ordered_of(bits_of(*number, is_float64), sign) - from) & (sign | (sign - 1));
     int negative = (difference & sign) != 0;
     if (negative) difference = (0 - difference) & (sign | (sign - 1));
-    difference = code_difference(coder, model, wide ? 64 : 32, length, difference, negative);
+    difference = code_difference(coder, model, is_float64 ? 64 : 32, length, difference, negative);
     bits = bits_of_ordered((from + difference) & (sign | (sign - 1)), sign);
-    *number = number_of(bits, wide);
-    return is_finite(bits, wide);
+    *number = number_of(bits, is_float64);
+    return is_finite(bits, is_float64);
 }
 
 /* A point's three numbers. */
-static int code_exact_point(ath_coder *coder, exact_model *model, int wide, const double expected[3], int32_t length[3],
+static int code_exact_point(ath_coder *coder, exact_model *model, int is_float64, const double expected[3], int32_t length[3],
                             double number[3])
 {
     for (int32_t k = 0; k < 3; k++)
-        if (!code_exact(coder, model, wide, expected[k], &length[k], number + k)) return 0;
+        if (!code_exact(coder, model, is_float64, expected[k], &length[k], number + k)) return 0;
     return 1;
 }
 

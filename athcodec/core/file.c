@@ -292,10 +292,10 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
     if (result != ATH_OK) return result;
     memcpy(file->info.origin, head.origin, sizeof head.origin);
-    file->info.rest_wide = head.wide;
+    file->info.rest_is_float64 = head.is_float64;
     if (head.exact) {
         result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
-                                       (int32_t)header->branch_count, head.wide, file->stored_rest);
+                                       (int32_t)header->branch_count, head.is_float64, file->stored_rest);
         for (size_t i = 0; i < numbers; i++) file->rest[i] = file->stored_rest[i] - head.origin[i % 3];
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
@@ -347,7 +347,7 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->level_count = header->level_count;
     info->full_level_count = header->full_level_count;
     info->chunk_count = (int32_t)header->chunk_count;
-    info->wide = header->wide;
+    info->is_float64 = header->is_float64;
 }
 
 /* One level more than the lossy ones gives the very positions of the source. */
@@ -498,7 +498,7 @@ void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
     }
 }
 
-void ath_rest_wide(const ath_file *file, ath_order order, double *xyz, size_t stride)
+void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
 {
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);

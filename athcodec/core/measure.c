@@ -43,7 +43,7 @@ void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, 
         }
 }
 
-void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count, int wide,
+void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count, int is_float64,
                 const void *source, const double origin[3], double *out)
 {
     size_t T = (size_t)frames, N = (size_t)source_count;
@@ -52,19 +52,19 @@ void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_sour
             for (size_t axis = 0; axis < 3; axis++)
                 for (int32_t t = start; t < ath_min(start + TILE, frames); t++) {
                     size_t at = ((size_t)t * N + (size_t)vertex_source[v]) * 3 + axis;
-                    double value = wide ? ((const double *)source)[at] : (double)((const float *)source)[at];
+                    double value = is_float64 ? ((const double *)source)[at] : (double)((const float *)source)[at];
                     out[(v * 3 + axis) * T + (size_t)t] = value - origin[axis];
                 }
 }
 
-static void store(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3], int wide,
+static void store(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3], int is_float64,
                   void *positions)
 {
     for (int32_t row = 0; row < 3 * count; row++) {
         const double *from = placed + (size_t)row * (size_t)T;
         size_t at = ((size_t)first * 3 + (size_t)row) * (size_t)T;
         double shift = origin[row % 3];
-        if (wide)
+        if (is_float64)
             for (int32_t t = 0; t < T; t++) ((double *)positions)[at + (size_t)t] = from[t] + shift;
         else
             for (int32_t t = 0; t < T; t++) ((float *)positions)[at + (size_t)t] = (float)(from[t] + shift);
@@ -72,7 +72,7 @@ static void store(const double *placed, int32_t first, int32_t count, int32_t T,
 }
 
 static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t n,
-                      const ath_scratch *scratch, const double origin[3], int wide, void *positions)
+                      const ath_scratch *scratch, const double origin[3], int is_float64, void *positions)
 {
     const ath_node *node = plan->nodes + n;
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
@@ -84,12 +84,12 @@ static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_
         for (int32_t axis = 0; axis < 3; axis++)
             for (int32_t t = 0; t < motion->frames; t++) scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
         ath_move(motion->frames, &scratch->at, scratch->placed);
-        store(scratch->placed, v, 1, motion->frames, origin, wide, positions);
+        store(scratch->placed, v, 1, motion->frames, origin, is_float64, positions);
     }
 }
 
 void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-              int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
+              int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
@@ -97,33 +97,33 @@ void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers
         ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
         if (piece->level > level) continue;
         const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
-        store(placed, piece->first, piece->count, motion->frames, origin, wide, positions);
+        store(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
 }
 
 void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                    int32_t stop, int32_t level, const double origin[3], int wide, void *positions)
+                    int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++)
         if (ath_is_shown(plan->nodes + n, level))
-            pose_node(plan, motion, integers, n, &scratch, origin, wide, positions);
+            pose_node(plan, motion, integers, n, &scratch, origin, is_float64, positions);
 }
 
-static double position_at(int wide, const void *positions, size_t at)
+static double position_at(int is_float64, const void *positions, size_t at)
 {
-    return wide ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
+    return is_float64 ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
 }
 
-static void set_position(int wide, void *positions, size_t at, double value)
+static void set_position(int is_float64, void *positions, size_t at, double value)
 {
-    if (wide)
+    if (is_float64)
         ((double *)positions)[at] = value;
     else
         ((float *)positions)[at] = (float)value;
 }
 
-void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *positions, const double *source,
+void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
                const double origin[3], double *max_error, double *sum_squares)
 {
     double largest = 0.0, sum = 0.0;
@@ -133,7 +133,7 @@ void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *posit
             double square = 0.0;
             for (size_t axis = 0; axis < 3; axis++) {
                 size_t at = (v * 3 + axis) * T + t;
-                double e = position_at(wide, positions, at) - (source[at] + origin[axis]);
+                double e = position_at(is_float64, positions, at) - (source[at] + origin[axis]);
                 square += e * e;
             }
             sum += square;
@@ -143,13 +143,13 @@ void ath_error(int32_t vertex_count, int32_t frames, int wide, const void *posit
     *sum_squares = sum;
 }
 
-static double rounded(int wide, double value) { return wide ? value : ath_single(value); }
+static double rounded(int is_float64, double value) { return is_float64 ? value : ath_single(value); }
 
-static double corrected_error(int wide, const double here[3], const double want[3], const int32_t q[3], double step)
+static double corrected_error(int is_float64, const double here[3], const double want[3], const int32_t q[3], double step)
 {
     double square = 0.0;
     for (int32_t k = 0; k < 3; k++) {
-        double e = rounded(wide, ath_corrected(here[k], q[k], step)) - want[k];
+        double e = rounded(is_float64, ath_corrected(here[k], q[k], step)) - want[k];
         square += e * e;
     }
     return square;
@@ -161,7 +161,7 @@ static int32_t to_steps(double value)
 }
 
 /* The correction with fewest non-zero axes, then the smallest error, that comes within the limit. */
-static int choose_correction(int wide, const double here[3], const double want[3], double limit, double step,
+static int choose_correction(int is_float64, const double here[3], const double want[3], double limit, double step,
                              int32_t best[3])
 {
     int32_t steps[3], found = 0;
@@ -177,7 +177,7 @@ static int choose_correction(int wide, const double here[3], const double want[3
             int32_t q[3];
             if ((mask & 1) + (mask >> 1 & 1) + (mask >> 2) != axes) continue;
             for (int32_t k = 0; k < 3; k++) q[k] = mask >> k & 1 ? steps[k] : 0;
-            double square = corrected_error(wide, here, want, q, step);
+            double square = corrected_error(is_float64, here, want, q, step);
             if (square > least) continue;
             least = square;
             found = 1;
@@ -187,7 +187,7 @@ static int choose_correction(int wide, const double here[3], const double want[3
     return found;
 }
 
-int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, const void *positions,
+int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
                              const double *source, const double origin[3], const double *limits, double step,
                              int32_t *corrections, int64_t capacity)
 {
@@ -198,13 +198,13 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, con
             double here[3], want[3], square = 0.0, limit = limits[v];
             for (size_t k = 0; k < 3; k++) {
                 size_t at = ((size_t)v * 3 + k) * T + (size_t)t;
-                here[k] = position_at(wide, positions, at);
+                here[k] = position_at(is_float64, positions, at);
                 want[k] = source[at] + origin[k];
                 square += (here[k] - want[k]) * (here[k] - want[k]);
             }
             if (!(square > limit * limit)) continue;
             int32_t q[3];
-            if (!choose_correction(wide, here, want, limit, step, q)) return -1;
+            if (!choose_correction(is_float64, here, want, limit, step, q)) return -1;
             if (count < capacity) {
                 int32_t *row = corrections + 5 * count;
                 row[0] = v;
@@ -216,7 +216,7 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int wide, con
     return count;
 }
 
-void ath_apply_corrections(int32_t frames, int wide, void *positions, double step, const int32_t *corrections,
+void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step, const int32_t *corrections,
                            int64_t count)
 {
     size_t T = (size_t)frames;
@@ -224,8 +224,8 @@ void ath_apply_corrections(int32_t frames, int wide, void *positions, double ste
         const int32_t *row = corrections + 5 * i;
         for (size_t k = 0; k < 3; k++) {
             size_t at = ((size_t)row[0] * 3 + k) * T + (size_t)row[1];
-            double here = position_at(wide, positions, at);
-            if (row[2 + k] != 0) set_position(wide, positions, at, ath_corrected(here, row[2 + k], step));
+            double here = position_at(is_float64, positions, at);
+            if (row[2 + k] != 0) set_position(is_float64, positions, at, ath_corrected(here, row[2 + k], step));
         }
     }
 }

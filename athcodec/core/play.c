@@ -150,18 +150,18 @@ static void matrix_of(const ath_file *file, const ath_part *part, const double m
 
 /* ---- vertices ---- */
 
-/* Where a position goes, as float or (wide) double. */
+/* Where a position goes, as float or (is_float64) double. */
 typedef struct {
     char *out;
     size_t stride;
     const int32_t *place; /* null: file order */
-    int wide;
+    int is_float64;
 } target;
 
 ATH_INLINE void put(const target *to, size_t vertex, double x, double y, double z)
 {
     char *at = to->out + (to->place ? (size_t)to->place[vertex] : vertex) * to->stride;
-    if (to->wide) {
+    if (to->is_float64) {
         double *out = (double *)(void *)at;
         out[0] = x;
         out[1] = y;
@@ -199,7 +199,7 @@ ATH_HOT static void narrow_block(const double *ATH_RESTRICT block, size_t count,
     for (size_t i = 0; i < count; i++) out[i] = (float)block[i];
 }
 
-static int is_packed(const target *to) { return !to->wide && !to->place && to->stride == 3 * sizeof(float); }
+static int is_packed(const target *to) { return !to->is_float64 && !to->place && to->stride == 3 * sizeof(float); }
 
 static void put_node(const ath_file *file, const ath_part *part, const double m[ATH_MAP], const target *to)
 {
@@ -213,7 +213,7 @@ static void put_node(const ath_file *file, const ath_part *part, const double m[
             narrow_block(block, 3 * count, (float *)(void *)to->out + 3 * first);
             continue;
         }
-        if (!file->info.wide && to->wide) round_block(block, 3 * count);
+        if (!file->info.is_float64 && to->is_float64) round_block(block, 3 * count);
         for (size_t i = 0; i < count; i++) put(to, first + i, block[3 * i], block[3 * i + 1], block[3 * i + 2]);
     }
 }
@@ -264,7 +264,7 @@ static void put_doubles(const shown_frames *shown, size_t index, size_t count, s
 
 static void put_exact(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
 {
-    if (shown->segment[0]->wide)
+    if (shown->segment[0]->is_float64)
         put_doubles(shown, index, count, vertex, to);
     else
         put_floats(shown, index, count, vertex, to);
@@ -288,13 +288,13 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
     return result;
 }
 
-static target target_of(const ath_file *file, ath_order order, void *out, size_t stride, int wide)
+static target target_of(const ath_file *file, ath_order order, void *out, size_t stride, int is_float64)
 {
     target to;
     to.out = (char *)out;
     to.stride = stride;
     to.place = order == ATH_SOURCE_ORDER ? file->vertex_source : 0;
-    to.wide = wide;
+    to.is_float64 = is_float64;
     return to;
 }
 
@@ -304,7 +304,7 @@ int ath_positions(const ath_file *file, const ath_segment *const *segments, int3
     return positions(file, segments, segment_count, frame, target_of(file, order, xyz, stride, 0));
 }
 
-int ath_positions_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+int ath_positions_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                        ath_order order, double *xyz, size_t stride)
 {
     return positions(file, segments, segment_count, frame, target_of(file, order, xyz, stride, 1));
@@ -324,7 +324,7 @@ int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t 
     return exact(file, segments, segment_count, frame, target_of(file, ATH_FILE_ORDER, xyz, stride, 0));
 }
 
-int ath_exact_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                    double *xyz, size_t stride)
 {
     return exact(file, segments, segment_count, frame, target_of(file, ATH_FILE_ORDER, xyz, stride, 1));
@@ -337,7 +337,7 @@ int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments
 }
 
 static int matrices(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, void *out,
-                    size_t stride, int wide)
+                    size_t stride, int is_float64)
 {
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, &shown);
@@ -349,7 +349,7 @@ static int matrices(const ath_file *file, const ath_segment *const *segments, in
         char *at = (char *)out + (size_t)part->index * stride;
         blend_map(&shown, part->index, map);
         matrix_of(file, part, map, matrix);
-        if (wide)
+        if (is_float64)
             memcpy(at, matrix, sizeof matrix);
         else
             for (int32_t k = 0; k < 12; k++) ((float *)(void *)at)[k] = (float)matrix[k];
@@ -363,7 +363,7 @@ int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32
     return matrices(file, segments, segment_count, frame, out, stride, 0);
 }
 
-int ath_matrices_wide(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                       double *out, size_t stride)
 {
     return matrices(file, segments, segment_count, frame, out, stride, 1);

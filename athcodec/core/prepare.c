@@ -116,9 +116,9 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
 static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, number = file->info.wide ? sizeof(double) : sizeof(float);
+    uint64_t T = (uint64_t)frames, number = file->info.is_float64 ? sizeof(double) : sizeof(float);
     segment->frames = frames;
-    segment->wide = file->info.wide;
+    segment->is_float64 = file->info.is_float64;
     ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
     ath_take(&arena, sizeof *segment);
     segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
@@ -430,7 +430,7 @@ static void store_piece(ath_work *work, const ath_piece *piece, const double *pl
     ath_segment *segment = work->segment;
     size_t at = 3 * (size_t)work->exact, frame_size = 3 * (size_t)segment->exact_vertices;
     const double *origin = work->file->info.origin;
-    if (segment->wide)
+    if (segment->is_float64)
         store_doubles(placed, 3 * piece->count, segment->frames, origin, (double *)segment->positions + at, frame_size);
     else
         store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
@@ -439,7 +439,7 @@ static void store_piece(ath_work *work, const ath_piece *piece, const double *pl
 static void correct(ath_segment *segment, size_t at, int32_t steps, double step)
 {
     if (steps == 0) return;
-    if (segment->wide) {
+    if (segment->is_float64) {
         double *position = (double *)segment->positions + at;
         *position = ath_corrected(*position, steps, step);
     } else {
@@ -468,11 +468,11 @@ static int read_exact_point(ath_work *work, size_t at)
     exact_reader *reader = &work->exact_level;
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
-        known[k] = work->segment->wide ? ((const double *)work->segment->positions)[at + k]
+        known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
                                        : (double)((const float *)work->segment->positions)[at + k];
-    if (!code_exact_point(&reader->coder, reader->model, work->segment->wide, known, reader->length, number)) return 0;
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number)) return 0;
     for (size_t k = 0; k < 3; k++) {
-        if (work->segment->wide)
+        if (work->segment->is_float64)
             ((double *)work->segment->positions)[at + k] = number[k];
         else
             ((float *)work->segment->positions)[at + k] = (float)number[k];

@@ -10,10 +10,10 @@ struct ath_segment {
     int32_t index, level;   /* level -1: not prepared */
     int32_t start, frames;
     int32_t exact_vertices, node_count, part_count;
-    int32_t wide;
+    int32_t is_float64;
     ath_part *parts;
     double *maps;           /* frames x node_count x ATH_MAP */
-    void *positions;        /* frames x exact_vertices x 3, float or (wide) double, absolute */
+    void *positions;        /* frames x exact_vertices x 3, float or (is_float64) double, absolute */
 };
 
 #endif

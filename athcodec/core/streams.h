@@ -295,7 +295,7 @@ static int code_rest(ath_coder *coder, rest_model *model, const ath_branch *bran
 /* ---- exact rest pose, times ---- */
 
 static int code_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches, int32_t branch_count,
-                           int wide, double *rest)
+                           int is_float64, double *rest)
 {
     int32_t length[3] = {0, 0, 0};
     exact_model_init(model);
@@ -303,7 +303,7 @@ static int code_exact_rest(ath_coder *coder, exact_model *model, const ath_branc
         for (int32_t i = 0; i < branches[b].count; i++) {
             double predicted[3], *out = rest + 3 * (size_t)(branches[b].first + i);
             predict_rest(branches + b, rest, i, predicted);
-            if (!code_exact_point(coder, model, wide, predicted, length, out)) return 0;
+            if (!code_exact_point(coder, model, is_float64, predicted, length, out)) return 0;
         }
     return 1;
 }

@@ -72,9 +72,9 @@ export interface AthInfo {
   readonly chunkCount: number;
   /** Whether positions are double in the file's own arithmetic; a Float64Array then holds more than a
    * Float32Array. */
-  readonly wide: boolean;
+  readonly isFloat64: boolean;
   /** The same of the rest pose. */
-  readonly restWide: boolean;
+  readonly restIsFloat64: boolean;
   /** Thresholds by which nodes were accepted. */
   readonly epsilon: number;
   readonly xi: number;

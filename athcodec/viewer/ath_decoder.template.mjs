@@ -13,8 +13,8 @@ const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
 const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
-  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32", levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", wide: "i32", epsilon: "f32",
-  xi: "f32", eta: "u32", lambda: "u32", restWide: "i32",
+  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32", levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", isFloat64: "i32", epsilon: "f32",
+  xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
 };
 const INFO_SIZE = 112;
 const CLIP = {
@@ -342,9 +342,9 @@ export class AthFile {
       this.#core.c.ath_get_info(this.#at, at);
       return this.#core.struct(INFO, at);
     });
-    const { originX, originY, originZ, wide, restWide, ...rest } = info;
+    const { originX, originY, originZ, isFloat64, restIsFloat64, ...rest } = info;
     const origin = [originX, originY, originZ];
-    return Object.freeze({ ...rest, origin, wide: wide !== 0, restWide: restWide !== 0 });
+    return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0 });
   }
 
   #clipTable() {
@@ -433,7 +433,7 @@ export class AthFile {
     const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
     const result = asOut(out, length, [Float32Array, Float64Array]);
     return this.#fill(result, length, (at) => {
-      if (result instanceof Float64Array) c.ath_rest_wide(this.#at, which, at, 24);
+      if (result instanceof Float64Array) c.ath_rest_float64(this.#at, which, at, 24);
       else c.ath_rest(this.#at, which, at, 12);
       return OK;
     });
@@ -670,7 +670,7 @@ export class AthFile {
     const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
     const result = asOut(out, length, [Float32Array, Float64Array]);
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
-      ? c.ath_positions_wide(this.#at, array, count, frame, which, at, 24)
+      ? c.ath_positions_float64(this.#at, array, count, frame, which, at, 24)
       : c.ath_positions(this.#at, array, count, frame, which, at, 12));
   }
 
@@ -678,7 +678,7 @@ export class AthFile {
     const c = this.#c, length = 12 * this.#most(segments, 1);
     const result = asOut(out, length, [Float32Array, Float64Array]);
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
-      ? c.ath_matrices_wide(this.#at, array, count, frame, at, 96)
+      ? c.ath_matrices_float64(this.#at, array, count, frame, at, 96)
       : c.ath_matrices(this.#at, array, count, frame, at, 48));
   }
 

@@ -70,26 +70,26 @@ static double place(const user *u, int32_t argument)
     return frame;
 }
 
-static void play(user *u, int32_t argument, int wide)
+static void play(user *u, int32_t argument, int is_float64)
 {
-    size_t vertices = (size_t)u->info.vertex_count, number = wide ? sizeof(double) : sizeof(float);
+    size_t vertices = (size_t)u->info.vertex_count, number = is_float64 ? sizeof(double) : sizeof(float);
     size_t stride = (size_t)(3 + argument % 2) * number;
     ath_order order = argument & 4 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER;
     double at = place(u, argument);
     void *out = fuzz_memory(vertices * stride, 0);
-    int result = wide ? ath_positions_wide(u->file, u->held, HELD + 1, at, order, out, stride)
+    int result = is_float64 ? ath_positions_float64(u->file, u->held, HELD + 1, at, order, out, stride)
                       : ath_positions(u->file, u->held, HELD + 1, at, order, out, stride);
     REQUIRE(result == ATH_OK || result == ATH_HELD || result == ATH_NOT_PREPARED, "playing gives its codes");
     free(out);
 }
 
-static void show_parts(user *u, int32_t argument, int wide)
+static void show_parts(user *u, int32_t argument, int is_float64)
 {
     double at = place(u, argument);
     int32_t level = ath_shown_level(u->file, u->held, HELD + 1, at), parts, nodes, exact;
     if (level < 0) return;
     ath_cut_size(u->file, level, &parts, &nodes, &exact);
-    size_t number = wide ? sizeof(double) : sizeof(float);
+    size_t number = is_float64 ? sizeof(double) : sizeof(float);
     void *matrices = fuzz_memory((size_t)nodes * 12 * number, 0), *stems = fuzz_memory((size_t)exact * 3 * number, 0);
     ath_part *cut = fuzz_memory((size_t)parts * sizeof *cut, 0);
     ath_cut(u->file, level, cut);
@@ -99,9 +99,9 @@ static void show_parts(user *u, int32_t argument, int wide)
         next += cut[i].count;
     }
     REQUIRE(next == u->info.vertex_count, "parts hold every vertex");
-    if (wide) {
-        ath_matrices_wide(u->file, u->held, HELD + 1, at, matrices, 12 * number);
-        ath_exact_wide(u->file, u->held, HELD + 1, at, stems, 3 * number);
+    if (is_float64) {
+        ath_matrices_float64(u->file, u->held, HELD + 1, at, matrices, 12 * number);
+        ath_exact_float64(u->file, u->held, HELD + 1, at, stems, 3 * number);
     } else {
         ath_matrices(u->file, u->held, HELD + 1, at, matrices, 12 * number);
         ath_exact(u->file, u->held, HELD + 1, at, stems, 3 * number);
@@ -172,14 +172,14 @@ static void misuse(user *u, int32_t argument)
 static void rest(user *u, int32_t argument)
 {
     size_t vertices = (size_t)u->info.vertex_count;
-    double *wide = fuzz_memory(3 * vertices * sizeof *wide, 0);
-    float *narrow = fuzz_memory(3 * vertices * sizeof *narrow, 0);
-    ath_rest_wide(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, wide, 3 * sizeof *wide);
-    ath_rest(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, narrow, 3 * sizeof *narrow);
+    double *doubles = fuzz_memory(3 * vertices * sizeof *doubles, 0);
+    float *floats = fuzz_memory(3 * vertices * sizeof *floats, 0);
+    ath_rest_float64(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, doubles, 3 * sizeof *doubles);
+    ath_rest(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, floats, 3 * sizeof *floats);
     for (size_t i = 0; i < 3 * vertices; i++)
-        REQUIRE(narrow[i] == (float)wide[i] || wide[i] != wide[i], "both widths hold the same rest pose");
-    free(narrow);
-    free(wide);
+        REQUIRE(floats[i] == (float)doubles[i] || doubles[i] != doubles[i], "both widths hold the same rest pose");
+    free(floats);
+    free(doubles);
 }
 
 static void call(user *u, int32_t which, int32_t argument)

@@ -165,8 +165,8 @@ int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b)
     double *first = fuzz_memory(size, 0), *second = fuzz_memory(size, 0xff);
     int same = 1;
     for (int32_t t = a->start; t < a->start + a->frames && same; t++) {
-        REQUIRE(ath_positions_wide(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK, "it plays");
-        REQUIRE(ath_positions_wide(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK, "it plays");
+        REQUIRE(ath_positions_float64(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK, "it plays");
+        REQUIRE(ath_positions_float64(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK, "it plays");
         same = memcmp(first, second, size) == 0;
     }
     free(first);
