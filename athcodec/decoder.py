@@ -99,6 +99,9 @@ class _OfFile(Generic[T]):
     def __init__(self, get: Callable[[AthFile], T]):
         self._get = get
 
+    def __set_name__(self, owner: type[Decoder], name: str) -> None:
+        self.__doc__ = getattr(AthFile, name).__doc__
+
     def __get__(self, decoder: Decoder, owner: type[Decoder]) -> T:
         return self._get(decoder.file)
 
@@ -125,6 +128,10 @@ class Decoder:
         The file, which all decoders of its clips share.
     clip : Clip
         The clip that is played.
+    clips, vertex_count, branch_count, level_count, full_level_count, deepest, complete, missing, max_error_bound, dtype
+        What `file` says of itself; see AthFile.
+    rest, hierarchy, vertex_branch, branch_parent, stem_index, edges, faces, attributes, error_weights
+        Static data of `file`; see AthFile.
 
     Raises
     ------

@@ -33,12 +33,30 @@ Range = tuple[int, int]
 
 
 class Remote:
-    """A seekable binary file behind `url`; `requests` and `bytes` count what was asked of the server and what
-    came.
+    """A seekable binary file behind a URL.
 
-    timeout: seconds without a byte until a request counts as failed. retries: how often it is made again.
-    Further options go to fsspec's file system, headers=... and client_kwargs=... for HTTP. Raises
-    RemoteError.
+    Parameters
+    ----------
+    url : str
+        http://, https://, or whatever else fsspec knows.
+    timeout : float
+        Seconds without a byte until a request counts as failed.
+    retries : int
+        How often a failed request is made again.
+    **options
+        For fsspec's file system, such as headers=... and client_kwargs=... for HTTP.
+
+    Attributes
+    ----------
+    requests, bytes : int
+        What was asked of the server, and what came.
+    size : int
+        Length of the file, bytes.
+
+    Raises
+    ------
+    RemoteError
+        Where the bytes cannot be had, or are no longer those of the file that was opened.
     """
 
     def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):
