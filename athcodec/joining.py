@@ -23,12 +23,26 @@ NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip an
 
 
 def join(clips: Mapping[str, MotionClip]) -> MotionClip:
-    """One clip of several by name, which go into one .ath file, in this order.
+    """One clip of several, which go into one .ath file.
 
     They have the same vertices, branches, faces, edges and attributes, which the file holds once, and the same rest
     pose: where that of a clip is its first frame, as it is for sources without one, the others' counts. Metadata in
-    which they differ are kept for each. Closing the result closes them all. Raises ClipError where they do not fit
-    together.
+    which they differ are kept for each. Frames are read when they are asked for.
+
+    Parameters
+    ----------
+    clips : mapping of str to MotionClip
+        By name, in the order of the file.
+
+    Returns
+    -------
+    MotionClip
+        All frames one clip after the other; its `clip_ranges` say where each is. Closing it closes them all.
+
+    Raises
+    ------
+    ClipError
+        Where there are none, or they do not fit together.
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -48,7 +62,18 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
-    """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
+    """The clips that `join` made one of.
+
+    Parameters
+    ----------
+    clip : MotionClip
+        One or several clips; read when frames are asked for.
+
+    Returns
+    -------
+    dict of str to MotionClip
+        By name; a single clip that has none is "". Closing any of them closes all.
+    """
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
     return {clip_range.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
@@ -58,8 +83,8 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
 
 def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Of one of several clips: what all have in common and what it has of its own, from those of all as one."""
-    every = metadata.get(OWN)
-    own = every.get(name) if isinstance(every, dict) else None
+    by_clip = metadata.get(OWN)
+    own = by_clip.get(name) if isinstance(by_clip, dict) else None
     common = {key: value for key, value in metadata.items() if key != OWN}
     return common | own if isinstance(own, dict) else common
 
@@ -67,9 +92,23 @@ def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     """The clip as a loop: behind its last frame comes its first, after the mean time of a frame.
 
-    blend: for a motion that does not end where it began, so many frames at its end are taken off and blended into those
-    at its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a
-    third of the frames. Raises ClipError.
+    Parameters
+    ----------
+    clip : MotionClip
+        A single clip; read when frames are asked for.
+    blend : int
+        For a motion that does not end where it began, so many frames at its end are taken off and blended into those at
+        its beginning, which they then lead to: frame 0 is what followed the new last frame in the source.
+
+    Returns
+    -------
+    MotionClip
+        `blend` frames shorter. Closing it closes `clip`.
+
+    Raises
+    ------
+    ClipError
+        Where `clip` is several clips, or `blend` more than a third of its frames.
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= blend <= clip.frame_count // 3:
@@ -83,15 +122,16 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
                      metadata=clip.metadata | {BLEND: blend})
 
 
-def with_clip_metadata(motion: Any) -> dict[str, Any]:
-    """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
+def clip_metadata(motion: Any) -> dict[str, Any]:
+    """Metadata of a motion, with the name of its clip and whether that is a loop, for files that hold a single clip."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
     return metadata | ({NAME: clip_range.name} if clip_range.name else {}) | ({LOOP: True} if clip_range.loop else {})
 
 
 def read_clip_metadata(clip: MotionClip) -> None:
-    """Takes name and loop out of the metadata of a clip, and gives them to it. Raises ClipError."""
+    """Moves name and loop from the metadata of a clip, as clip_metadata has put them there, to its range. Raises
+    ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:
@@ -141,9 +181,9 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     """What all have in common, and under OWN what each has of its own."""
-    every = [clip.metadata for clip in clips.values()]
-    common = {key: value for key, value in every[0].items()
-              if all(key in each and each[key] == value for each in every)}
+    first, *others = (clip.metadata for clip in clips.values())
+    common = {key: value for key, value in first.items()
+              if all(key in metadata and metadata[key] == value for metadata in others)}
     own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
            for name, clip in clips.items()}
     own = {name: metadata for name, metadata in own.items() if metadata}

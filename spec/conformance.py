@@ -94,7 +94,7 @@ def vectors() -> list[Vector]:
 def parse_line(line: str) -> Vector:
     facts, reason = line.split(" # ", 1)
     name, checksum, *results = facts.split()
-    return Vector(name, checksum, dict(each.split("=") for each in results), reason)
+    return Vector(name, checksum, dict(result.split("=") for result in results), reason)
 
 
 def format_line(name: str, data: bytes, results: dict[str, str], reason: str) -> str:

@@ -150,6 +150,14 @@ def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path)
         assert np.array_equal(part.time, decoder.time[20:70])
 
 
+def test_depth_is_another_word_for_level(encoded, tmp_path):
+    for word in ("level", "depth"):
+        assert run("truncate", encoded, tmp_path / f"{word}.ath", f"--{word}", 1) == 0
+        assert run("decode", encoded, tmp_path / f"{word}.mdd", f"--{word}", 0) == 0
+    for suffix in ("ath", "mdd"):
+        assert (tmp_path / f"level.{suffix}").read_bytes() == (tmp_path / f"depth.{suffix}").read_bytes()
+
+
 def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, capsys):
     shorter = tmp_path / "a.ath"
     assert run("truncate", encoded, shorter, "--level", 1) == 0

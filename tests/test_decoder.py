@@ -340,8 +340,8 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
     def read(_) -> None:
         for _ in range(10):
             decoder.file.check()
-            for name in ("attributes", "joined_metadata", "faces", "edges"):
-                vars(decoder.file).pop(name)  # remembered otherwise
+            for name in ("attributes", "metadata", "faces", "edges"):
+                vars(decoder.file).pop(name)   # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata == full_clip.metadata
 
@@ -387,7 +387,7 @@ def test_what_is_not_in_the_file_is_refused_with_the_range(ask, bushy_ath):
 
 def test_a_path_is_closed_again_and_a_file_object_is_left_open(bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        own = decoder._file
+        own = decoder.file.source
     with open(bushy_ath, "rb") as file:
         with athcodec.open(file) as decoder:
             decoder.positions(0)
@@ -436,8 +436,8 @@ def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
         assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
         assert np.array_equal(partial.positions(), plain.positions())
-        plain.check()
-        partial.check()
+        plain.file.check()
+        partial.file.check()
 
 
 def test_checking_reads_every_byte_behind_the_tables(full_ath):

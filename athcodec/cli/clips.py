@@ -88,7 +88,7 @@ def with_sources(decoder: Decoder, args: argparse.Namespace,
                for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
     if len(sources) != len(played):
         raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
-    return [(each, path, clip) for each, (path, clip) in zip(played, sources)]
+    return [(decoder, path, clip) for decoder, (path, clip) in zip(played, sources)]
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:

@@ -31,8 +31,9 @@ from athcodec.exporters.parts import (
     own_arrays,
     parts_of,
     rows_of,
+    told,
 )
-from athcodec.sources.parts import OWN, ArrayDescriptor, turned_corners
+from athcodec.sources.parts import OWN, turned_corners
 
 SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
           "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}
@@ -203,5 +204,4 @@ def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, st
         raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
         held = _filled(imath.UnsignedCharArray, raw)
         Abc.OUcharArrayProperty(properties, f"array{i}").setValue(held)
-        descriptor = ArrayDescriptor.of(name, values, domain)
-        Abc.OStringProperty(properties, f"array{i}.descriptor").setValue(json.dumps(descriptor._asdict()))
+        Abc.OStringProperty(properties, f"array{i}.told").setValue(json.dumps(told(name, values, domain)))

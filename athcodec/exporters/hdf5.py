@@ -22,7 +22,7 @@ from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, che
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.hierarchy import branch_orders
-from athcodec.joining import with_clip_metadata
+from athcodec.joining import clip_metadata
 
 CHUNK_BYTES = 1 << 20
 
@@ -179,7 +179,7 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
         rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
         dtype=clip.dtype,
         gzip=options.gzip,
-        metadata=with_clip_metadata(clip),
+        metadata=clip_metadata(clip),
         **{name: getattr(clip, name, None) for name in optional},
     )
     with writer:

@@ -19,7 +19,7 @@ from athcodec.clip import RESERVED_NAMES
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.hierarchy import branch_orders
-from athcodec.joining import with_clip_metadata
+from athcodec.joining import clip_metadata
 from athcodec.sources.npz import METADATA
 
 
@@ -61,7 +61,7 @@ def _arrays(motion: Any) -> dict[str, np.ndarray]:
     for name in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
         arrays[name] = getattr(motion, name)
     arrays |= motion.attributes
-    metadata = with_clip_metadata(motion)
+    metadata = clip_metadata(motion)
     if metadata:
         arrays[METADATA] = np.array(json.dumps(metadata))
     return {name: np.asarray(values) for name, values in arrays.items() if values is not None}

@@ -6,6 +6,7 @@ knows no format and touches no positions.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -186,3 +187,9 @@ def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator
             yield name, np.asarray(values), domain
     for name, (values, domain) in left.items():
         yield name, values, "" if domain == "other" else domain
+
+
+def told(name: str, values: np.ndarray, domain: str) -> dict[str, str]:
+    """What makes an array of its bytes again; see sources/parts.py."""
+    dtype = json.dumps(values.dtype.descr) if values.dtype.names else values.dtype.str
+    return {"name": name, "dtype": dtype, "shape": json.dumps(list(values.shape)), "domain": domain}

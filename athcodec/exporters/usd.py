@@ -30,8 +30,8 @@ from athcodec.exporters.parts import (
     own_arrays,
     parts_of,
     rows_of,
+    told,
 )
-from athcodec.sources.parts import ArrayDescriptor
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20
@@ -256,7 +256,7 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
                                          Sdf.VariabilityUniform)
         raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
         attribute.Set(Vt.UCharArray.FromNumpy(raw) if len(raw) else Vt.UCharArray())
-        for key, text in ArrayDescriptor.of(name, values, domain)._asdict().items():
+        for key, text in told(name, values, domain).items():
             attribute.SetCustomDataByKey(f"{OWN}:{key}", text)
 
 

@@ -26,7 +26,6 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.frames import Frames
 from athcodec.sources.parts import (
     OWN,
-    ArrayDescriptor,
     Part,
     Static,
     edges,
@@ -34,6 +33,7 @@ from athcodec.sources.parts import (
     fields,
     joined,
     names_and_kinds,
+    own_array,
     own_metadata,
     turned_corners,
 )
@@ -415,7 +415,7 @@ def _is_own(schema: Any) -> bool:
     return _own_properties(schema) is not None
 
 
-def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]:
+def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
     """The metadata, JSON, and further arrays, that our writer has kept."""
     top = archive.getTop()
     if top.getNumChildren() != 1:
@@ -429,23 +429,24 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]
     names = [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
     kept = []
     for name in names:
-        if name != OWN and f"{name}.descriptor" in names:
-            descriptor = _descriptor(Abc.IStringProperty(properties, f"{name}.descriptor").getValue())
-            kept.append((descriptor, np.array(Abc.IUcharArrayProperty(properties, name).getValue(), np.uint8).tobytes()))
+        if name != OWN and f"{name}.told" in names:
+            told = _told(Abc.IStringProperty(properties, f"{name}.told").getValue())
+            kept.append((told, np.array(Abc.IUcharArrayProperty(properties, name).getValue(), np.uint8).tobytes()))
     return Abc.IStringProperty(properties, OWN).getValue(), kept
 
 
-def _descriptor(text: str) -> ArrayDescriptor:
+def _told(text: str) -> dict[str, str]:
     try:
-        found = ArrayDescriptor(**json.loads(text))
-    except (ValueError, TypeError, RecursionError):
-        return ArrayDescriptor()
-    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()) else {}
 
 
 def _add_kept(kept: list, attributes: dict[str, np.ndarray], domains: dict[str, str], vertices: int, skip: Any) -> None:
-    for descriptor, raw in kept:
-        name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
+    for told, raw in kept:
+        name, domain = told.get("name", ""), told.get("domain", "")
+        values = own_array(raw, told.get("dtype", ""), told.get("shape", ""))
         if values is None or name in skip or not name or domain == "vertex" and len(values) != vertices:
             continue
         attributes[name] = values

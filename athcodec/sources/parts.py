@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -208,27 +208,13 @@ def own_metadata(text: Any) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name not in KNOWN_METADATA}
 
 
-class ArrayDescriptor(NamedTuple):
-    """Of a static array that our writers keep byte for byte where the format has no place for it, as text."""
-
-    name: str = ""
-    dtype: str = ""
-    shape: str = ""
-    domain: str = ""
-
-    @classmethod
-    def of(cls, name: str, values: np.ndarray, domain: str) -> ArrayDescriptor:
-        dtype = json.dumps(values.dtype.descr) if values.dtype.names else values.dtype.str
-        return cls(name, dtype, json.dumps(list(values.shape)), domain)
-
-    def array(self, raw: bytes) -> np.ndarray | None:
-        """The array that has these bytes; None where it cannot have them."""
-        try:
-            fields = json.loads(self.dtype) if self.dtype.startswith("[") else None
-            dtype = np.dtype([tuple(entry) for entry in fields] if fields else self.dtype)
-            return None if dtype.hasobject else np.frombuffer(raw, dtype).reshape(json.loads(self.shape))
-        except (ValueError, TypeError, RecursionError):
-            return None
+def own_array(raw: bytes, dtype: str, shape: str) -> np.ndarray | None:
+    """An array that a writer of ours has kept byte for byte; None where that is not what it is."""
+    try:
+        kind = np.dtype([tuple(each) for each in json.loads(dtype)] if dtype.startswith("[") else dtype)
+        return None if kind.hasobject else np.frombuffer(raw, kind).reshape(json.loads(shape))
+    except (ValueError, TypeError, RecursionError):
+        return None
 
 
 def turned_corners(counts: np.ndarray) -> np.ndarray:

@@ -33,7 +33,6 @@ from athcodec.sources.crate import check_crates
 from athcodec.sources.frames import Frames
 from athcodec.sources.parts import (
     OWN,
-    ArrayDescriptor,
     Part,
     Static,
     edges,
@@ -41,6 +40,7 @@ from athcodec.sources.parts import (
     fields,
     joined,
     names_and_kinds,
+    own_array,
     own_metadata,
 )
 from athcodec.units import METRES
@@ -453,7 +453,7 @@ def _own_array(attribute: Usd.Attribute) -> np.ndarray | None:
     values, dtype, shape = attribute.Get(), _said(attribute, "dtype"), _said(attribute, "shape")
     if not isinstance(values, Vt.UCharArray) or dtype is None or shape is None:
         return None
-    return ArrayDescriptor(dtype=dtype, shape=shape).array(np.array(values).tobytes())
+    return own_array(np.array(values).tobytes(), dtype, shape)
 
 
 # ---- skeletons ----
