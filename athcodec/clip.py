@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,7 @@ class MotionClip:
 
     positions      (T, N, 3) float32 or float64, in `metadata["unit"]`: an array, or anything that has shape
                    and dtype and is sliced by frames (an h5py.Dataset, a numpy.memmap). Never read whole.
-    time           (T,) seconds, strictly increasing (within each clip range); becomes float64. The steps may differ.
+    time           (T,) seconds, strictly increasing (within each clip_range); becomes float64. The steps may differ.
     vertex_branch  (N,) integers, the branch of each vertex; becomes int32. None, and branch_parent too: not known,
                    see discovery.py.
     branch_parent  (B,) integers, -1 for a root (several are allowed); becomes int32.
@@ -70,8 +70,8 @@ class MotionClip:
                    them. "fps" and "start_frame": the rate and the number of the first frame in the tool that made it,
                    whose frames are then start_frame + time * fps. "part_names": the objects that the vertices belong
                    to, one after the other, their numbers of vertices in the attribute part_vertex_counts.
-    clip_ranges    where it is several clips one after the other, or a loop: tuple of ClipRange, which make up all
-                   frames and have names of their own; joining.py makes such clips. Empty: one clip without a name.
+    clip_ranges          where it is several clips one after the other, or a loop: tuple of ClipRange, which make up all frames and
+                   have names of their own; joining.py makes such clips. Empty: one clip without a name.
     skin           the joints that moved the vertices, where a source has them; not stored, only for discovery.py.
     resource       something with close(), closed with the clip: the open file behind lazily read positions.
     unchanged      a function that tells whether what the positions are read from is as it was when the clip was made.
@@ -135,6 +135,15 @@ class MotionClip:
         return self.branch_parent is not None
 
     @property
+    def source_rest(self) -> np.ndarray:
+        """(N, 3) rest pose in `rest_dtype`, as it was given."""
+        return self.rest.astype(self.rest_dtype)
+
+    def replace(self, **changes: Any) -> MotionClip:
+        """A clip with other values of some fields; the rest pose keeps its dtype unless another is given."""
+        return replace(self, **{"rest": self.source_rest} | changes)
+
+    @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Faces of any sizes: corners per face (F,), and the vertex of each corner (C,), face after face; or None."""
         return polygons(self.faces, self.attributes)
@@ -152,7 +161,7 @@ class MotionClip:
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
-        """(start, stop) frames of each clip range; of the whole clip where it has none."""
+        """(start, stop) frames of each clip_range; of the whole clip where it has none."""
         return clip_range_frames(self.clip_ranges) if self.clip_ranges else [(0, self.frame_count)]
 
     def check(self) -> None:
@@ -289,8 +298,7 @@ def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> Non
     """ClipError unless they make up all frames, and several of them have names that can be told apart."""
     if not clip_ranges:
         return
-    counts = [clip_range.frame_count for clip_range in clip_ranges]
-    names = [clip_range.name for clip_range in clip_ranges]
+    counts, names = [clip_range.frame_count for clip_range in clip_ranges], [clip_range.name for clip_range in clip_ranges]
     if min(counts) < 1 or sum(counts) != frame_count:
         raise ClipError(f"clip_ranges: got {counts} frames, expected {frame_count} in all, at least one each")
     for name in names:
@@ -310,7 +318,7 @@ def is_name(text: str) -> bool:
 
 
 def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
-    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip range and one per frame."""
+    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip_range and one per frame."""
     time = np.asarray(time)
     if time.shape != (frame_count,):
         raise ClipError(f"time: got shape {time.shape}, expected ({frame_count},), one time per frame")

@@ -127,8 +127,8 @@ def _first_found(seen: _Seen, methods: Sequence[str], root: int | None) -> Found
 
 def with_branches(clip: MotionClip, found: Found) -> MotionClip:
     """The clip on these branches. Raises ClipError where they are not for so many vertices."""
-    return dataclasses.replace(clip, vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
-                               stem_index=found.stem_index, rest=clip.rest.astype(clip.rest_dtype))
+    return clip.replace(vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
+                        stem_index=found.stem_index)
 
 
 # ---- results that a user keeps, edits and uses again ----

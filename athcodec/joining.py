@@ -1,7 +1,7 @@
 """Several clips of one plant as one, for one file; and clips that repeat without a jump.
 
 A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such
-clips one after the other; the encoder sees one long clip whose ranges it codes apart. `split` is its inverse. `looped`
+clips one after the other; the encoder sees one long clip whose clip_ranges it codes apart. `split` is its inverse. `looped`
 makes a clip that can be played over and over. All read frames only when they are asked for.
 """
 
@@ -43,16 +43,15 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     return MotionClip(
         _Joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
         first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
-        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts),
-        skin=first.skin)
+        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts), skin=first.skin)
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
     """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
-    return {clip_range.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
-                                       clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
+    return {clip_range.name: clip.replace(positions=_Run(clip.positions, start, stop), time=clip.time[start:stop], clip_ranges=(clip_range,),
+                                metadata=metadata_of(clip.metadata, clip_range.name))
             for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)}
 
 
@@ -78,12 +77,12 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     frames = clip.frame_count - blend
     clip_ranges = (dataclasses.replace(clip_range, frame_count=frames, loop=True),)
     if not blend:
-        return _replaced(clip, clip_ranges=clip_ranges)
-    return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
-                     metadata=clip.metadata | {BLEND: blend})
+        return clip.replace(clip_ranges=clip_ranges)
+    return clip.replace(positions=_Blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
+                        metadata=clip.metadata | {BLEND: blend})
 
 
-def with_clip_metadata(motion: Any) -> dict[str, Any]:
+def with_notes(motion: Any) -> dict[str, Any]:
     """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
@@ -98,10 +97,6 @@ def read_clip_metadata(clip: MotionClip) -> None:
         clip.metadata = {key: value for key, value in clip.metadata.items() if key not in (NAME, LOOP)}
         clip.clip_ranges = (ClipRange(name, clip.frame_count, loop),)
         check_clip_ranges(clip.clip_ranges, clip.frame_count)
-
-
-def _replaced(clip: MotionClip, **changes: Any) -> MotionClip:
-    return dataclasses.replace(clip, rest=clip.rest.astype(clip.rest_dtype), **changes)
 
 
 def _only_clip_range(name: str, clip: MotionClip) -> ClipRange:
@@ -136,7 +131,7 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
             raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is "
                             f"{clip.rest[vertex].tolist()}, not {chosen.rest[vertex].tolist()}), expected clips of one "
                             "plant")
-    return chosen.rest.astype(chosen.rest_dtype)
+    return chosen.source_rest
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:

@@ -3,7 +3,6 @@ compressed; what was found can be kept, edited and used again."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections import Counter
 from pathlib import Path
@@ -34,8 +33,7 @@ def dressed() -> MotionClip:
 
 def bare(clip: MotionClip, **changes) -> MotionClip:
     """The clip without its branches."""
-    rest = changes.pop("rest", clip.rest).astype(clip.rest_dtype)
-    return dataclasses.replace(clip, vertex_branch=None, branch_parent=None, stem_index=None, rest=rest, **changes)
+    return clip.replace(vertex_branch=None, branch_parent=None, stem_index=None, **changes)
 
 
 def right_parents(found: discovery.Found, clip: MotionClip) -> float:
@@ -48,9 +46,8 @@ def right_parents(found: discovery.Found, clip: MotionClip) -> float:
 def renumbered(clip: MotionClip, order: np.ndarray) -> MotionClip:
     """The clip with vertex order[i] as vertex i."""
     place = np.argsort(order)
-    return dataclasses.replace(clip, positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
-                               vertex_branch=clip.vertex_branch[order], stem_index=None,
-                               rest=clip.rest[order].astype(clip.rest_dtype))
+    return clip.replace(positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
+                        vertex_branch=clip.vertex_branch[order], stem_index=None, rest=clip.source_rest[order])
 
 
 def test_tubes_and_leaves_are_found_again(dressed):

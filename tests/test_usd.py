@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import subprocess
@@ -395,8 +394,7 @@ def test_a_plant_of_edges_becomes_curves_that_keep_its_order(tmp_path, sample_cl
 def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
     whole_plant(tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as clip:
-        labelled = dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32),
-                                       branch_parent=np.array([-1]), rest=clip.rest.astype(clip.rest_dtype))
+        labelled = clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
             athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.usdc")

@@ -47,7 +47,7 @@ class PlantSample:
         clip, places = source.clip, source.hierarchy.vertex_source[self.vertices]
         chosen = np.sort(places)
         some = MotionClip(Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen),
-                                 clip.dtype), clip.time, rest=clip.rest[chosen].astype(clip.rest_dtype),
+                                 clip.dtype), clip.time, rest=clip.source_rest[chosen],
                           clip_ranges=clip.clip_ranges)
         sample = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
                        weights=None if source.weights is None else source.weights[self.vertices])

@@ -32,7 +32,7 @@ from athcodec.exporters.parts import (
     parts_of,
     rows_of,
 )
-from athcodec.sources.parts import OWN, ArrayDescriptor, turned_corners
+from athcodec.sources.parts import OWN, turned_corners
 
 SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
           "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}

@@ -178,8 +178,7 @@ def rows_of(values: np.ndarray, domain: str, part: Part) -> np.ndarray:
 
 def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[str, np.ndarray, str]]:
     """(name, array, domain) of what scene formats have no place for: the arrays in `left`, branches, edges, rest."""
-    rest = np.asarray(motion.rest)
-    yield "rest", rest.astype(getattr(motion, "rest_dtype", rest.dtype)), "vertex"
+    yield "rest", getattr(motion, "source_rest", motion.rest), "vertex"
     for name, domain in (("vertex_branch", "vertex"), ("branch_parent", ""), ("stem_index", "vertex"), ("edges", "")):
         values = getattr(motion, name, None)
         if values is not None:

@@ -31,7 +31,6 @@ from athcodec.exporters.parts import (
     parts_of,
     rows_of,
 )
-from athcodec.sources.parts import ArrayDescriptor
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20

@@ -7,7 +7,6 @@ none then (see discovery.py).
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import os
 import re
@@ -205,10 +204,9 @@ def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip
         turned = clip.attributes["normals"] @ (matrix / np.cbrt(np.linalg.det(matrix))).T
         clip.attributes["normals"] = turned.astype(clip.attributes["normals"].dtype)
     source, dtype = clip.positions, clip.dtype
-    clip.positions = Frames(lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
-                            clip.frame_count, clip.vertex_count, dtype)
-    rest = clip.rest @ matrix.T
-    return dataclasses.replace(clip, rest=rest.astype(clip.rest_dtype))
+    positions = Frames(lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
+                       clip.frame_count, clip.vertex_count, dtype)
+    return clip.replace(positions=positions, rest=(clip.rest @ matrix.T).astype(clip.rest_dtype))
 
 
 def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: object) -> MotionClip:

@@ -117,7 +117,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             | ({} if options.takes else _played(scene)),
             unchanged=lambda: file.stamp() == before, **branches,
         )
-        rest = clips[name].rest.astype(clips[name].rest_dtype)  # of several, the same for all
+        rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]
 
 
