@@ -21,6 +21,7 @@ import numpy as np
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.sources.frames import Frames
+from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
@@ -122,11 +123,8 @@ def read(path: str | PathLike[str], format: str | None = None, *, unit: str | No
     kind = find_format(path) if format is None else format_named(format, FORMATS)
     kind.check()
     clip = importlib.import_module(kind.module).read_clip(path, wanted)
-    try:
+    with closing_on_failure(clip):
         return _in_axes(_in_units(clip, unit), up_axis)
-    except BaseException:
-        clip.close()
-        raise
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:

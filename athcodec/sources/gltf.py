@@ -14,7 +14,7 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.frames import Frames
 from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, integer
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
+from athcodec.sources.opening import closing_on_failure, naming
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
@@ -35,6 +36,7 @@ MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
 ANIMATION = "animation:"
+_BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
 
 
@@ -46,26 +48,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     clip's ranges. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
     needs a package, OSError where a file cannot be opened.
     """
-    try:
+    with naming(path):
         file = GltfFile(path)
-    except ClipError as error:
-        raise _named(path, error) from error
-    try:
-        with np.errstate(all="ignore"):
-            return _read(file, options)
-    except ClipError as error:
-        file.close()
-        raise _named(path, error) from error
-    except (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError) as error:
-        file.close()
-        raise ClipError(f"{fspath(path)}: got glTF that cannot be read: {str(error)[:100]}") from error
-    except BaseException:
-        file.close()
-        raise
-
-
-def _named(path: str | PathLike[str], error: ClipError) -> ClipError:
-    return ClipError(f"{fspath(path)}: {error}")
+    with naming(path, *_BROKEN), closing_on_failure(file), np.errstate(all="ignore"):
+        return _read(file, options)
 
 
 @dataclass(eq=False)
@@ -102,7 +88,6 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(file, parts, options.skip, motion, keep_normals=still)
     faces, edges = _connections(file, parts)
-    before = file.stamp()
     rest = motion.read(None)[0] if options.rest == "auto" else None
     clips = {}
     for name, timing in timings.items():
@@ -115,7 +100,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
             metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(parts)
             | ({} if options.takes else _played(scene)),
-            unchanged=lambda: file.stamp() == before, **branches,
+            unchanged=file.unchanged, **branches,
         )
         rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]

@@ -20,6 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.sources.opening import FileWatch, closing_on_failure
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -42,30 +43,24 @@ class GltfFile:
         self._files: list[BinaryIO] = []
         self._buffers: dict[int, _Bytes] = {}
         self._unpacked_views: dict[int, bytes] = {}
-        try:
+        self.unchanged = FileWatch()
+        with closing_on_failure(self):
             file = self._open(self.path)
             self.size = os.fstat(file.fileno()).st_size
             self._binary: _Bytes | None = None
             self.json = _parsed(self._read_json(file))
             self._check_version()
-        except BaseException:
-            self.close()
-            raise
 
     def _open(self, path: str) -> BinaryIO:
         if not os.path.isfile(path) and os.path.exists(path):
             raise ClipError(f"{path}: got a folder or a device, expected a file")
         self._files.append(open(path, "rb"))
+        self.unchanged.add(self._files[-1].fileno())
         return self._files[-1]
 
     def close(self) -> None:
         for file in self._files:
             file.close()
-
-    def stamp(self) -> list[tuple[int, int]]:
-        """Sizes and times of the files, which tell whether they have been written to."""
-        states = [os.fstat(file.fileno()) for file in self._files]
-        return [(state.st_size, state.st_mtime_ns) for state in states]
 
     # ---- structure ----
 

@@ -23,6 +23,7 @@ from athcodec.errors import ClipError
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
 from athcodec.sources.frames import Frames
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
+from athcodec.sources.opening import FileWatch, naming
 from athcodec.sources.timing import numbered_times
 
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
@@ -103,12 +104,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     mesh = reader.mesh
     mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
     attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
-    try:
+    with naming(path):
         return MotionClip(reader.frames, time, faces=mesh.faces, edges=mesh.edges, attributes=attributes,
                           metadata=mesh.metadata | metadata, rest_pose="mean" if options.rest == "mean" else "first",
                           unchanged=reader.unchanged)
-    except ClipError as error:
-        raise ClipError(f"{fspath(path)}: {error}") from None
 
 
 def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str]) -> list[str]:
@@ -131,18 +130,11 @@ class FileFrames:
     def __init__(self, paths: Sequence[Path], parse: Callable[[bytes, Path], Mesh],
                  fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]]):
         self.paths, self._parse = list(paths), parse
-        self._stamps = [_stamp(path) for path in self.paths]
+        self.unchanged = FileWatch(*self.paths)
         data = self.paths[0].read_bytes()
         self.mesh = parse(data, self.paths[0])
         self._fast = fast_reader(data, self.mesh)
         self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype)
-
-    def unchanged(self) -> bool:
-        """Whether no file has been written to since this was made."""
-        try:
-            return [_stamp(path) for path in self.paths] == self._stamps
-        except OSError:
-            return False
 
     def _read(self, start: int, stop: int) -> np.ndarray:
         block = np.empty((stop - start, *self.frames.shape[1:]), self.frames.dtype)
@@ -166,11 +158,6 @@ class FileFrames:
             raise ClipError(f"frame {frame}, {path.name}: {different}, unlike {self.paths[0].name}; topology that "
                             "changes cannot be coded")
         return mesh.points
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    now = os.stat(path)
-    return now.st_size, now.st_mtime_ns
 
 
 def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:

@@ -31,6 +31,7 @@ from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
 from athcodec.sources.frames import Frames
+from athcodec.sources.opening import FileWatch, naming
 from athcodec.sources.parts import (
     OWN,
     ArrayDescriptor,
@@ -58,12 +59,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     own. The rest pose is a static primvar `rest` where every prim has one. Raises ClipError, OSError.
     """
     path = fspath(path)
-    try:
+    with naming(path):
         check_crates(path)
         with quietly():
             return _clip(_Stage(path), options)
-    except ClipError as error:
-        raise ClipError(f"{path}: {error}") from None
 
 
 @contextmanager
@@ -100,21 +99,8 @@ class _Stage:
             raise ClipError("stage: cannot be opened")
         for error in self.stage.GetCompositionErrors():
             warnings.warn(f"{path}: {' '.join(str(error).split())}", stacklevel=4)
-        self._files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
-        self._stamps = self._now()
-
-    def _now(self) -> list[tuple[int, int] | None]:
-        def stamp(name: str) -> tuple[int, int] | None:
-            try:
-                found = os.stat(name)
-            except OSError:
-                return None
-            return found.st_size, found.st_mtime_ns
-
-        return [stamp(name) for name in self._files]
-
-    def unchanged(self) -> bool:
-        return self._now() == self._stamps
+        files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
+        self.unchanged = FileWatch(*files)
 
     def close(self) -> None:
         self.stage = None
