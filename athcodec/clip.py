@@ -338,13 +338,19 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
     return time
 
 
+def stated_fps(metadata: Mapping[str, Any]) -> float | None:
+    """Frames per second in `metadata["fps"]`; None where it is missing or no positive number."""
+    fps = metadata.get("fps")
+    is_number = isinstance(fps, (int, float)) and not isinstance(fps, bool) and 0 < fps < float("inf")
+    return float(fps) if is_number else None
+
+
 def frame_rate(metadata: Mapping[str, Any]) -> float:
     """Frames per second in `metadata["fps"]`, 30 where it is missing; ClipError for no positive number."""
-    fps = metadata.get("fps", DEFAULT_FPS)
-    is_number = isinstance(fps, (int, float)) and not isinstance(fps, bool)
-    if not is_number or not 0 < fps < float("inf"):
-        raise ClipError(f"fps: got {fps!r}, expected a positive number")
-    return float(fps)
+    fps = stated_fps({"fps": DEFAULT_FPS} | metadata)
+    if fps is None:
+        raise ClipError(f"fps: got {metadata['fps']!r}, expected a positive number")
+    return fps
 
 
 def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:

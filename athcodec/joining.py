@@ -50,8 +50,8 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
     """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
-    return {clip_range.name: clip.replace(positions=_Run(clip.positions, start, stop), time=clip.time[start:stop], clip_ranges=(clip_range,),
-                                metadata=metadata_of(clip.metadata, clip_range.name))
+    return {clip_range.name: clip.replace(positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
+                                    clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
             for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)}
 
 

@@ -18,9 +18,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from athcodec import __version__
-from athcodec.clip import ClipRange
+from athcodec.clip import ClipRange, stated_fps
 from athcodec.errors import ClipError
+from athcodec.exporters.timing import start_frame_of
 from athcodec.joining import metadata_of
+from athcodec.sources.timing import whole
 from athcodec.units import METRES, unit_symbol
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
@@ -227,10 +229,8 @@ def clock(motion: Any) -> dict[str, Any]:
 
 def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
     """Frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
-    fps = float(metadata.get("fps") or fps)
-    first = metadata.get("start_frame", 0)
-    first = (first if isinstance(first, (int, float)) else 0) + round(float(time[0]) * fps, 6)
-    return {"fps": fps, "start_frame": int(first) if float(first).is_integer() else first}
+    fps = stated_fps(metadata) or fps
+    return {"fps": fps, "start_frame": whole(start_frame_of(metadata) + round(float(time[0]) * fps, 6))}
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:
