@@ -24,7 +24,8 @@ from athcodec.errors import ClipError
 from athcodec.joining import join
 from athcodec.sources import ReadOptions
 from athcodec.sources.frames import Frames
-from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, integer
+from athcodec.sources.gltf_file import GltfFile
+from athcodec.sources.gltf_json import brief, entries, entry, integer
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
 from athcodec.sources.opening import closing_on_failure, naming
 

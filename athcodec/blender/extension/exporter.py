@@ -50,7 +50,7 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
         try:
             summary = write_object(context, context.active_object, self.filepath, self.space == "WORLD",
                                    self.effort, self.attributes, **self._bound())
-        except Exception as error:  # told in one line
+        except Exception as error:  # reported in one line
             self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
             return {"CANCELLED"}
         self.report({"INFO"}, f"{summary.bytes:,} bytes, {summary.ratio:.1f} times smaller")

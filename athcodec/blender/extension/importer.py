@@ -15,7 +15,7 @@ from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringPrope
 from bpy_extras.io_utils import ImportHelper
 
 from . import player
-from .settings import DEEPEST
+from .player import DEEPEST
 
 DOMAINS = {"vertex": "POINT", "corner": "CORNER", "face": "FACE"}
 KINDS = {("f", ()): "FLOAT", ("f", (2,)): "FLOAT2", ("f", (3,)): "FLOAT_VECTOR", ("f", (4,)): "FLOAT_COLOR",
@@ -52,7 +52,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         for path in paths:
             try:
                 obj = add_object(context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip)
-            except Exception as error:  # of the file, told in one line
+            except Exception as error:  # of the file, reported in one line
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
             for each in context.selected_objects:
