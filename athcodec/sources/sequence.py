@@ -40,6 +40,15 @@ class Numbering:
     width: int
     suffix: str
 
+    @classmethod
+    def of_pattern(cls, path: Path) -> Numbering | None:
+        """That of a name with # or %04d in it; None where there is none."""
+        found = NUMBER_PATTERN.fullmatch(path.name)
+        if found is None:
+            return None
+        prefix, marks, width, suffix = found.groups()
+        return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+
     def path(self, number: int) -> Path:
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
@@ -57,10 +66,8 @@ class Numbering:
 def numbering_of(path: str | PathLike[str]) -> Numbering | None:
     """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
     path = Path(path)
-    pattern = NUMBER_PATTERN.fullmatch(path.name) if is_pattern(path) else None
-    if pattern:
-        prefix, marks, width, suffix = pattern.groups()
-        return Numbering(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+    if is_pattern(path):
+        return Numbering.of_pattern(path)
     numbered = _NUMBERED.fullmatch(path.stem)
     if not numbered:
         return None
