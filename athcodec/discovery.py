@@ -151,9 +151,9 @@ def load(path: str | os.PathLike[str]) -> Found:
         try:
             content = json.load(file)
             vertex_count, branches = int(content["vertex_count"]), content["branches"]
-            numbers = {each["branch"]: number for number, each in enumerate(branches)}
-            parent = np.array([numbers.get(each["parent"], -1) for each in branches], np.int64)
-            stems = [_vertices(each["vertices"], vertex_count) for each in branches]
+            numbers = {branch["branch"]: number for number, branch in enumerate(branches)}
+            parent = np.array([numbers.get(branch["parent"], -1) for branch in branches], np.int64)
+            stems = [_vertices(branch["vertices"], vertex_count) for branch in branches]
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise ClipError(f"{os.fspath(path)}: got no branches ({type(error).__name__}: {error}), expected the JSON "
                             "that athcodec hierarchy --save writes") from None
@@ -605,7 +605,7 @@ def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
     rest = np.concatenate([frames[0], np.ones((len(label), 1))], axis=1)[order]
     moved = (frames - frames[0])[:, order]
     squares = np.add.reduceat(rest[:, :, None] * rest[:, None, :], first)
-    products = np.stack([np.add.reduceat(rest[:, :, None] * each[:, None, :], first) for each in moved], axis=1)
+    products = np.stack([np.add.reduceat(rest[:, :, None] * frame[:, None, :], first) for frame in moved], axis=1)
     firmness = 1e-3 * np.trace(squares[:, :3, :3], axis1=1, axis2=2) + 1e-30
     squares[:, np.arange(3), np.arange(3)] += firmness[:, None]
     return np.linalg.solve(squares[:, None], products)

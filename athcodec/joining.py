@@ -138,7 +138,7 @@ def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     """What all have in common, and under OWN what each has of its own."""
     every = [clip.metadata for clip in clips.values()]
     common = {key: value for key, value in every[0].items()
-              if all(key in each and each[key] == value for each in every)}
+              if all(key in metadata and metadata[key] == value for metadata in every)}
     own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
            for name, clip in clips.items()}
     own = {name: metadata for name, metadata in own.items() if metadata}

@@ -24,7 +24,7 @@ from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
 
 FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
-SUFFIXES = tuple(suffix for each in FORMATS for suffix in each.suffixes if suffix not in FRAME_SUFFIXES)
+SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
 TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified", "mtime", "md5Hash", "generation",
         "created")  # what file systems say of a file that changes with it
 
@@ -40,7 +40,7 @@ class Item:
 
     @property
     def fingerprint(self) -> str:
-        """Short, and of plain characters whatever the names have."""
+        """Of the output: short, and of plain characters whatever the names have."""
         return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 
     @property
@@ -58,7 +58,7 @@ def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str
     names nothing, settings do not exist, or two inputs would have one output; OSError.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(each, f'["{pattern}"]') for pattern, each in (patterns or {}).items()}
+    patterns = {pattern: check_settings(given, f'["{pattern}"]') for pattern, given in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
@@ -147,9 +147,9 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
     except Exception as error:  # each file system has errors of its own
         raise RemoteError(f"{shown}: {type(error).__name__}: {_one_line(error)}") from None
     base = path.rstrip("/") if is_folder else _fixed_part(path, "/")
-    for each in sorted(found):
-        if not is_folder or _is_clip(posixpath.basename(each)):
-            yield posixpath.relpath(each, base) if base else each, system.unstrip_protocol(each)
+    for found_path in sorted(found):
+        if not is_folder or _is_clip(posixpath.basename(found_path)):
+            yield posixpath.relpath(found_path, base) if base else found_path, system.unstrip_protocol(found_path)
 
 
 def file_system(url: str) -> tuple[Any, str]:
@@ -214,7 +214,7 @@ def _frames(path: str) -> list[str]:
 
 def _files_identity(paths: list[str]) -> dict[str, Any]:
     stats = [os.stat(path) for path in paths]
-    known = {"size": sum(each.st_size for each in stats), "mtime_ns": max(each.st_mtime_ns for each in stats)}
+    known = {"size": sum(stat.st_size for stat in stats), "mtime_ns": max(stat.st_mtime_ns for stat in stats)}
     return known | ({"files": len(stats)} if len(stats) > 1 else {})
 
 

@@ -104,15 +104,15 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
         os.chmod(folder, 0o700)  # workers unpickle what lies there
         todo = []
         for item in items:
-            each = _todo(item, notes.records.get(_key(item, output)), redo)
-            todo.append(each) if each.reason else outcome.kept.append(item)
-        show.begin([each.item for each in todo], len(outcome.kept))
+            entry = _todo(item, notes.records.get(_key(item, output)), redo)
+            todo.append(entry) if entry.reason else outcome.kept.append(item)
+        show.begin([entry.item for entry in todo], len(outcome.kept))
         try:
             if todo:
                 with _client(workers, scheduler) as client:
                     _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
         finally:
-            _tidy(each.item.output for each in todo if not is_url(each.item.output))
+            _tidy(entry.item.output for entry in todo if not is_url(entry.item.output))
             show.end()
     outcome.seconds = time.monotonic() - start
     return outcome
@@ -250,18 +250,18 @@ class _Run:
 
     def all(self, todo: Sequence[Todo]) -> None:
         """Until each clip is in the manifest."""
-        outputs = {each.item.fingerprint: each.item.output for each in todo}
+        outputs = {entry.item.fingerprint: entry.item.output for entry in todo}
 
         def show(event: tuple[float, dict[str, Any]]) -> None:
             self.show.stage(outputs[event[1]["clip"]], event[1]["stage"], event[1]["fraction"])
 
         self.client.subscribe_topic(self.topic, show)
         try:
-            for each in todo:
-                if not is_url(each.item.output):
-                    os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
-                self._submit(each.item, "begin", tasks.begin, self._folder(each.item), split=self.split,
-                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=each.known)
+            for entry in todo:
+                if not is_url(entry.item.output):
+                    os.makedirs(os.path.dirname(entry.item.output), exist_ok=True)
+                self._submit(entry.item, "begin", tasks.begin, self._folder(entry.item), split=self.split,
+                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=entry.known)
             while self.pending:
                 self._take()
         finally:

@@ -184,7 +184,7 @@ def _one_of(*names: str) -> Callable[[Any], str]:
 
 def _patterns(value: Any) -> list[str]:
     patterns = [value] if isinstance(value, str) else list(value)
-    if not all(isinstance(each, str) for each in patterns):
+    if not all(isinstance(pattern, str) for pattern in patterns):
         raise ValueError("expected a pattern or a list of them")
     return patterns
 

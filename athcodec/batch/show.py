@@ -94,9 +94,9 @@ class LiveTable(Show):
 
     def _ended(self, output: str, state: str, said: str) -> None:
         self.rows.pop(output, None)
-        ended = [each for each, (before, _) in self.rows.items() if before in ENDED]
-        for each in ended[: max(0, len(ended) - ROWS // 2)]:
-            del self.rows[each]
+        ended = [row for row, (before, _) in self.rows.items() if before in ENDED]
+        for row in ended[: max(0, len(ended) - ROWS // 2)]:
+            del self.rows[row]
         self.rows[output] = state, said
 
     def _table(self) -> Group:

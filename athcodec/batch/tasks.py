@@ -164,8 +164,8 @@ def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
     """One after the other into a file that is there whole or not at all, also where two workers write it."""
     temporary = f"{path}.{os.getpid()}.{time.monotonic_ns()}"
     with open(temporary, "wb") as file:
-        for each in objects:
-            pickle.dump(each, file, pickle.HIGHEST_PROTOCOL)
+        for item in objects:
+            pickle.dump(item, file, pickle.HIGHEST_PROTOCOL)
     os.replace(temporary, path)
 
 

@@ -82,7 +82,7 @@ def _check_clips(motion: Any, kind: Format) -> None:
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
-        suffixes = " ".join(suffix for each in FORMATS if each.holds_several for suffix in each.suffixes)
+        suffixes = " ".join(suffix for other in FORMATS if other.holds_several for suffix in other.suffixes)
         raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
                         f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
 

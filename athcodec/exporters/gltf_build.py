@@ -354,4 +354,4 @@ def _objects(motion: Any, name: str, triangles: np.ndarray, edges: np.ndarray) -
         part = np.searchsorted(stops, corners, "right")
         if (part != part[:, :1]).any():
             return whole
-    return [(str(each), int(stop - count), int(stop)) for each, count, stop in zip(names, counts, stops)]
+    return [(str(name), int(stop - count), int(stop)) for name, count, stop in zip(names, counts, stops)]

@@ -83,7 +83,7 @@ def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[
             details = metadata.get("part_usd")
             if not isinstance(details, list) or len(details) != len(names):
                 details = [{}] * len(names)
-            return [str(each) for each in names], counts.astype(np.int64), kinds, details
+            return [str(name) for name in names], counts.astype(np.int64), kinds, details
     return ["plant"], np.array([count]), [_kind(motion, np.array([count]), 0)], [{}]
 
 
@@ -151,7 +151,7 @@ def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str
     said = domains.get(name) if isinstance(domains, dict) else None
     if said is not None:
         return said if rows.get(said) == count else "other"
-    return next((each for each in ("vertex", "branch", "face") if count == rows[each]), "other")
+    return next((domain for domain in ("vertex", "branch", "face") if count == rows[domain]), "other")
 
 
 def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:

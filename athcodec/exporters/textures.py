@@ -30,7 +30,7 @@ def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
-        with OpenEXR.File(header, {name: np.ascontiguousarray(each) for name, each in channels.items()}) as file:
+        with OpenEXR.File(header, {name: np.ascontiguousarray(values) for name, values in channels.items()}) as file:
             file.write(path)
     except RuntimeError as error:
         raise OSError(f"{path}: {error}") from None

@@ -133,19 +133,19 @@ def is_pattern(path: str | PathLike[str]) -> bool:
 
 
 def format_named(name: str, formats: Sequence[Format]) -> Format:
-    for each in formats:
-        if each.name == name:
-            return each
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in formats)}")
+    for candidate in formats:
+        if candidate.name == name:
+            return candidate
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
 
 
 def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
     suffix = Path(path).suffix.lower()
-    for each in formats:
-        if suffix in each.suffixes:
-            return each
-    known = " ".join(suffix for each in formats for suffix in each.suffixes)
+    for candidate in formats:
+        if suffix in candidate.suffixes:
+            return candidate
+    known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
 
 
@@ -158,9 +158,9 @@ def find_format(path: str | PathLike[str]) -> Format:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
-    for each in FORMATS:
-        if head.startswith(each.magic or ()):
-            return each
+    for candidate in FORMATS:
+        if head.startswith(candidate.magic or ()):
+            return candidate
     return format_by_suffix(path, FORMATS)
 
 

@@ -156,7 +156,7 @@ class _Object(SceneObject):
     track: _Track | None = None
 
     def tracks(self) -> Iterator[_Track]:
-        yield from (each for each in (self.track, *(xform.track for xform in self.xforms)) if len(each.times) > 1)
+        yield from (track for track in (self.track, *(xform.track for xform in self.xforms)) if len(track.times) > 1)
 
     @property
     def moves(self) -> bool:
@@ -220,9 +220,9 @@ def _add(child: Any, xforms: list[_Xform], objects: list[_Object], only: Sequenc
     name = child.getHeader().getMetaData().get("schema") or ""
     if name.startswith("AbcGeom_Xform"):
         return _above(child, xforms)
-    found = next((each for start, each in SCHEMAS.items() if name.startswith(start)), None)
+    found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
-    if found is None or only and not any(fnmatchcase(each, pattern) for pattern in only for each in names):
+    if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
         return xforms
     kind, wrap = found
     schema = wrap(child, EXISTING).getSchema()
@@ -342,7 +342,7 @@ def _statics(obj: _Object, order: np.ndarray, time: float) -> None:
     further = obj.schema.getArbGeomParams()
     for i in range(further.getNumProperties() if further.valid() else 0):
         header = further.getPropertyHeader(i)
-        kind = next((each for each in PARAMS if each.matches(header)), None)
+        kind = next((param for param in PARAMS if param.matches(header)), None)
         if kind is not None:
             _keep(obj, header.getName(), kind(further, header.getName()), order)
     if obj.kind != "mesh":

@@ -33,7 +33,7 @@ def _members(file: BinaryIO) -> list[tuple[int, int]]:
     """(start, size) of what a .usdz holds, which is stored without compression."""
     try:
         with zipfile.ZipFile(file) as archive:
-            entries = [(each.header_offset, each.file_size) for each in archive.infolist()]
+            entries = [(member.header_offset, member.file_size) for member in archive.infolist()]
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:
         raise ClipError(f"stage: got no .usdz: {error}") from None
     end, members = file.seek(0, 2), []

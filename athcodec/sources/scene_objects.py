@@ -233,11 +233,11 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
 def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
     """An object that lacks the array has zeros; None where the objects' arrays do not go together."""
     found = [obj.statics[name] for obj in objects if name in obj.statics]
-    shapes = {each.values.shape[1:] for each in found}
+    shapes = {static.values.shape[1:] for static in found}
     if len(shapes) != 1:
         return None
     domain = _common_domain(found, len(objects))
-    dtypes = {each.values.dtype for each in found}
+    dtypes = {static.values.dtype for static in found}
     dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
     if domain == "constant":
         return Static(domain, found[0].values.astype(dtype, copy=False))
@@ -246,9 +246,9 @@ def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
 
 
 def _common_domain(found: list[Static], object_count: int) -> str:
-    domains = {each.domain for each in found}
+    domains = {static.domain for static in found}
     if domains == {"constant"}:
-        same = all(np.array_equal(each.values, found[0].values) for each in found)
+        same = all(np.array_equal(static.values, found[0].values) for static in found)
         return "constant" if same and len(found) == object_count else "vertex"
     domains.discard("constant")
     return domains.pop() if len(domains) == 1 else "corner"

@@ -186,8 +186,8 @@ def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
     """Those that are seen at some time from the first frame to the last."""
     def seen(prim: Usd.Prim) -> bool:
         times = {float(codes[0])}
-        for each in _lineage(prim):
-            attribute = UsdGeom.Imageable(each).GetVisibilityAttr() if each.IsA(UsdGeom.Imageable) else None
+        for ancestor in _lineage(prim):
+            attribute = UsdGeom.Imageable(ancestor).GetVisibilityAttr() if ancestor.IsA(UsdGeom.Imageable) else None
             times.update(t for t in (attribute.GetTimeSamples() if attribute else ()) if codes[0] <= t <= codes[-1])
         image = UsdGeom.Imageable(prim)
         return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
@@ -287,7 +287,7 @@ def _sampled(objects: list[_Prim]) -> list[float]:
     for obj in objects:
         found.update(obj.points.GetTimeSamples())
         prims = [obj.prim] if obj.skeleton is None else [obj.prim, obj.skeleton.query.GetPrim()]
-        for prim in (each for one in prims for each in _lineage(one)):
+        for prim in (ancestor for one in prims for ancestor in _lineage(one)):
             if prim.IsA(UsdGeom.Xformable):
                 found.update(UsdGeom.Xformable(prim).GetTimeSamples())
         if obj.skeleton is not None and obj.skeleton.animation:
@@ -337,7 +337,7 @@ def _rename_first_uv(obj: _Prim) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).GetPrimvars():
         name = primvar.GetPrimvarName()
         if primvar.GetTypeName().role == Sdf.ValueRoleNames.TextureCoordinate and name in obj.statics:
-            obj.statics = {("uv" if key == name else key): each for key, each in obj.statics.items()}
+            obj.statics = {("uv" if key == name else key): static for key, static in obj.statics.items()}
             return
 
 
@@ -451,7 +451,7 @@ class _Skeleton:
         found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
         if not found or count == 0:
             return np.full(count, -1, np.int32)
-        joints, weights = (np.array(each).reshape(count, -1) for each in found)
+        joints, weights = (np.array(values).reshape(count, -1) for values in found)
         rows = np.arange(count), weights.argmax(axis=1)
         chosen = joints[rows]
         order = self.target.GetJointOrder()

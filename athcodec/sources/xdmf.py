@@ -335,14 +335,14 @@ def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTr
     """The temporal collection (one with the wanted field, else the first) and its grids; a single grid without one."""
     series = [grid for grid in root.iter("Grid") if grid.get("GridType") == "Collection"
               and grid.get("CollectionType", "Spatial") == "Temporal"]
-    series = [each for each in series if each.findall("Grid")]
+    series = [collection for collection in series if collection.findall("Grid")]
     if not series:
         single = [grid for grid in root.iter("Grid") if grid.get("GridType", "Uniform") == "Uniform"]
         if len(single) != 1:
             raise ClipError(f"got {len(single)} grids and no temporal collection, expected a time series or one grid")
         return None, single
-    named = [each for each in series if field and each.find(f"Grid/Attribute[@Name='{field.replace(chr(39), '')}']")
-             is not None]
+    wanted = f"Grid/Attribute[@Name='{(field or '').replace(chr(39), '')}']"
+    named = [collection for collection in series if field and collection.find(wanted) is not None]
     chosen = (named or series)[0]
     grids = chosen.findall("Grid")
     pieces = [grid for grid in grids if grid.get("GridType", "Uniform") != "Uniform"]
