@@ -82,15 +82,16 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
                         metadata=clip.metadata | {BLEND: blend})
 
 
-def with_notes(motion: Any) -> dict[str, Any]:
-    """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
+def with_clip_metadata(motion: Any) -> dict[str, Any]:
+    """Metadata of a motion, with the name of its clip and whether that is a loop, for files that hold a single clip."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
     return metadata | ({NAME: clip_range.name} if clip_range.name else {}) | ({LOOP: True} if clip_range.loop else {})
 
 
 def read_clip_metadata(clip: MotionClip) -> None:
-    """Takes name and loop out of the metadata of a clip, and gives them to it. Raises ClipError."""
+    """Moves name and loop from the metadata of a clip, as with_clip_metadata has put them there, to its clip_range. Raises
+    ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:

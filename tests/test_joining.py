@@ -284,7 +284,7 @@ def sources(medley_clips, tmp_path_factory):
     """The motions as files, before any was made a loop."""
     folder = tmp_path_factory.mktemp("sources")
     for name in ("calm", "Böe"):
-        athcodec.write_hdf5(folder / f"{name}.h5", medley_clips[name].replace(spans=()))
+        athcodec.write_hdf5(medley_clips[name].replace(spans=()), folder / f"{name}.h5")
     return [str(folder / f"{name}.h5") for name in ("calm", "Böe")]
 
 

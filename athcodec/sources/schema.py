@@ -11,7 +11,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip, frame_rate
 from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import take_notes
+from athcodec.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
 
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
@@ -31,7 +31,7 @@ def clip_of_arrays(positions: Any, array: Callable[[str], np.ndarray | None], at
     order = clip.attributes.get("branch_order")
     if order is not None and clip.has_branches and np.array_equal(order, branch_orders(clip.branch_parent)):
         del clip.attributes["branch_order"]
-    take_notes(clip)
+    read_clip_metadata(clip)
     return clip
 
 
