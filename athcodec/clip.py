@@ -397,13 +397,14 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
 
 
 def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
-    """(start, stop) frames of each."""
+    """(start, stop) frames of each clip_range, where the first begins at frame 0."""
     stops = np.cumsum([clip_range.frame_count for clip_range in clip_ranges]).tolist()
     return list(zip([0, *stops], stops))
 
 
 def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> None:
-    """ClipError unless they make up all frames, and have names that differ, each that can be stored; a single one may have none."""
+    """ClipError unless they make up all frames and have different names that can be stored; a single one may have no
+    name."""
     if not clip_ranges:
         return
     counts, names = [clip_range.frame_count for clip_range in clip_ranges], [clip_range.name for clip_range in clip_ranges]

@@ -50,8 +50,19 @@ CRUMB = 12  # vertices: smaller patches join a neighbour
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Branches of a clip: vertex_branch (N,), branch_parent (B,), stem_index (N,) or None as in MotionClip, how they
-    were found (one of METHODS, or "file"), and one line on what they are."""
+    """Branches that were found for a clip; `str` describes them in one line.
+
+    Parameters
+    ----------
+    vertex_branch : (N,) int32 array
+        The branch of each vertex.
+    branch_parent : (B,) int32 array
+        The branch that each branch grows on, -1 for a root.
+    stem_index : (N,) int32 array or None
+        The place of each vertex on its stem, as in MotionClip.
+    method : str
+        How they were found: "attributes", "skeleton", "edges", "components", "motion", or "file".
+    """
 
     vertex_branch: np.ndarray
     branch_parent: np.ndarray
@@ -67,10 +78,10 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives, and where that goes by motion, patches of another size, patches that hang on nothing,
-    and a single one too: only a trial tells which of them makes the smallest file."""
+    """What find_branches gives; and where that goes by motion, also patches of another size, patches without parents,
+    and one single branch: only a trial shows which of them makes the smallest file."""
     seen = _Seen(clip)
-    found = _first_found(seen, METHODS, None)
+    found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
     if found.method != "motion":
@@ -82,13 +93,31 @@ def candidates(clip: MotionClip) -> list[Found]:
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
-    """Branches for a clip; those that it has are not looked at.
+    """Find branches for a clip; those that it has are not looked at.
 
-    method  one of METHODS; "auto" takes the first of them that has something to go by
-    root    a vertex of the branch that all others hang on, directly or not; None: of the largest one
+    Parameters
+    ----------
+    clip : MotionClip
+    method : str, optional
+        "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
+        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "motion": patches
+        that move rigidly. "auto": the first of these that the clip has the data for.
+    root : int, optional
+        A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
 
-    Raises ClipError where the method finds nothing to go by, MissingExtra where a package is missing, ValueError for a
-    method that does not exist.
+    Returns
+    -------
+    Found
+        The branches; a clip gets them by ``clip.replace(vertex_branch=..., branch_parent=..., stem_index=...)``.
+
+    Raises
+    ------
+    ClipError
+        Where the clip does not have the data that the method needs.
+    MissingExtra
+        Where scipy is missing.
+    ValueError
+        For a method that does not exist.
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
@@ -126,7 +155,7 @@ def _first_found(seen: _Seen, methods: Sequence[str], root: int | None) -> Found
 
 
 def with_branches(clip: MotionClip, found: Found) -> MotionClip:
-    """The clip on these branches. Raises ClipError where they are not for so many vertices."""
+    """The clip on branches that were found. Raises ClipError where they are for another number of vertices."""
     return clip.replace(vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
                         stem_index=found.stem_index)
 
@@ -135,7 +164,19 @@ def with_branches(clip: MotionClip, found: Found) -> MotionClip:
 
 
 def save(found: Found, path: str | os.PathLike[str]) -> None:
-    """Writes branches as JSON, one line per branch: its parent, and its vertices from base to tip as runs "0-5 9"."""
+    """Write branches to a JSON file that a user can edit, one line per branch.
+
+    Parameters
+    ----------
+    found : Found
+    path : str or path
+        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9".
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    """
     order = _stem_order(found.vertex_branch, found.stem_index)
     bounds = np.searchsorted(found.vertex_branch[order], np.arange(len(found.branch_parent) + 1))
     lines = [json.dumps({"branch": branch, "parent": int(parent), "vertices": _runs(order[first:last])})
@@ -146,7 +187,24 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
 
 
 def load(path: str | os.PathLike[str]) -> Found:
-    """Branches from a file of `save`; numbers of branches may be any, in any order. Raises ClipError, OSError."""
+    """Read branches from a file of `save`.
+
+    Parameters
+    ----------
+    path : str or path
+        The numbers of the branches in it may be any, in any order.
+
+    Returns
+    -------
+    Found
+
+    Raises
+    ------
+    ClipError
+        Where the file is no such JSON, or does not have every vertex once.
+    OSError
+        Where it cannot be opened.
+    """
     with open(path, encoding="utf-8") as file:
         try:
             content = json.load(file)
@@ -464,7 +522,8 @@ def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
-    return np.linalg.norm(high - low, axis=1)
+    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
+    return diagonals
 
 
 def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
@@ -537,7 +596,7 @@ def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarra
     length = np.linalg.norm(rest[inner[:, 0]] - rest[inner[:, 1]], axis=1)
     graph = _scipy("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
     graph.data = np.maximum(graph.data, 1e-30)  # a distance of nothing would be no link
-    way = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
+    way: np.ndarray = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
     return np.where(np.isfinite(way), way, np.linalg.norm(rest - rest[joints.base][label], axis=1))
 
 

@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 
 GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [6, 7, 10, 9], [7, 8, 11, 10]], np.int32)
@@ -410,7 +410,7 @@ def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
 MEASURE = """
 import sys, json, numpy as np, athcodec
 from athcodec.clip import MotionClip
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 frames = int(sys.argv[1])
 most = 0
 def note(done=None):

@@ -14,8 +14,8 @@ from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan
 from athcodec.encoding.segment import Source
+from athcodec.frames import Frames
 from athcodec.hierarchy import Hierarchy
-from athcodec.sources.frames import Frames
 
 LARGE = 1 << 16  # vertices: smaller plants are not sampled
 LEAST_SAMPLE = 1 << 15  # vertices of a sample

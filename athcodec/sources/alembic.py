@@ -24,8 +24,8 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
 from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 
 ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")

@@ -15,9 +15,9 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Topology
-from athcodec.sources.frames import Frames
 from athcodec.sources.mesh import kind_of
 
 DISPLACEMENTS = ("displacement", "displacements", "disp", "u", "displ")

@@ -21,9 +21,9 @@ import numpy as np
 
 from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.joining import join
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
 from athcodec.sources.gltf_file import GltfFile
 from athcodec.sources.gltf_json import brief, entries, entry, integer
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid

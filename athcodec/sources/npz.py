@@ -22,8 +22,8 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip, check_float_dtype
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
 from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.schema import clip_of_arrays

@@ -16,8 +16,8 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
 
 MAX_METADATA_BYTES = 1 << 24
 DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor

@@ -20,8 +20,8 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
-from athcodec.sources.frames import Frames
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
 from athcodec.sources.opening import FileWatch, naming
 from athcodec.sources.timing import numbered_times
