@@ -31,7 +31,17 @@ TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified",
 
 @dataclass(frozen=True)
 class Item:
-    """A clip of a batch: its name, where it is and where its file goes (absolute paths or URLs), its settings."""
+    """A clip of a batch.
+
+    Parameters
+    ----------
+    name : str
+        Its path below the directory that was given, or the name of a plain file.
+    input, output : str
+        Where it is, and where its .ath file goes: absolute paths or URLs.
+    settings : dict
+        As `check_settings` gives them.
+    """
 
     name: str
     input: str
@@ -52,10 +62,30 @@ class Item:
 def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
          settings: Mapping[str, Any] | None = None,
          patterns: Mapping[str, Mapping[str, Any]] | None = None) -> list[Item]:
-    """The clips that `inputs` name, by name, with outputs in the directory `output`, a path or a URL.
+    """List the clips of a batch.
 
-    settings: those of all clips; patterns: further ones by pattern, see settings.py. Raises ClipError where an input
-    names nothing, settings do not exist, or two inputs would have one output; OSError.
+    Parameters
+    ----------
+    inputs : iterable of str or path
+        Files, directories, patterns of names, URLs.
+    output : str or path
+        The directory of the .ath files, a path or a URL.
+    settings : dict, optional
+        Those of all clips; see `check_settings`.
+    patterns : dict of str to dict, optional
+        Further settings by pattern of the clips' names; see `load_settings`.
+
+    Returns
+    -------
+    list of Item
+        In the order of their names.
+
+    Raises
+    ------
+    ClipError
+        Where an input names no clip, a setting does not exist, or two inputs would have the same output.
+    OSError
+        Where an input does not exist.
     """
     default = check_settings(settings or {})
     patterns = {pattern: check_settings(given, f'["{pattern}"]') for pattern, given in (patterns or {}).items()}
