@@ -29,20 +29,21 @@ METHODS = ("attributes", "skeleton", "edges", "components", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 
-SAMPLE_FRAMES = 12  # that are looked at
+SAMPLE_FRAMES = 12  # of the clip, which the methods look at
 NEIGHBOURS = 60  # vertices around each one among which those of other branches are looked for
 LONE_PARTS = 64  # parts of the plant, at most, whose nearest others are looked for however far they are
-QUERY = 1 << 21  # neighbours that are looked at at once
-STAYING = 300.0  # how much more it counts that a branch stays at its distance from another than how near it is
-ALIKE = 4.0  # how much more it counts against two branches that have as many vertices: no leaf hangs on a leaf
-ROOT_SIZE = 0.25  # of the largest branch: smaller ones are no trunks
+QUERY = 1 << 21  # neighbours in one query
+STAYING = 300.0  # weight of how constant the distance of two branches is, against how small it is
+ALIKE = 4.0  # further cost of two branches of the same size: no leaf grows on a leaf
+ROOT_SIZE = 0.25  # of the diagonal of the largest branch: smaller ones are no roots
 WELD = 1e-6  # of the diagonal: vertices that stay closer than this are one vertex of a mesh that was split
 COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no branches but loose points
 IN_ORDER = 0.7  # rank correlation of the source's order with the distance from the base from which on it is kept
-SMALL = 8  # vertices of a branch whose order is kept in any case
+SMALL = 8  # vertices of a branch, up to which the source's order is kept in any case
 PATCH_VERTICES = 150  # that a patch of a mesh without other branches has on average
-SMALL_PATCH, LARGE_PATCH, LARGE_MESH = 40, 600, 10_000  # that are tried besides, and vertices from which on the latter
-FREE_PATCHES = (64, 200)  # vertices of patches that hang on nothing
+SMALL_PATCH, LARGE_PATCH = 40, 600  # one of which is tried besides
+LARGE_MESH = 10_000  # vertices from which on that is the large one
+FREE_PATCHES = (64, 200)  # vertices of patches without parents
 PATCH_ROUNDS = 8
 MOST_PATCHES = 2000
 CRUMB = 12  # vertices: smaller patches join a neighbour
@@ -601,7 +602,7 @@ def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarra
 
 
 def _rank_correlation(label: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(B,) of each branch, between two orders of its vertices; Spearman's."""
+    """(B,) of each branch, between two orders of its vertices; Spearman's coefficient."""
     size = np.bincount(label)
     apart = np.bincount(label, (first - second).astype(np.float64) ** 2)
     return 1 - 6 * apart / np.maximum(size * (size.astype(np.float64) ** 2 - 1), 1)
@@ -658,7 +659,7 @@ def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
 
 
 def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """(B, F, 4, 3) least-squares affine maps from the rest pose, drawn to translations where vertices do not tell."""
+    """(B, F, 4, 3) least-squares affine maps from the rest pose; translations where vertices do not determine more."""
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     rest = np.concatenate([frames[0], np.ones((len(label), 1))], axis=1)[order]
@@ -681,7 +682,7 @@ def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.
 
 
 def _without_crumbs(label: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Patches of few vertices go to one beside them."""
+    """Patches of few vertices are merged into a neighbour."""
     for _ in range(PATCH_ROUNDS):
         size = np.bincount(label)
         leaves = (size[label[links[:, 0]]] < CRUMB) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])

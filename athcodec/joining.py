@@ -215,7 +215,7 @@ def _blended(positions: Any, blend: int) -> Frames:
         if start >= last:
             return shown
         place = np.arange(start, last)[:, None, None] / blend
-        weight = place * place * (3 - 2 * place)  # neither place nor speed jumps
+        weight = place * place * (3 - 2 * place)  # smoothstep: neither positions nor speeds jump
         leaving = np.asarray(positions[frame_count + start: frame_count + last], np.float64)
         mixed = shown.astype(dtype, copy=True)
         mixed[: last - start] = leaving + (shown[: last - start] - leaving) * weight

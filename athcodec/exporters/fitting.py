@@ -1,4 +1,4 @@
-"""What of a motion moves as one, for formats that hold transforms in place of vertices.
+"""The rigid or affine parts of a motion, for formats that hold transforms in place of vertices.
 
 It starts from the parts that an .ath file has at a level (nodes and stems), or from the branches of a clip, and fits to
 each, frame by frame, what a format can do: `Placed` finds translation, rotation and three scales, `Mapped` any affine

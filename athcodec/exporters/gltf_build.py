@@ -1,4 +1,4 @@
-"""The pieces of a GLB file: its structure, its binary chunk, and the shapes of a clip as meshes.
+"""The pieces of a GLB file: its structure, its binary chunk, and the objects of a clip as meshes.
 
 Polygons are drawn as triangles (which polygon a triangle came from is not kept), edges as lines where an object has no
 faces, vertices as points where it has neither. Vertices keep their order; one whose corners have different texture
@@ -37,7 +37,7 @@ SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": ("NORMAL", (3,)), "colors": 
 
 
 class Glb:
-    """A file on its way: `json` is its structure, arrays are added to its binary chunk."""
+    """A file that is being made: `json` is its structure, arrays are added to its binary chunk."""
 
     def __init__(self, extras: Mapping[str, Any]):
         self.json: dict[str, Any] = {
@@ -65,6 +65,7 @@ class Glb:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, view: int, dtype: np.dtype, count: int, width: int, **values: Any) -> int:
+        """The number of a new accessor of (count, width) values in a buffer view; values: further entries."""
         kind = {"bufferView": view, "componentType": COMPONENTS[dtype.name], "count": count, "type": TYPES[width]}
         self.json["accessors"].append(kind | values)
         return len(self.json["accessors"]) - 1
@@ -124,7 +125,7 @@ class Glb:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class GltfMesh:
     """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
     attributes by their semantic, (n, width)."""
 
@@ -134,7 +135,7 @@ class Shape:
     attributes: dict[str, np.ndarray]
 
 
-def shapes(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[Shape], list[str]]:
+def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[GltfMesh], list[str]]:
     """The objects of a clip, and the names of attributes that they cannot have. `more`: by semantic, (N, width)."""
     faces = motion.polygons
     triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
@@ -153,23 +154,23 @@ def shapes(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None)
         mine = triangles[(corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)]
         lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
         corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
-        made.append(Shape(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
+        made.append(GltfMesh(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
     return made, left_out
 
 
-def add_mesh(glb: Glb, shape: Shape, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
+def add_mesh(glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
              **primitive: Any) -> int:
-    """A mesh of the shape in its rest pose (N, 3)."""
-    semantic = {"POSITION": glb.array(rest[shape.source].astype(np.float32), bounds=True, target=VERTICES)}
-    for key, values in (shape.attributes | dict(attributes or {})).items():
+    """Adds a mesh to the file, in its rest pose (N, 3)."""
+    semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
+    for key, values in (mesh.attributes | dict(attributes or {})).items():
         is_ratio = key == "COLOR_0" or key.startswith("WEIGHTS_")
         semantic[key] = glb.array(values, target=VERTICES, normalized=is_ratio and values.dtype.kind == "u")
     primitive |= {"attributes": semantic, "mode": 0}
-    if shape.corners is not None:
-        dtype = np.uint16 if shape.corners.max() < 65535 else np.uint32
-        primitive["mode"] = 4 if shape.corners.shape[1] == 3 else 1
-        primitive["indices"] = glb.array(shape.corners.astype(dtype).reshape(-1, 1), target=INDICES)
-    glb.json["meshes"].append({"name": shape.name, "primitives": [primitive]})
+    if mesh.corners is not None:
+        dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
+        primitive["mode"] = 4 if mesh.corners.shape[1] == 3 else 1
+        primitive["indices"] = glb.array(mesh.corners.astype(dtype).reshape(-1, 1), target=INDICES)
+    glb.json["meshes"].append({"name": mesh.name, "primitives": [primitive]})
     return len(glb.json["meshes"]) - 1
 
 
@@ -234,6 +235,7 @@ def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[st
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:
+    """What extras say of the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
 

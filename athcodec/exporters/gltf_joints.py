@@ -1,6 +1,6 @@
-"""Joints of glTF for a motion: parts (parts.py) with translation, rotation and scale along their own axes.
+"""Joints of glTF for a motion: parts (fitting.py) with translation, rotation and scale along their own axes.
 
-What hardly moves is held still, so that it needs no keys. The error is measured against the motion, in the precision
+What hardly moves is made constant, so that it needs no keys. The error is measured against the motion, in the precision
 that is written. It writes nothing.
 """
 

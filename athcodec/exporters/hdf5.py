@@ -1,8 +1,7 @@
 """Writes the HDF5 schema of athcodec (see sources/hdf5.py), frame block by frame block.
 
 The file is written under another name in the same directory and takes its own name when it is complete, so a
-reader never sees half a clip and a failure leaves what was there before. It does not compute anything but
-branch_order.
+reader never sees half a clip, and a failure leaves the older file. It computes nothing but branch_order.
 """
 
 from __future__ import annotations
@@ -268,7 +267,7 @@ class Sink:
         return size
 
     def flush(self) -> None:
-        pass  # nothing is held back here
+        pass  # nothing is buffered here
 
     @contextmanager
     def _noting(self) -> Iterator[None]:

@@ -42,6 +42,7 @@ class SceneObject:
 
 
 def objects_of(motion: Any) -> list[SceneObject]:
+    """The objects of a motion, in the order of their vertices; one of all where it does not say."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     face_indices = np.asarray(face_indices, np.int64)
@@ -173,7 +174,7 @@ def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator
 
 
 def distinct(names: Iterable[str]) -> list[str]:
-    """The names, with a number behind each that comes again."""
+    """The names, each made different from those before it by a number behind it."""
     taken: dict[str, None] = {}
     for wanted in names:
         name, number = wanted, 1

@@ -64,7 +64,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
 
 @contextmanager
 def _saying(path: str) -> Iterator[None]:
-    """USD's errors in one line each: that a file cannot be written is all that can go wrong here."""
+    """USD's errors become OSErrors of one line: all that can fail here is writing a file."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -75,7 +75,7 @@ def _saying(path: str) -> Iterator[None]:
 
 
 def _convert(binary: str, target: str, suffix: str) -> None:
-    """From the binary file that was written to what is wanted; the latter alone is left."""
+    """Converts the binary file that was written to the wanted kind; only that remains."""
     if suffix == ".usda":
         text = f"{binary}.usda"
         _must(Sdf.Layer.FindOrOpen(binary).Export(text), binary)

@@ -6,7 +6,7 @@ everywhere else here. An Alembic file names no unit and no axis; Y is up by cust
 alone. Objects that are hidden throughout, NURBS patches, materials and velocities are not read.
 
 Alembic's library crashes on damaged archives. So it works in a process of its own (alembic_archive.py), which gives
-frames when it is asked for them and whose end is one line of error here.
+frames when it is asked for them, and whose crash becomes a ClipError.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 It takes a path and ReadOptions as one line of JSON, answers with the clip but for its motion, and then with the frames
 that it is asked for, until there is nothing more to read. Each answer is a line of JSON, {"size": bytes} and these
-bytes or {"error": what is wrong}. What kills this process, as a damaged archive may, is an end of answers there.
+bytes or {"error": message}. Where this process crashes, as a damaged archive may make it, the answers end.
 """
 
 from __future__ import annotations
@@ -247,7 +247,7 @@ def _track(points: Any) -> _Track:
 
 
 def _hidden(child: Any) -> bool:
-    """Whether an object is never seen."""
+    """Whether an object is hidden in all frames."""
     visible = AbcGeom.GetVisibilityProperty(child)
     if not visible or not visible.valid() or not visible.isConstant() or not visible.getNumSamples():
         return False
@@ -306,7 +306,7 @@ def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.
 
 
 def _rate(archive: Any, step: float, times: np.ndarray) -> float:
-    """What the samples are apart; where they differ, what the archive says of its maker's rate."""
+    """The rate of the samples; where their steps differ, the one that the archive states for the tool that made it."""
     said = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
     rate = 1 / step if step > 0 else float(said) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
@@ -406,7 +406,7 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]
 
 
 def _descriptor(text: str) -> ArrayDescriptor:
-    """An empty one where the text is none."""
+    """That of a JSON text; an empty one where it cannot be parsed."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):

@@ -28,7 +28,7 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 512
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KEPT_VIEWS = 8  # that have been decompressed
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-# What a reader of positions may ignore, or knows.
+# Extensions that a reader of positions may ignore, or that are read here.
 HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_", "EXT_lights_", "MSFT_texture_",
             "ADOBE_materials_", "KHR_mesh_quantization", "KHR_animation_pointer", *MESHOPT)
 
@@ -217,8 +217,8 @@ class GltfFile:
         return found
 
     def _beside(self, uri: str) -> str:
-        """The file that a relative URI names. One that leads elsewhere is refused: a file from a stranger must not
-        read what else is on the disk."""
+        """The file that a relative URI names. One that leads elsewhere is refused: a file that is not trusted must
+        not read others on the disk."""
         name = unquote(uri)
         parts = name.replace("\\", "/").split("/")
         if ":" in parts[0] or name.startswith(("/", "\\")) or ".." in parts or "\0" in name:

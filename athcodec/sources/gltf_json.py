@@ -56,11 +56,13 @@ def vector(holder: Mapping, key: str, default: list[float]) -> np.ndarray:
 
 
 def brief(value: Any) -> str:
+    """A value for a message, cut off where it is long."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def looked_up(table: Mapping, key: Any, what: str) -> Any:
+    """The entry `key` of a table of what glTF allows. Raises ClipError."""
     if not isinstance(key, (int, str)) or key not in table:
         raise ClipError(f"{what}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
     return table[key]

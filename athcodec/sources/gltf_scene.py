@@ -69,6 +69,7 @@ def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 
 
 def normalized(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
     length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
 
@@ -98,6 +99,7 @@ class Scene:
         self._groups = self._grouped()
 
     def name(self, node: int) -> str:
+        """The name of a node, "" where it has none."""
         name = self.nodes[node].get("name")
         return name if isinstance(name, str) else ""
 
@@ -279,7 +281,7 @@ def on_grid(keys: np.ndarray, rate: float) -> bool:
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:
-    """The rate that a tool would have said."""
+    """The rate that a tool would have stated: whole, or of a drop-frame time code."""
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)

@@ -1,7 +1,7 @@
 """Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py) into a MotionClip.
 
 Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
-as they are asked for: forward without a detour, backward from the start again. Every other array is static and
+as they are asked for: going forward once, going backward from the start again. Every other array is static and
 survives by its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON
 text, and the scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
 """
@@ -85,7 +85,7 @@ def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.nda
 
 
 def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Taken out of the arrays."""
+    """The metadata, which are removed from the arrays."""
     metadata = {}
     for name in SCALARS:
         if name in arrays and arrays[name].ndim == 0 and arrays[name].dtype.kind in "biufUS":
@@ -157,7 +157,7 @@ class _Positions:
                 self._member, self._next = self._archive.open(self._info), 0
                 self._skip(self._header_bytes)
             self._skip((start - self._next) * frame_bytes)
-            self._next = self.shape[0] + 1  # until it is known to be right
+            self._next = self.shape[0] + 1  # unknown until all of the frames have been read
             data = bytearray()
             while len(data) < (stop - start) * frame_bytes:
                 data += self._some((stop - start) * frame_bytes - len(data))

@@ -13,8 +13,8 @@ from athcodec.frames import Frames
 
 
 def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:
-    """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. Who calls has checked that
-    the file is long enough."""
+    """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has checked
+    that the file is long enough."""
     stored = np.dtype(dtype)
     frame_bytes = vertex_count * 3 * stored.itemsize
 

@@ -76,7 +76,7 @@ class SceneObject:
             raise ClipError(f"{self.path}: got curves of {points} points, expected {self.count}")
 
     def keep(self, name: str, domain: str | None, values: np.ndarray | None) -> None:
-        """Notes a static array where its rows fit; a row per curve becomes one per vertex."""
+        """Keeps a static array where its rows fit; a row per curve becomes one per vertex."""
         if values is None or domain is None or name in self.statics or domain == "constant" and len(values) != 1:
             return
         if domain == "face" and self.curve_counts is not None and len(values) == len(self.curve_counts):
@@ -87,7 +87,7 @@ class SceneObject:
             self.statics[name] = Static(domain, values)
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Takes normals into world space; away where they turn with the object, or have no direction there."""
+        """Transforms normals to world space; removes them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return
@@ -99,7 +99,7 @@ class SceneObject:
             self.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
 
     def halve_widths(self, matrix: np.ndarray) -> None:
-        """Makes radii in world space of the widths that "radius" holds."""
+        """Replaces the widths in "radius" by radii in world space."""
         widths = self.statics.get("radius")
         if widths is not None:
             scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
@@ -182,6 +182,7 @@ def frames_of_objects(objects: Sequence[Any], frame_count: int,
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """(n, 3) points by a (4, 4) matrix for row vectors, as float32."""
     if np.array_equal(matrix, np.eye(4)):
         return points
     return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)

@@ -1,8 +1,8 @@
 """Reads numbered OBJ or PLY files as the frames of one motion: tree_0001.obj, tree_0002.obj ...
 
 Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames:
-where some are missing, time goes on all the same. Frames come options.fps a second, DEFAULT_FPS (30) without it. A file
-without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and all
+where some are missing, the others keep their times. Frames come options.fps a second, DEFAULT_FPS (30) without it. A
+file without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and all
 else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
 (Blender's PLY does where texture coordinates are to be written) split those of all frames alike.
 """
@@ -50,6 +50,7 @@ class Numbering:
         return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
 
     def path(self, number: int) -> Path:
+        """The file of this number."""
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
     def files(self) -> dict[int, Path]:
@@ -128,10 +129,15 @@ def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str
 class FileFrames:
     """Frames of which each is a file of its own, read whole.
 
-    paths          in the order of time
-    parse          (bytes, path) -> Mesh
-    fast_reader    (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or
-                   None where it cannot tell that all else is as in the first
+    Parameters
+    ----------
+    paths : sequence of Path
+        In the order of time.
+    parse : callable
+        (bytes, path) -> Mesh.
+    fast_reader : callable
+        (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or to None
+        where that cannot tell whether all else is as in the first.
     """
 
     def __init__(self, paths: Sequence[Path], parse: Callable[[bytes, Path], Mesh],
@@ -156,7 +162,7 @@ class FileFrames:
         try:
             points = self._fast(data)
         except (ClipError, ValueError, IndexError, OverflowError):
-            points = None  # the careful way says what is wrong
+            points = None  # the full parser says what is wrong
         if points is not None and points.shape == self.mesh.points.shape:
             return points
         mesh = self._parse(data, path)

@@ -7,8 +7,8 @@ else the time codes that have samples; options.fps sets another rate. Static pri
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
 what a layer needs and cannot be found is one warning each. Point instancers, patches, tetrahedra, materials and
-velocities are not read. A stage is opened by its structure; positions are read frame by frame. Of a damaged binary file
-USD believes how long an array is, whatever that is: files that are not trusted are read under a limit of memory.
+velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD trusts the
+lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of memory.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """Keeps what USD has to say off stderr; its errors become ClipError, one line each."""
+    """Keeps USD's messages off stderr; its errors become ClipErrors of one line."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -75,7 +75,7 @@ def quietly() -> Iterator[None]:
 
 
 def _one_line(error: Exception) -> str:
-    """What the first of USD's errors says, without its place in USD's source."""
+    """The message of the first of USD's errors, without its place in USD's source."""
     try:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     except UnicodeDecodeError:  # it quotes bytes of the file
@@ -183,7 +183,7 @@ def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
 
 
 def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
-    """Those that are seen at some time from the first frame to the last."""
+    """Those that are visible at some time from the first frame to the last."""
     def seen(prim: Usd.Prim) -> bool:
         times = {float(codes[0])}
         for ancestor in _lineage(prim):

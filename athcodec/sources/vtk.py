@@ -172,7 +172,7 @@ def _legacy_grid(path: Path) -> _Grid:
         mesh = vtk.read(path)
     except OSError:
         raise
-    except Exception as error:  # a library that trusts its files fails in any way
+    except Exception as error:  # meshio trusts its files: a damaged one may raise any exception
         text = " ".join(str(error).split()) or type(error).__name__
         raise ClipError(f"{path}: the VTK file cannot be read: {text[:200]}") from None
     counts = [np.full(len(block.data), np.shape(block.data)[1] if len(block.data) else 0) for block in mesh.cells]
@@ -307,7 +307,7 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
-    """The XML of a file, and the raw bytes appended to it, which are none; None where there are none."""
+    """The XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
     found = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
     if not found:
         return data, None

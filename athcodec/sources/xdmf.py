@@ -59,7 +59,7 @@ def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
         raise ClipError("got XML with entities of its own or in UTF-16, expected plain UTF-8")
     try:
         root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an encoding that nobody knows
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # LookupError: an unknown encoding
         raise ClipError(f"got no XML: {error}") from None
     if root.tag != tag:
         raise ClipError(f"got the XML of {root.tag[:40]!r}, expected {tag}")

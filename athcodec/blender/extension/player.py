@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 
 DEEPEST = -1  # the level of an object that shows the deepest one in its file
 _decoders: dict = {}  # path: (its size and time, the decoder, decoders of its clips by name)
-_problems: dict = {}  # name of an object: what keeps it from playing
+_problems: dict = {}  # name of an object: the error that keeps it from playing
 _moved: dict = {}  # name of an object: its path before the .blend was saved
 _busy = False
 
