@@ -57,7 +57,7 @@ def test_tubes_and_leaves_are_found_again(dressed):
     assert right_parents(found, dressed) > 0.98
 
 
-def test_whatever_the_order_of_the_vertices(dressed):
+def test_branches_are_found_whatever_the_order_of_the_vertices(dressed):
     mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
     found = athcodec.find_branches(bare(mixed))
     assert right_parents(found, mixed) > 0.98
@@ -216,7 +216,7 @@ def test_a_file_without_usable_branches_is_refused(tmp_path, text, message):
         discovery.load(tmp_path / "a.json")
 
 
-def test_a_method_that_has_nothing_to_go_by_says_so(dressed):
+def test_a_method_without_the_data_that_it_needs_is_refused(dressed):
     with pytest.raises(ClipError, match="expected joints with weights"):
         athcodec.find_branches(bare(dressed), "skeleton")
     with pytest.raises(ValueError, match="method: got 'luck'"):

@@ -75,7 +75,7 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
     assert together.bytes < 0.6 * sum(apart)
 
 
-def test_the_order_of_the_clips_says_nothing_about_the_size(medley_clips, tmp_path):
+def test_the_size_does_not_depend_on_the_order_of_the_clips(medley_clips, tmp_path):
     names = list(medley_clips)
     orders = (names, names[::-1], names[1:] + names[:1])
     sizes = [athcodec.encode(athcodec.join({name: medley_clips[name] for name in order}), tmp_path / "a.ath",
@@ -149,7 +149,7 @@ def test_lossless_clips_are_joined_without_loss(medley_clips, tmp_path):
             assert played.clip.seam_errors[-1:] in ((), (0.0,))
 
 
-def test_the_file_is_the_same_by_steps_and_whatever_the_jobs(medley_clips, medley_ath, tmp_path):
+def test_the_file_is_the_same_when_coded_in_steps_or_with_any_number_of_jobs(medley_clips, medley_ath, tmp_path):
     clip, options = athcodec.join(medley_clips), {"rel_error": 1e-4, "segment_frames": 16}
     plan = draft(clip, **options)
     segments = [*code_segments(clip, plan, range(plan.segment_count))][::-1]

@@ -24,7 +24,7 @@ DISPLACEMENTS = ("displacement", "displacements", "disp", "u", "displ")
 
 
 class Steps(Protocol):
-    """The steps of a result, as a format gives them; what is asked for is read then. `topology` is that of the first."""
+    """The steps of a result, as a format gives them, read when they are asked for. `topology` is that of the first."""
 
     topology: Topology
 

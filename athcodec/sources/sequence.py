@@ -2,8 +2,8 @@
 
 Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames:
 where some are missing, the others keep their times. Frames come options.fps a second, DEFAULT_FPS (30) without it. A
-file without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and all
-else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
+file without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and
+all else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
 (Blender's PLY does where texture coordinates are to be written) split those of all frames alike.
 """
 
