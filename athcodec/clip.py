@@ -76,7 +76,7 @@ class MotionClip:
         Positions of the vertices in ``metadata["unit"]``: an array, or anything that has a shape and a dtype and is
         sliced by frames, such as an h5py.Dataset or a numpy.memmap. Never read whole.
     time : (T,) array
-        Seconds, strictly increasing within each clip_range, in steps that may differ. Becomes float64.
+        Seconds, strictly increasing within each clip range, in steps that may differ. Becomes float64.
     vertex_branch : (N,) array of integers, optional
         The branch of each vertex. Becomes int32. None, as is branch_parent then, where branches are not known; see
         `find_branches`.
@@ -227,7 +227,7 @@ class MotionClip:
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
-        """(start, stop) frames of each clip_range; of the whole clip where it has none."""
+        """(start, stop) frames of each clip range; of the whole clip where it has none."""
         return clip_range_frames(self.clip_ranges) if self.clip_ranges else [(0, self.frame_count)]
 
     def check(self) -> None:
@@ -397,7 +397,7 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
 
 
 def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
-    """(start, stop) frames of each clip_range, where the first begins at frame 0."""
+    """(start, stop) frames of each clip range, where the first begins at frame 0."""
     stops = np.cumsum([clip_range.frame_count for clip_range in clip_ranges]).tolist()
     return list(zip([0, *stops], stops))
 
@@ -407,7 +407,8 @@ def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> Non
     name."""
     if not clip_ranges:
         return
-    counts, names = [clip_range.frame_count for clip_range in clip_ranges], [clip_range.name for clip_range in clip_ranges]
+    counts = [clip_range.frame_count for clip_range in clip_ranges]
+    names = [clip_range.name for clip_range in clip_ranges]
     if min(counts) < 1 or sum(counts) != frame_count:
         raise ClipError(f"clip_ranges: got {counts} frames, expected {frame_count} in all, at least one each")
     for name in names:
@@ -427,7 +428,7 @@ def is_name(text: str) -> bool:
 
 
 def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
-    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip_range and one per frame."""
+    """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip range and one per frame."""
     times: np.ndarray = np.asarray(time)
     if times.shape != (frame_count,):
         raise ClipError(f"time: got shape {times.shape}, expected ({frame_count},), one time per frame")

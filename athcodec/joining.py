@@ -1,7 +1,7 @@
 """Several clips of one plant as one, for one file; and clips that repeat without a jump.
 
 A game's oak has a calm, a breeze and a storm: the same mesh, branches and rest pose, stored once. `join` lays such
-clips one after the other; the encoder sees one long clip whose clip_ranges it codes apart. `split` is its inverse. `looped`
+clips one after the other; the encoder sees one long clip whose ranges it codes apart. `split` is its inverse. `looped`
 makes a clip that can be played over and over. All read frames only when they are asked for.
 """
 
@@ -36,7 +36,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     Returns
     -------
     MotionClip
-        A clip with a clip_range for each. Closing it closes all of them.
+        A clip with a clip range for each. Closing it closes all of them.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     return MotionClip(
         _joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
         first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
-        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts), skin=first.skin)
+        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts),
+        skin=first.skin)
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
@@ -126,8 +127,8 @@ def with_clip_metadata(motion: Any) -> dict[str, Any]:
 
 
 def read_clip_metadata(clip: MotionClip) -> None:
-    """Moves name and loop from the metadata of a clip, as with_clip_metadata has put them there, to its clip_range. Raises
-    ClipError."""
+    """Moves name and loop from the metadata of a clip, as with_clip_metadata has put them there, to its clip range.
+    Raises ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:

@@ -3,14 +3,13 @@ loops without a jump."""
 
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 
 import athcodec
 from athcodec import exporters
 from athcodec.cli import main
-from athcodec.clip import ClipRange, MotionClip
+from athcodec.clip import ClipRange
 from athcodec.clip_view import ClipView
 from athcodec.encoding import code_segments, draft, write
 from athcodec.errors import BoundError, ClipError, ClipUnavailable
@@ -284,7 +283,7 @@ def sources(medley_clips, tmp_path_factory):
     """The motions as files, before any was made a loop."""
     folder = tmp_path_factory.mktemp("sources")
     for name in ("calm", "Böe"):
-        athcodec.write_hdf5(medley_clips[name].replace(spans=()), folder / f"{name}.h5")
+        athcodec.write_hdf5(medley_clips[name].replace(clip_ranges=()), folder / f"{name}.h5")
     return [str(folder / f"{name}.h5") for name in ("calm", "Böe")]
 
 

@@ -12,7 +12,6 @@ import json
 import os
 import re
 from collections.abc import Callable
-from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
@@ -192,4 +191,4 @@ def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, st
     Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
     for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):
         Abc.OUcharArrayProperty(properties, f"array{i}").setValue(_filled(imath.UnsignedCharArray, raw))
-        Abc.OStringProperty(properties, f"array{i}{DESCRIPTOR}").setValue(json.dumps(asdict(descriptor)))
+        Abc.OStringProperty(properties, f"array{i}{DESCRIPTOR}").setValue(json.dumps(descriptor._asdict()))

@@ -203,7 +203,8 @@ def takes(motion: Any) -> list[Take]:
     """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
     apart."""
     clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
-    return [_take(motion, clip_range, start, stop) for clip_range, (start, stop) in zip(clip_ranges, motion.clip_range_frames)]
+    return [_take(motion, clip_range, start, stop)
+            for clip_range, (start, stop) in zip(clip_ranges, motion.clip_range_frames)]
 
 
 def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:

@@ -199,7 +199,7 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
     `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and source_rest are written where it has them.
+    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and source_rest where it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
     writer = Hdf5Writer(

@@ -12,7 +12,6 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -243,7 +242,7 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
         attribute = root.CreateAttribute(f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True,
                                          Sdf.VariabilityUniform)
         attribute.Set(Vt.UCharArray.FromNumpy(raw) if len(raw) else Vt.UCharArray())
-        for key, text in asdict(descriptor).items():
+        for key, text in descriptor._asdict().items():
             attribute.SetCustomDataByKey(f"{OWN}:{key}", text)
 
 

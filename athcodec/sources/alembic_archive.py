@@ -7,7 +7,6 @@ bytes or {"error": message}. Where this process crashes, as a damaged archive ma
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import math
@@ -408,12 +407,10 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]
 def _descriptor(text: str) -> ArrayDescriptor:
     """That of a JSON text; an empty one where it cannot be parsed."""
     try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        found = None
-    texts = {} if not isinstance(found, dict) else found
-    names = [item.name for item in dataclasses.fields(ArrayDescriptor)]
-    return ArrayDescriptor(**{name: texts[name] for name in names if isinstance(texts.get(name), str)})
+        found = ArrayDescriptor(**json.loads(text))
+    except (ValueError, TypeError, RecursionError):
+        return ArrayDescriptor()
+    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
 
 
 # ---- positions ----

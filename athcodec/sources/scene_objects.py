@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,8 +106,7 @@ class SceneObject:
             self.statics["radius"] = Static(widths.domain, (widths.values * scale).astype(widths.values.dtype))
 
 
-@dataclass(frozen=True)
-class ArrayDescriptor:
+class ArrayDescriptor(NamedTuple):
     """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it, a
     record's as JSON; shape as JSON; domain: what its rows stand for, "" for nothing."""
 
