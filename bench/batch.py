@@ -91,7 +91,7 @@ def make_clips(args: argparse.Namespace, folder: Path) -> int:
         for number, start in enumerate(np.linspace(0, clip.frame_count - frames, args.clips).astype(int)):
             window = athcodec.MotionClip(
                 clip.block(start, start + frames), clip.time[:frames], clip.vertex_branch, clip.branch_parent,
-                clip.rest.astype(clip.rest_dtype), stem_index=clip.stem_index, metadata=clip.metadata)
+                clip.source_rest, stem_index=clip.stem_index, metadata=clip.metadata)
             athcodec.write_hdf5(window, folder / f"clip_{number:04}.h5")
         return clip.vertex_count
 

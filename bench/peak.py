@@ -35,7 +35,7 @@ def repeat(source: str, target: str, times: int) -> dict[str, int]:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])
         with Hdf5Writer(target, time=time, vertex_branch=clip.vertex_branch, branch_parent=clip.branch_parent,
-                        rest=clip.rest.astype(clip.rest_dtype), dtype=clip.dtype, stem_index=clip.stem_index,
+                        rest=clip.source_rest, dtype=clip.dtype, stem_index=clip.stem_index,
                         edges=clip.edges, metadata=clip.metadata, gzip=True) as writer:
             for _ in range(times):
                 for _, frames in clip.blocks():

@@ -112,7 +112,7 @@ def medley_clips():
 
     def part(start, stop, time):
         return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent,
-                          stem_index=clip.stem_index, rest=clip.rest.astype(clip.rest_dtype),
+                          stem_index=clip.stem_index, rest=clip.source_rest,
                           metadata={"unit": "m", "from": start})
 
     return {"calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -69,8 +68,7 @@ def assert_same_mesh(got: MotionClip, wanted: MotionClip) -> None:
 
 def on_one_branch(clip: MotionClip) -> MotionClip:
     """The clip as the encoder takes it."""
-    return dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]),
-                               rest=clip.rest.astype(clip.rest_dtype))
+    return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
 
 
 def coded(clip: MotionClip, folder: Path, rel_error: float = 1e-4) -> Path:

@@ -335,7 +335,7 @@ def test_arrays_that_are_only_promised_are_not_allocated(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.xdmf.h5", "a.pvd", "a_0001.vtu", "a_0002.vtu"])
 @pytest.mark.parametrize("gzip", [False, True])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, name, gzip):
+def test_damaged_files_are_refused_by_a_clip_error_or_read(tmp_path, name, gzip):
     opened = tmp_path / ("a.xdmf" if "xdmf" in name else "a.pvd")
     athcodec.write(mixed_clip(frames=3), opened, gzip=gzip)
     assert survives_damage(tmp_path / name, lambda: athcodec.read(opened), cuts=15, changes=30) > 12

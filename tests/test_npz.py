@@ -102,7 +102,7 @@ def test_branches_are_derived_from_edges_as_in_hdf5(forked, tmp_path):
         assert clip.stem_index.tolist() == [3, 2, 1, 0, 0, 1]
 
 
-def test_end_to_end_the_bound_holds(tmp_path):
+def test_a_clip_through_ath_and_back_keeps_the_bound(tmp_path):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder, frames=range(4, 20)), tmp_path / "a.npz")
@@ -170,7 +170,7 @@ def test_nothing_is_unpickled(tmp_path):
 
 
 @pytest.mark.parametrize("gzip", [False, True])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, gzip):
+def test_damaged_files_are_refused_by_a_clip_error_or_read(tmp_path, gzip):
     athcodec.write(quad_clip(), tmp_path / "a.npz", gzip=gzip)
     assert survives_damage(tmp_path / "a.npz", lambda: athcodec.read(tmp_path / "a.npz"), changes=80) > 30
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import subprocess
@@ -17,7 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdValidation, Vt
 import athcodec
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 
 GRID = np.array([[x, y, 0] for y in range(4) for x in range(3)], np.float32)
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [6, 7, 10, 9], [7, 8, 11, 10]], np.int32)
@@ -58,7 +57,7 @@ def read_all(path, **options):
 
 
 @pytest.mark.parametrize("suffix", ["usda", "usdc", "usd"])
-def test_a_mesh_that_moves_under_a_transform_that_moves(tmp_path, suffix):
+def test_a_moving_mesh_below_a_moving_transform_is_read_in_world_space(tmp_path, suffix):
     stage = new_stage(tmp_path / f"a.{suffix}")
     root = UsdGeom.Xform.Define(stage, "/root")
     turn, shift = root.AddRotateZOp(), root.AddTranslateOp()
@@ -87,7 +86,7 @@ def test_points_without_a_transform_are_bit_for_bit(tmp_path):
     assert np.array_equal(positions, np.stack([sway(frame) for frame in range(101, 111)]))
 
 
-def test_frames_are_the_samples_where_the_stage_has_no_range_and_what_fps_says(tmp_path):
+def test_frames_are_the_samples_where_the_stage_has_no_range_or_at_the_rate_of_fps(tmp_path):
     stage = new_stage(tmp_path / "a.usda", first=None, fps=24.0)
     add_grid(stage, frames=[2, 3, 5.5])
     stage.Save()
@@ -99,7 +98,7 @@ def test_frames_are_the_samples_where_the_stage_has_no_range_and_what_fps_says(t
     assert np.allclose(positions[1], (sway(2) + sway(3)) / 2, atol=1e-6)
 
 
-def test_units_that_no_symbol_has_and_files_that_name_none(tmp_path):
+def test_a_unit_without_a_symbol_is_kept_in_metres_and_a_missing_one_is_not_made_up(tmp_path):
     stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
     add_grid(stage)
     stage.Save()
@@ -282,7 +281,7 @@ def test_a_file_that_changes_while_it_is_read_is_noticed_and_read_afresh_the_nex
             assert again.metadata["unit"] == "m"
 
 
-def test_a_closed_clip_says_so(tmp_path):
+def test_a_closed_clip_refuses_to_be_read(tmp_path):
     stage = new_stage(tmp_path / "a.usda")
     add_grid(stage)
     stage.Save()
@@ -392,11 +391,10 @@ def test_a_plant_of_edges_becomes_curves_that_keep_its_order(tmp_path, sample_cl
         assert np.array_equal(again.vertex_branch, sample_clip.vertex_branch)
 
 
-def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
+def test_a_clip_from_usd_through_ath_and_back_keeps_the_bound(tmp_path):
     whole_plant(tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as clip:
-        labelled = dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32),
-                                       branch_parent=np.array([-1]), rest=clip.rest.astype(clip.rest_dtype))
+        labelled = clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
         athcodec.encode(labelled, tmp_path / "a.ath", rel_error=1e-4)
         with athcodec.open(tmp_path / "a.ath") as decoder:
             athcodec.write(athcodec.ClipView(decoder, frames=range(2, 9)), tmp_path / "b.usdc")
@@ -412,7 +410,7 @@ def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
 MEASURE = """
 import sys, json, numpy as np, athcodec
 from athcodec.clip import MotionClip
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 frames = int(sys.argv[1])
 most = 0
 def note(done=None):
@@ -431,7 +429,7 @@ print(json.dumps([written, most]))
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is told by Linux only")
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux states the memory")
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
     def measure(frames):
         command = [sys.executable, "-c", MEASURE, str(frames), str(tmp_path / "a.usdc")]

@@ -54,8 +54,7 @@ def _arrays(motion: Any) -> dict[str, np.ndarray]:
     taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
     if taken:
         raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
-    rest = np.asarray(motion.rest)
-    arrays = {"time": motion.time, "rest": rest.astype(getattr(motion, "rest_dtype", rest.dtype))}
+    arrays = {"time": motion.time, "rest": getattr(motion, "source_rest", motion.rest)}
     if motion.branch_parent is not None:
         arrays["branch_order"] = branch_orders(motion.branch_parent)
     for name in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
