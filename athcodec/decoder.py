@@ -632,9 +632,12 @@ class Decoder:
             node_matrices = self._player.matrices(ready, in_file, len(nodes))
             self._player.positions(ready, in_file, positions, player.FILE_ORDER)
         try:
-            maps = stem_maps(self.hierarchy, self._player.rest(), positions[None])
-        except np.linalg.LinAlgError:
-            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant") from None
+            with np.errstate(over="ignore", invalid="ignore"):
+                maps = stem_maps(self.hierarchy, self._player.rest(), positions[None])
+        except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
+            maps = np.array(np.nan)
+        if not np.isfinite(maps).all():
+            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant")
         first = np.concatenate([nodes["first"], self.branches["first"][stems]])
         count = np.concatenate([nodes["count"], self.branches["count"][stems]])
         branch = self.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
@@ -656,14 +659,12 @@ class Decoder:
         """
         parts = self.affines(frame, depth)
         full = self.positions(frame, self.deepest, np.float64)[self._vertex_source]
+        if not np.isfinite(full).all():
+            raise BadChunk(f"frame {frame}: got positions that are not finite; expected those of a plant")
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
             rows = slice(first, first + count)
-            try:
-                inverse = np.linalg.pinv(matrix[:, :3])
-            except np.linalg.LinAlgError:
-                raise BadChunk(f"frame {frame}: got a matrix without an inverse; expected one of a plant") from None
-            out[self._vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ inverse.T
+            out[self._vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ np.linalg.pinv(matrix[:, :3]).T
         return out
 
     # ---- checks ----

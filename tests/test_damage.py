@@ -651,12 +651,40 @@ def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
                            lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time)
 
 
-@pytest.mark.parametrize("step", [1e-38, 1e38])
-def test_steps_at_the_ends_of_their_range_play(step, parts):
-    """They give positions that are no plant, but numbers or infinities, in time."""
-    for kind, level in ((ct.STEMS, 2), (ct.CORRECTIONS, 2)):
-        use(parts.with_payload(kind, floats(step) + parts.payload(kind, level)[4:], level))
-    use(parts.with_payload(ct.REST, parts.payload(ct.REST)[:28] + doubles(step) + parts.payload(ct.REST)[36:]))
+def with_step(parts: Parts, kind: int, step: float) -> bytes:
+    """The file with another quantisation step in one chunk."""
+    level, at, packed = (None, 28, doubles(step)) if kind == ct.REST else (2, 0, floats(step))
+    payload = parts.payload(kind, level)
+    return parts.with_payload(kind, payload[:at] + packed + payload[at + len(packed):], level)
+
+
+@pytest.mark.parametrize("kind", [ct.STEMS, ct.CORRECTIONS, ct.REST])
+def test_the_smallest_steps_play(kind, parts):
+    data = with_step(parts, kind, 1e-38)
+    assert use(data) and np.isfinite(opened(data).positions()).all()
+
+
+@pytest.mark.parametrize("kind, finite", [(ct.STEMS, [0, 1]), (ct.CORRECTIONS, [0, 1, 2]), (ct.REST, [])])
+def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matrices(kind, finite, parts):
+    """The positions are no plant, but numbers or infinities."""
+    decoder = opened(with_step(parts, kind, 1e38))
+    decoder.check()
+    found = []
+    for level in range(decoder.level_count):
+        positions = decoder.positions(0, level)
+        assert not np.isnan(decoder.positions(depth=level)).any()
+        if np.isfinite(positions).all():
+            found.append(level)
+            assert np.isfinite(decoder.affines(0, level).matrices).all()
+        else:
+            with pytest.raises(BadChunk, match="positions that no matrix fits"):
+                decoder.affines(0, level)
+    assert found == finite
+    if finite == [0, 1, 2]:
+        assert np.isfinite(decoder.residual(0, 0)).all()
+    else:
+        with pytest.raises(BadChunk, match="frame 0: got positions"):
+            decoder.residual(0, 0)
 
 
 @pytest.mark.parametrize("size", [0, 1, 64, 4096])

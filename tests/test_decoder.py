@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import time
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -15,7 +16,7 @@ import athcodec
 from athcodec import Thresholds, entropy, player
 from athcodec import container as ct
 from athcodec._native import LOOSE
-from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
+from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
 from athcodec.transform import Plan
 from files import Parts, opened, roots, still_file
 from plants import STEADY, awkward_plants, chain_plant, plant, tube
@@ -484,6 +485,19 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
             assert np.abs(placed - shown[attach]).max(initial=0) < 1e-9 * size
+
+
+@pytest.mark.parametrize("clip", [tube(8, 6, 3), plant(3, branches=6, frames=3)], ids=["one solid stem", "thin stems"])
+def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(clip, tmp_path):
+    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
+    parts = Parts.of((tmp_path / "a.ath").read_bytes())
+    level = max(chunk.level for chunk, _ in parts.chunks if chunk.kind == ct.STEMS)
+    largest = struct.pack("<f", 1e38) + parts.payload(ct.STEMS, level)[4:]
+    decoder = opened(parts.with_payload(ct.STEMS, largest, level))
+    assert np.isinf(decoder.positions(0)).any()
+    for ask in (decoder.affines, decoder.residual):
+        with pytest.raises(BadChunk, match="frame 0: got positions"):
+            ask(0)
 
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
