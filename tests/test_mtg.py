@@ -165,4 +165,4 @@ def test_damage_is_an_error_and_nothing_worse(tmp_path):
             read_mtg(tmp_path / "plant.mtg")
         except ClipError:
             refused += 1
-    assert refused > 30
+    assert 30 < refused < 300
