@@ -108,11 +108,8 @@ def test_clips_longer_than_a_segment_are_coded_in_parts(piece):
 def test_athcodec_takes_part_as_a_codec(piece, single_depth):
     codec = Athcodec(single_depth)
     data, _ = check(codec, piece, BOUND * piece.diagonal)
-    assert (
-        data[:3] != b""
-        and codec.kind == "athcodec"
-        and len(codec.settings["rotations"]) == (2 if single_depth else 4)
-    )
+    assert 0 < len(data) < piece.positions.nbytes / 3 and codec.kind == "athcodec"
+    assert len(codec.settings["rotations"]) == (2 if single_depth else 4)
 
 
 @pytest.mark.parametrize("codec", BASELINES[::2], ids=lambda codec: codec.name)

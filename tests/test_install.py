@@ -15,8 +15,8 @@ import pytest
 
 import athcodec
 from athcodec._native import crc32c
+from fuzz.targets import CORE, decoder_sources
 
-CORE = Path(__file__).resolve().parent.parent / "athcodec" / "core"
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
 TOOLS = {**os.environ, "PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}
@@ -85,11 +85,6 @@ def run(*command, env=TOOLS) -> str:
 
 
 # ---- compiling ----
-
-
-def decoder_sources() -> list[Path]:
-    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    return [CORE / name for name in names.split()]
 
 
 @pytest.mark.parametrize("command", [
