@@ -1,4 +1,4 @@
-"""The benchmark's clips are what they are said to be: plants that hang together, move, and come out alike."""
+"""The clips of the benchmark: connected plants that move as described, and the same in every run."""
 
 from __future__ import annotations
 

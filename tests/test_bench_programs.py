@@ -24,7 +24,8 @@ from bench.codecs.programs import CLASSES, PROGRAMS, lossless  # noqa: E402
 MODULES = {kind.module: kind.package for kind in CLASSES}
 FRAMES, BRANCHES = slice(30, 46), 16
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-INSTALLED = {re.match(r"[\w-]+", each)[0] for each in PROJECT["dependencies"] + PROJECT["optional-dependencies"]["test"]}
+NEEDED = PROJECT["dependencies"] + PROJECT["optional-dependencies"]["test"]
+INSTALLED = {re.match(r"[\w-]+", package)[0] for package in NEEDED}
 
 
 def interleaved(clip, seed):
@@ -124,7 +125,7 @@ def test_a_bound_below_what_float32_resolves_is_refused(piece):
         codec.encode(piece, 1e-12)
 
 
-def test_a_program_that_errs_is_caught(piece, monkeypatch):
+def test_a_program_that_breaks_the_bound_is_caught(piece, monkeypatch):
     [codec] = [codec for codec in PROGRAMS if codec.package == "zstandard"]
     def wrong(grid, integers):
         return (integers * grid.step * 0.9).astype(np.float32)

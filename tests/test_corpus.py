@@ -1,4 +1,4 @@
-"""Every input that once went wrong, and what it must come to now. Files that are small are kept in corpus/.
+"""Every input that once went wrong, and what must come of it now. Files that are small are kept in corpus/.
 
 An .ath file there is used through Python and by all fuzz targets; one that is named after a target is that target's own
 input. A find without a test here is a failure.

@@ -208,7 +208,7 @@ def test_a_header_field_out_of_range_is_refused(field, value, error, data):
     ("vertex_count", []), ("branch_count", []), ("frame_count", []), ("segment_count", []), ("level_count", []),
     ("full_level_count", [4]), ("chunk_count", []), ("flags", [1])])
 def test_header_counts_that_are_off_by_a_little_are_refused_where_they_contradict_the_rest(field, playing, data):
-    """A lossless file whose last level was cut off has one level fewer than it once had; a flag makes positions wide."""
+    """A lossless file without its last level has one level fewer than it once had, and a flag makes positions wide."""
     value = header_fields(data)[field]
     others = [value + d for d in (-7, -2, -1, 1, 2, 100) if value + d >= 0]
     assert [other for other in others if use(with_header(data, **{field: other}))] == playing
@@ -331,7 +331,7 @@ def change_a_field(rng: np.random.Generator, record: bytearray, form: struct.Str
     struct.pack_into(code, record, at, value)
 
 
-def spoilt_front(rng: np.random.Generator, data: bytes) -> bytes:
+def corrupted_front(rng: np.random.Generator, data: bytes) -> bytes:
     """The file with fields and entries of its front changed, mostly so that sums and counts still fit."""
     tables_end = Parts.of(data).chunks[0][0].offset
     header, count = bytearray(data[:64]), header_fields(data)["chunk_count"]
@@ -400,14 +400,14 @@ def both_readings(data: bytes, limits: Limits) -> str:
     return "opened"
 
 
-def read_spoilt_fronts(data: bytes, count: int, seed: int) -> set[str]:
+def read_corrupted_fronts(data: bytes, count: int, seed: int) -> set[str]:
     rng = np.random.default_rng(seed)
     seen = set()
     for _ in range(count):
-        spoilt = spoilt_front(rng, data)
+        corrupted = corrupted_front(rng, data)
         if rng.random() < 0.1:
-            spoilt = spoilt[: rng.integers(1, len(spoilt))]
-        seen.add(both_readings(spoilt, some_limits(rng)))
+            corrupted = corrupted[: rng.integers(1, len(corrupted))]
+        seen.add(both_readings(corrupted, some_limits(rng)))
     return seen
 
 
@@ -420,12 +420,12 @@ def test_the_core_reads_a_front_as_the_container_does(data, parts):
     assert both_readings(data, Limits()) == "opened"
     still = parts.with_chunks([entry for entry in parts.chunks if not entry[0].is_motion])
     assert both_readings(still, Limits()) == "refused for what is behind the front"
-    assert read_spoilt_fronts(data, 1500, seed=1) == ALL_READINGS
+    assert read_corrupted_fronts(data, 1500, seed=1) == ALL_READINGS
 
 
 @pytest.mark.slow
 def test_the_core_reads_many_fronts_as_the_container_does(data):
-    assert read_spoilt_fronts(data, 30_000, seed=2) == ALL_READINGS
+    assert read_corrupted_fronts(data, 30_000, seed=2) == ALL_READINGS
 
 
 def test_the_core_asks_for_more_of_any_front_that_is_not_whole(data):
@@ -443,7 +443,7 @@ KINDS = {name: kind for kind, name in ct.KIND_NAMES.items()}
 
 
 def mutations(rng: np.random.Generator, payload: bytes):
-    """One of several ways to spoil a chunk."""
+    """One of several ways to corrupt a chunk."""
     way = rng.integers(5)
     if way == 0:
         return bytes(rng.integers(0, 256, rng.integers(0, 200), np.uint8))
@@ -534,7 +534,7 @@ def attribute(body: bytes = b"", name: object = "a", **head: object) -> bytes:
 NESTED = "[" * 900 + "]" * 900
 
 
-@pytest.mark.parametrize("kind, spoil, error", [
+@pytest.mark.parametrize("kind, corrupt, error", [
     (ct.HIERARCHY, lambda p: floats(np.nan) + p[4:], BadChunk),
     (ct.HIERARCHY, lambda p: p[:4] + floats(-1) + p[8:], BadChunk),
     (ct.HIERARCHY, lambda p: p[:15], BadChunk),
@@ -633,10 +633,10 @@ NESTED = "[" * 900 + "]" * 900
     (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16))[:-1]), BadChunk),
     (ct.ATTRIBUTE, lambda p: attribute(), BadChunk),
 ])
-def test_content_that_breaks_a_rule_is_refused(kind, spoil, error, parts):
+def test_content_that_breaks_a_rule_is_refused(kind, corrupt, error, parts):
     level = {ct.STEMS: 2, ct.AFFINES: 1, ct.CORRECTIONS: 2}.get(kind)
     with np.errstate(all="ignore"), pytest.raises(error) as caught:
-        check(parts.with_payload(kind, spoil(parts.payload(kind, level)), level))
+        check(parts.with_payload(kind, corrupt(parts.payload(kind, level)), level))
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
 
 

@@ -432,7 +432,7 @@ def test_one_frame_has_no_frame_rate(tmp_path):
         assert decoder.fps == 0.0 and decoder.positions().shape[0] == 1
 
 
-def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
+def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
         assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
         assert np.array_equal(partial.positions(), plain.positions())

@@ -57,7 +57,7 @@ def test_tubes_and_leaves_are_found_again(dressed):
     assert right_parents(found, dressed) > 0.98
 
 
-def test_whatever_the_order_of_the_vertices(dressed):
+def test_branches_are_found_whatever_the_order_of_the_vertices(dressed):
     mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
     found = athcodec.find_branches(bare(mixed))
     assert right_parents(found, mixed) > 0.98

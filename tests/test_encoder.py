@@ -238,7 +238,7 @@ def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tm
 @pytest.mark.parametrize("frames", [64, 640])
 def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path, monkeypatch):
     """Work: positions that are analysed, which is most of what a search and coding do."""
-    done, told = [0], []
+    done, reported = [0], []
     analyse = SegmentMotion.analyse
 
     def counted(self, source, dead_zone):
@@ -247,9 +247,9 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
     monkeypatch.setattr(SegmentMotion, "analyse", counted)
     athcodec.encode(endless_clip(frames, at_once=frames), tmp_path / "e.ath", segment_frames=32, effort=effort, jobs=1,
-                    progress=lambda stage, fraction: told.append((fraction, done[0])))
+                    progress=lambda stage, fraction: reported.append((fraction, done[0])))
     for part in (0.25, 0.5, 0.75):
-        work = max([0, *(work for fraction, work in told if fraction <= part)]) / done[0]
+        work = max([0, *(work for fraction, work in reported if fraction <= part)]) / done[0]
         assert work == pytest.approx(part, abs=0.25)
 
 

@@ -1,5 +1,4 @@
-"""What is left when writing goes wrong: nothing, or the older file; and what a source that misbehaves leads
-to.
+"""What a failed write leaves: nothing, or the older file; and what comes of sources that change or cannot be read.
 
 Kills, full disks and read-only places are those of spec/robust/faults.py with a few rounds each; `python -m
 spec.robustness --only faults` has many.
@@ -51,7 +50,7 @@ def test_a_killed_writer_leaves_the_older_file_or_a_whole_one_and_nothing_after_
 
 
 @pytest.mark.slow
-def test_so_do_two_hundred(place):
+def test_two_hundred_killed_writers_leave_the_older_file_or_a_whole_one(place):
     row = faults.kill_while_writing(place, 200, seed=7)
     assert row.tried == 200 and row.wrong == 0
 
@@ -242,7 +241,7 @@ def test_a_source_that_changes_while_it_is_read_is_refused_by_name(change, stage
     assert "changed while it was read" in err and names(tmp_path) == {"source.h5"}
 
 
-def test_comparing_with_a_source_that_changes_is_refused_too(long_source, tmp_path, capsys, monkeypatch):
+def test_comparing_with_a_source_that_changes_is_refused(long_source, tmp_path, capsys, monkeypatch):
     assert cli.main(["encode", str(long_source), str(tmp_path / "a.ath"), "--effort", "fast"]) == 0
     capsys.readouterr()
     monkeypatch.setattr("athcodec.cli.clips.progress", lambda: nullcontext(lambda stage, fraction: shrink(long_source)))

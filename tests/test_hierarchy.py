@@ -1,4 +1,4 @@
-"""Branches from labels and from edges: order, attachment, and the trees that break simple code."""
+"""Branches from labels and from edges: order, attachment, and extreme trees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engine that takes the C core relies on: the decoder compiles alone, as C and as C++, needs nothing but
+"""The C core in an engine: the decoder compiles alone, as C and as C++, needs nothing but
 memory functions, is found by CMake and pkg-config once it is installed, and plays."""
 
 from __future__ import annotations
@@ -239,12 +239,12 @@ def test_the_example_plays_the_same_again(played, engine, sample_ath):
     assert without_times(again) == without_times(played) and len(rows(played)) == 24
 
 
-@pytest.mark.parametrize("spoil, says", [
+@pytest.mark.parametrize("damage, says", [
     (lambda data: b"", "MISSING"), (lambda data: data[:200], "MISSING"),
     (lambda data: b"PK" + data, "NOT_AN_ATH_FILE"),
     (lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:], "BAD_CHECKSUM"),
 ], ids=["empty", "cut off", "another file", "damaged"])
-def test_the_example_says_in_one_line_what_is_wrong_with_a_file(spoil, says, engine, sample_ath, tmp_path):
-    (tmp_path / "bad.ath").write_bytes(spoil(sample_ath.read_bytes()))
+def test_the_example_says_in_one_line_what_is_wrong_with_a_file(damage, says, engine, sample_ath, tmp_path):
+    (tmp_path / "bad.ath").write_bytes(damage(sample_ath.read_bytes()))
     done = subprocess.run([engine / "play", tmp_path / "bad.ath"], capture_output=True, text=True)
     assert done.returncode == 1 and re.fullmatch(rf"play: .*: {says}\n", done.stderr)

@@ -38,7 +38,7 @@ def test_sixteen_threads_in_c_race_nowhere_and_see_what_one_alone_does(thread_pr
     assert row.tried > 16 * 8 and row.crashes == row.wrong == 0
 
 
-def test_a_race_would_be_found(thread_program, bushy_ath):
+def test_the_thread_sanitizer_reports_a_data_race(thread_program, bushy_ath):
     """Two threads on one ath_work without synchronisation, which ath.h forbids."""
     code, err, _ = load.race(thread_program, "race", 2, bushy_ath)
     assert code == load.RACE_FOUND and "WARNING: ThreadSanitizer: data race" in err
@@ -86,7 +86,7 @@ def test_a_thousand_seeks_do_not_grow_memory(bushy_ath):
 
 
 @pytest.mark.slow
-def test_ten_thousand_seeks_do_not_either(sample_ath):
+def test_ten_thousand_seeks_do_not_grow_memory(sample_ath):
     row = load.seeks(sample_ath, 10_000)
     assert row.tried == 10_000 and row.crashes == row.wrong == row.over_limit == 0, row.note
 

@@ -1,4 +1,4 @@
-"""Files behind a URL: few requests, the same bits, and one clear line where the server does not play along.
+"""Files behind a URL: few requests, the same bits, and an error of one line where the server fails.
 
 The server is a real one on this machine, with faults that a test switches on.
 """
@@ -302,7 +302,7 @@ def test_several_threads_play_from_one_server(server, local):
 
 
 @pytest.mark.parametrize("fault", [drop, hang_up, overloaded])
-def test_a_fault_that_passes_is_not_noticed(fault, server, local):
+def test_a_passing_fault_is_retried_unnoticed(fault, server, local):
     server.fault = first(2, fault)
     with athcodec.open(server.url) as decoder:
         server.fault = first(3, fault)
@@ -485,7 +485,7 @@ def other_url(request, large_ath):
     return "memory://deep/tree.ath"
 
 
-def test_other_systems_of_fsspec_work(other_url, local):
+def test_other_file_systems_of_fsspec_give_the_same_positions(other_url, local):
     with athcodec.open(other_url) as decoder:
         decoder.check()
         assert np.array_equal(decoder.positions(), local.positions())
@@ -545,7 +545,7 @@ def test_without_the_optional_packages_the_message_names_the_command_that_instal
                                        'pip install "athcodec[remote]"\n')
 
 
-def test_a_plain_file_is_opened_without_them():
+def test_a_local_file_is_opened_without_fsspec_and_aiohttp():
     code = ("import sys; sys.modules['fsspec'] = sys.modules['aiohttp'] = None\n"
             "import athcodec.sources, athcodec.cli; assert 'asyncio' not in sys.modules")
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -1,4 +1,4 @@
-"""USD in and out: what USD itself writes is read, and of what we write USD itself has nothing to complain."""
+"""USD: files that its own library writes are read, and its validators accept what is written."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def read_all(path, **options):
 
 
 @pytest.mark.parametrize("suffix", ["usda", "usdc", "usd"])
-def test_a_mesh_that_moves_under_a_transform_that_moves(tmp_path, suffix):
+def test_a_moving_mesh_below_a_moving_transform_is_read_in_world_space(tmp_path, suffix):
     stage = new_stage(tmp_path / f"a.{suffix}")
     root = UsdGeom.Xform.Define(stage, "/root")
     turn, shift = root.AddRotateZOp(), root.AddTranslateOp()
@@ -79,7 +79,7 @@ def test_a_mesh_that_moves_under_a_transform_that_moves(tmp_path, suffix):
     assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
 
 
-def test_points_without_a_transform_are_bit_for_bit(tmp_path):
+def test_points_without_a_transform_are_read_bit_for_bit(tmp_path):
     stage = new_stage(tmp_path / "a.usdc")
     add_grid(stage)
     stage.Save()
@@ -99,7 +99,7 @@ def test_frames_are_the_samples_where_the_stage_has_no_range_and_what_fps_says(t
     assert np.allclose(positions[1], (sway(2) + sway(3)) / 2, atol=1e-6)
 
 
-def test_units_that_no_symbol_has_and_files_that_name_none(tmp_path):
+def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing(tmp_path):
     stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
     add_grid(stage)
     stage.Save()
@@ -282,7 +282,7 @@ def test_a_file_that_changes_while_it_is_read_is_noticed_and_read_afresh_the_nex
             assert again.metadata["unit"] == "m"
 
 
-def test_a_closed_clip_says_so(tmp_path):
+def test_reading_a_closed_clip_is_an_error(tmp_path):
     stage = new_stage(tmp_path / "a.usda")
     add_grid(stage)
     stage.Save()
@@ -367,7 +367,7 @@ def awkward_clip():
     )
 
 
-def test_what_usd_has_no_place_for_comes_back(tmp_path):
+def test_data_without_a_place_in_usd_come_back(tmp_path):
     clip = awkward_clip()
     athcodec.write(clip, tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as again:
@@ -392,7 +392,7 @@ def test_a_plant_of_edges_becomes_curves_that_keep_its_order(tmp_path, sample_cl
         assert np.array_equal(again.vertex_branch, sample_clip.vertex_branch)
 
 
-def test_from_usd_to_ath_and_back_within_the_bound(tmp_path):
+def test_a_clip_from_usd_through_ath_to_usd_keeps_the_bound(tmp_path):
     whole_plant(tmp_path / "a.usdc")
     with athcodec.read(tmp_path / "a.usdc") as clip:
         labelled = dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32),
@@ -431,7 +431,7 @@ print(json.dumps([written, most]))
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is told by Linux only")
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux says how much memory a process has")
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
     def measure(frames):
         command = [sys.executable, "-c", MEASURE, str(frames), str(tmp_path / "a.usdc")]

@@ -1,5 +1,5 @@
-"""What who looks at a plant relies on: the page comes with all that it needs, from a server or as one file; plays from
-the first bytes on, shows the bits of every depth, and says what is wrong with a file.
+"""The viewer: its page comes complete, from a server or as one file; plays from the first bytes on, shows the bits of
+every depth, and says what is wrong with a file.
 
 Tests with the marker `browser` look at the page in Chromium (Debian: apt-get install chromium; pip install playwright).
 """
@@ -128,7 +128,7 @@ def test_a_clip_to_begin_with_is_named_in_the_address_and_in_the_page(medley_ath
         assert "'gale'" in error and "'calm', 'Böe'" in error and "\n" not in error
 
 
-def test_what_cannot_be_shown_is_one_line(sample_ath, tmp_path, monkeypatch, capsys):
+def test_a_file_that_cannot_be_shown_is_an_error_of_one_line(sample_ath, tmp_path, monkeypatch, capsys):
     broken = tmp_path / "broken.ath"
     broken.write_bytes(b"no plant at all")
     for arguments in (["view", str(broken)], ["view", str(broken), "--export", str(tmp_path / "x.html")],
@@ -591,7 +591,7 @@ def test_a_truncated_file_plays_to_its_depth(opened, sample_ath, ranges):
     (lambda data: b"<!doctype html>" + data[15:], "not an .ath file"), (lambda data: data[:40], "cut off"),
     (lambda data: data[:900] + bytes([data[900] ^ 1]) + data[901:], "damaged"), (lambda data: b"", "not an .ath file"),
     (None, "cannot be fetched")])
-def test_a_file_that_cannot_be_shown_is_said_to_be(opened, sample_ath, damage, words):
+def test_the_page_says_that_a_file_cannot_be_shown(opened, sample_ath, damage, words):
     files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
     with Line(files) as line:
         page = opened(line.page("tree.ath"), "document.getElementById('message').checkVisibility()")
@@ -599,7 +599,7 @@ def test_a_file_that_cannot_be_shown_is_said_to_be(opened, sample_ath, damage, w
 
 
 @browser_test
-def test_what_is_whole_of_a_damaged_file_plays(opened, sample_ath):
+def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
     parts = sample_ath.read_bytes()
     with athcodec.open(sample_ath) as decoder:
         at = decoder.info()["depths"][1]["bytes"] + 50
@@ -742,7 +742,7 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
 
 @browser_test
 @pytest.mark.parametrize("size, scheme", [((390, 800), "light"), ((390, 800), "dark"), ((1280, 800), "dark")])
-def test_nothing_runs_out_of_the_screen(opened, sample_ath, size, scheme):
+def test_no_control_lies_outside_the_screen(opened, sample_ath, size, scheme):
     with Line({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"), color_scheme=scheme)
         page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))

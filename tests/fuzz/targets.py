@@ -140,7 +140,7 @@ def _number(pattern: str, log: str) -> int:
 
 def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0,
          runs: int = -1) -> Outcome:
-    """Mutates for some time, or until so many inputs were tried, from the seeds and what the corpus has, which grows."""
+    """Mutates for some time, or so many inputs, from the seeds and what the corpus has, which grows."""
     start = BUILD / "seeds" / target
     seeds.write_inputs(target, start)
     for folder in (corpus, finds):
