@@ -91,14 +91,20 @@ def damaged(data: bytes, seed: int = 0, cuts: int = 25, changes: int = 40) -> It
 
 
 def survives_damage(path: Path, read: Callable[[], MotionClip], seed: int = 0, **how_often: int) -> int:
-    """Reads damaged copies in place of the file; how many were refused. Anything but ClipError and OSError fails."""
+    """Reads the file, then damaged copies in its place; how many were refused. Anything but ClipError and OSError
+    fails."""
+
+    def read_all() -> None:
+        with read() as clip:
+            for _ in clip.blocks():
+                pass
+
+    read_all()
     whole, refused = path.read_bytes(), 0
     for data in damaged(whole, seed, **how_often):
         path.write_bytes(data)
         try:
-            with read() as clip:
-                for _ in clip.blocks():
-                    pass
+            read_all()
         except (ClipError, OSError) as error:
             assert "\n" not in str(error)
             refused += 1

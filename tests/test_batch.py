@@ -1,4 +1,5 @@
-"""Many clips at once: every clip is there once, whole and the same as alone, whatever dies, fills up or is broken."""
+"""Batches: every clip is encoded once, completely and to the bytes of a single encoding, whatever process dies, disk
+fills up or input is broken."""
 
 from __future__ import annotations
 
@@ -61,7 +62,7 @@ def lines(out: Path) -> list[dict]:
 
 
 def done_once(out: Path) -> set[str]:
-    """Outputs that have one line that they are done, and the file that it tells of."""
+    """Outputs that have one line that they are done; each is checked against its file."""
     done = [line for line in lines(out) if line["status"] == "done"]
     assert len({line["output"] for line in done}) == len(done)
     for line in done:
@@ -118,7 +119,7 @@ def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
         assert (decoder.clip.loop, decoder.frame_count) == (True, 40)
 
 
-def test_a_blend_that_a_clip_is_too_short_for_is_reported(clips, tmp_path, cluster, capsys):
+def test_a_blend_that_is_too_long_for_a_clip_is_reported(clips, tmp_path, cluster, capsys):
     words = ["batch", str(clips / "a.h5"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
     assert cli.main([*words, "--loop-blend", "7"]) == 1
     assert "loop: got 7 frames to blend, expected 0 to 6" in capsys.readouterr().err
@@ -186,7 +187,7 @@ def test_an_incomplete_last_line_is_removed_and_its_clip_encoded_again(cut, tmp_
 
 
 @pytest.mark.parametrize("rest", [b"\0" * 50, b"\0" * 50 + b"\n", b'{"outp', b'{"output": "b", "st\n'])
-def test_zeros_or_half_a_line_at_the_end_of_a_manifest_are_removed(rest, tmp_path):
+def test_zeros_and_half_lines_at_the_end_of_a_manifest_are_removed(rest, tmp_path):
     path = tmp_path / "m.jsonl"
     path.write_bytes(b'{"output": "a", "status": "done"}\n' + rest)
     with Manifest(path) as notes:
@@ -264,7 +265,7 @@ def test_inputs_can_come_from_a_list(clips, tmp_path, monkeypatch, capsys):
     assert [each["input"] for each in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
 
 
-def test_a_clip_whose_name_is_not_unicode_is_encoded(clips, tmp_path, cluster):
+def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, tmp_path, cluster):
     name = os.fsdecode(b"b\xe4um.h5")
     (clips / "a.h5").rename(clips / name)
     out = tmp_path / "out"
@@ -343,7 +344,7 @@ def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path,
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
 
 
-def test_an_input_whose_server_states_no_time_or_tag_is_compared_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
+def test_an_input_without_a_modification_time_is_recognised_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
     monkeypatch.setattr(Quiet, "unsaid", "Last-Modified")
     out = tmp_path / "out"
     items = batch.find([f"{served}/a.h5"], out, settings=FAST)
@@ -412,7 +413,7 @@ def test_memory_serves_workers_in_this_process_and_is_no_place_for_others(clips,
     ("memory://out", "memory://out: got no manifest, expected a file of this machine where outputs go to a URL"),
     ("https://me:hush@example.org/out?key=hush", "https://example.org/out: got a chain of file systems or a query"),
 ])
-def test_an_unusable_output_url_is_refused_in_one_line(out, message, clips, capsys):
+def test_an_unusable_output_url_is_an_error_of_one_line(out, message, clips, capsys):
     assert cli.main(["batch", str(clips / "a.h5"), "--out", out]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and message in err and "hush" not in err
@@ -462,7 +463,7 @@ def test_without_dask_the_command_that_installs_it_is_named(clips, tmp_path, mon
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_scheduler_is_an_error_of_one_line(clips, tmp_path, monkeypatch, capsys):
+def test_an_unreachable_scheduler_is_an_error_of_one_line(clips, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs, "CONNECTING", 0.5)
     assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
     err = capsys.readouterr().err
@@ -627,7 +628,7 @@ def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, ma
 
 
 @pytest.mark.slow
-def test_a_full_file_system_is_reported_and_a_second_run_does_what_is_missing(many, tmp_path):
+def test_a_full_tmpfs_is_reported_and_a_second_run_does_what_is_missing(many, tmp_path):
     """A tmpfs in a mount namespace of its own, which the system has to allow."""
     out, kept = tmp_path / "out", tmp_path / "kept"
     out.mkdir()

@@ -1,4 +1,4 @@
-"""What `python -m bench` prints can be relied on: sizes come with a bound that was seen to hold."""
+"""What `python -m bench` prints: sizes with a bound that was checked, figures with command, versions and machine."""
 
 from __future__ import annotations
 
@@ -289,7 +289,7 @@ def test_what_a_frame_behind_a_url_takes_is_counted_and_limited(tmp_path, bushy_
 
 
 @pytest.mark.slow
-def test_the_drill_finds_every_clip_once(tmp_path):
+def test_a_batch_with_injected_faults_has_every_clip_once(tmp_path):
     _, result = run_bench(tmp_path, "drill", "--clips", "16", "--frames", "20", "--effort", "fast")
     runs, [end] = tables_of(result)
     assert result["broken"] == [] and runs[0]["exit code"] == -9

@@ -112,7 +112,7 @@ def test_a_clip_without_any_extent_has_a_bound_that_a_file_can_hold(scratch):
 @settings(STEADY, max_examples=40)
 @given(st.integers(0, 19), st.integers(0, 9), st.integers(0, 2),
        st.sampled_from([np.nan, np.inf, -np.inf, 1e19, -3e38]), st.sampled_from([np.float32, np.float64]))
-def test_one_number_that_is_none_is_refused_wherever_it_is(scratch, frame, vertex, axis, value, dtype):
+def test_one_number_that_is_not_finite_is_refused_wherever_it_is(scratch, frame, vertex, axis, value, dtype):
     clip = plant(seed=2, branches=5, longest=4, frames=20, dtype=dtype)
     vertex %= clip.vertex_count
     clip.positions[frame, vertex, axis] = value

@@ -1,5 +1,5 @@
 """What an engine that calls the C core relies on (ath.h): sizes that are enough and checked, bytes in any order,
-levels and times that mean what the header says, and the same bits whichever way a frame is come by.
+levels and times that mean what the header says, and the same bits in whatever order frames are decoded.
 
 The functions are declared here from the header alone, as a program would, apart from the package's own binding.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import time
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -19,7 +20,7 @@ from athcodec import container as ct
 from athcodec._native import LOOSE
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
-from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
+from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
 
 
 @pytest.fixture(scope="module")
@@ -432,7 +433,7 @@ def test_one_frame_has_no_frame_rate(tmp_path):
         assert decoder.fps == 0.0 and decoder.positions().shape[0] == 1
 
 
-def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
+def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
         assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
         assert np.array_equal(partial.positions(), plain.positions())
@@ -484,6 +485,19 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
             assert np.abs(placed - shown[attach]).max(initial=0) < 1e-9 * size
+
+
+@pytest.mark.parametrize("clip", [tube(8, 6, 3), plant(3, branches=6, frames=3)], ids=["one solid stem", "thin stems"])
+def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(clip, tmp_path):
+    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
+    parts = Parts.of((tmp_path / "a.ath").read_bytes())
+    level = max(chunk.level for chunk, _ in parts.chunks if chunk.kind == ct.STEMS)
+    largest = struct.pack("<f", 1e38) + parts.payload(ct.STEMS, level)[4:]
+    decoder = opened(parts.with_payload(ct.STEMS, largest, level))
+    assert np.isinf(decoder.positions(0)).any()
+    for ask in (decoder.affines, decoder.residual):
+        with pytest.raises(BadChunk, match="frame 0: got positions"):
+            ask(0)
 
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():

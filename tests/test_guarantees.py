@@ -20,8 +20,8 @@ FORMATS = {
 }
 NUMBERED = {"obj", "ply"}  # a file per frame
 
-NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: it is given to the reader
-WITHOUT_UNIT = {"pc2", "mdd", "obj", "ply", "pvd"}  # formats without units and axes: given to the reader
+NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: who reads has to give it
+WITHOUT_UNIT = {"pc2", "mdd", "obj", "ply", "pvd"}  # formats without a place for a unit or an axis
 NO_STATICS = {"pc2", "mdd"}  # but for what their mesh file holds
 METRES = {"gltf"}  # always metres with y up: the reader gives that
 EXACT = {"hdf5", "npz", "usdc", "usda", "pc2", "mdd", "obj", "ply", "pvd"}  # positions bit for bit

@@ -1,4 +1,4 @@
-"""What a web page relies on: the decoder in WebAssembly shows the same bits as the C library, plays files
+"""The decoder in WebAssembly: it shows the same bits as the C library, plays files
 that arrive in pieces, names what is wrong with a damaged one, and is what the sources make."""
 
 from __future__ import annotations
@@ -276,7 +276,7 @@ answer({
 """
 
 
-def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
+def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
     native = Native(any_ath.read_bytes())
     lib, file, info = native.lib, native.file, native.info
     rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))

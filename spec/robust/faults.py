@@ -166,8 +166,8 @@ def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None
     row.tried += 1
     row.hangs += code == -signal.SIGKILL
     row.crashes += code < 0 and code != -signal.SIGKILL
-    row.wrong += not (code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older"
-                      or code == 0 and is_whole(target)) or bool(place.left_over(target))
+    row.wrong += not ((code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older")
+                      or (code == 0 and is_whole(target))) or bool(place.left_over(target))
     target.unlink()
 
 
@@ -189,7 +189,7 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
             refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
             row.tried += 1
             row.crashes += done.returncode > 1
-            row.wrong += not (refused or done.returncode == 0 and done.stdout == f"{target.name}\n")
+            row.wrong += not (refused or (done.returncode == 0 and done.stdout == f"{target.name}\n"))
     row.note = "tmpfs, the error is ENOSPC"
     return row
 
