@@ -278,4 +278,4 @@ class File:
 
     def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
-        return lib.ath_depth_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)
+        return lib.ath_level_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)

@@ -2,7 +2,7 @@
 
 The forest. A camera looks into a wedge of 90 degrees, about what a vertical field of view of 60 degrees shows on a
 screen of 16:9. Plants stand evenly in it, one on each square as wide as the plant, the first as far away as that. Each
-shows the level that `ath_depth_for` gives for its distance: at most 1 pixel off on 1,080 lines. Plant i, by distance,
+shows the level that `ath_level_for` gives for its distance: at most 1 pixel off on 1,080 lines. Plant i, by distance,
 plays clip i modulo the clips.
 
 The player is that of an engine. Clips loop, and are streamed: of each clip and level in use the segment that plays is
@@ -71,7 +71,7 @@ FORMULA = """
 kB/s = sum over clips of (stems up to the deepest level in use, maps of the levels in use, corrections of the last) /
 seconds of the clip. ms a picture = instances * choice + sum over clips and levels in use of (phases in use * pose +
 preparing all segments / (seconds of the clip * pictures a second)). The wedge has {wedge:.0f} degrees with a plant on
-each {side:.3g} x {side:.3g} of ground; level: ath_depth_for, 1 pixel, field of view 60 degrees, 1,080 lines.
+each {side:.3g} x {side:.3g} of ground; level: ath_level_for, 1 pixel, field of view 60 degrees, 1,080 lines.
 bench/forest.py says why.
 """
 PARTS_NOTE = """

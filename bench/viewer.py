@@ -41,16 +41,16 @@ FETCH = """async (name) => {
   const size = (await answer.arrayBuffer()).byteLength;
   return { seconds: (performance.now() - start) / 1000, size };
 }"""
-MODES = """async ([name, mode, depths, frames]) => {
+MODES = """async ([name, mode, levels, frames]) => {
   const { ATHLoader } = await import("athcodec-three"), loader = new ATHLoader().setMode(mode);
   const ath = await loader.loadAsync(name), { stage } = athcodecViewer, gl = stage.renderer.getContext();
   const { motion } = ath, scene = stage.scene([ath.object]), pixel = new Uint8Array(4), found = [];
   while (!motion.complete) await new Promise((done) => setTimeout(done, 20));
-  for (let depth = 0; depth < depths; depth++) {
+  for (let level = 0; level < levels; level++) {
     const ms = [], worker = [];
     for (let i = 0; i < frames; i++) {
       const start = performance.now();
-      await motion.show(i / 30, depth);
+      await motion.show(i / 30, level);
       stage.renderer.render(scene, stage.camera);
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
       ms.push(performance.now() - start);
@@ -59,7 +59,7 @@ MODES = """async ([name, mode, depths, frames]) => {
     const median = (values) => values.sort((a, b) => a - b)[frames >> 1];
     const texture = motion.uniforms.athData.value, bytes = mode === "matrices" ? texture.image.data.byteLength
       : 12 * motion.info.vertexCount;
-    found.push({ depth, mode, ms: median(ms), worker: median(worker), bytes });
+    found.push({ level, mode, ms: median(ms), worker: median(worker), bytes });
   }
   ath.dispose();
   loader.dispose();
@@ -77,7 +77,7 @@ clock, as the long-task observer has it (0: none over 50 ms), and in processor t
 programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
 NOTE_FOREST = """
-Milliseconds from choosing depths until the picture is drawn, in software, the fastest of seven, by turns;
+Milliseconds from choosing levels until the picture is drawn, in software, the fastest of seven, by turns;
 vertices are those drawn.
 """
 NOTE_MODES = """
@@ -231,7 +231,7 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate("athcodecViewer.forestOf(10)")
-        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.depthCount")
+        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.levelCount")
         for count in counts:
             page.evaluate(f"athcodecViewer.forestOf({count})")
             both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
@@ -240,7 +240,7 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
                     page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
                     found.append(page.evaluate("athcodecViewer.timeForest(1)"))
             on, off = (min(found, key=lambda each: each["ms"]) for found in both.values())
-            rows.append({"instances": count, "in view": count - on["unseen"], "by depth": on["counts"],
+            rows.append({"instances": count, "in view": count - on["unseen"], "by level": on["counts"],
                          "detail on": on["ms"], "detail off": off["ms"], "off / on": off["ms"] / on["ms"],
                          "vertices on": on["vertices"], "vertices off": off["vertices"]})
         page.close()
@@ -252,8 +252,8 @@ def _modes(browser, data: bytes) -> list[dict[str, Any]]:
         page = _page(browser, line, "tree.ath")
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
-        depths = page.evaluate("athcodecViewer.motion.depthCount")
+        levels = page.evaluate("athcodecViewer.motion.levelCount")
         rows = [row for mode in ("matrices", "positions")
-                for row in page.evaluate(MODES, ["/tree.ath", mode, depths, 21])]
+                for row in page.evaluate(MODES, ["/tree.ath", mode, levels, 21])]
         page.close()
-    return sorted(rows, key=lambda row: row["depth"])
+    return sorted(rows, key=lambda row: row["level"])

@@ -1,5 +1,5 @@
 """What who looks at a plant relies on: the page comes with all that it needs, from a server or as one file; plays from
-the first bytes on, shows the bits of every depth, and says what is wrong with a file.
+the first bytes on, shows the bits of every level, and says what is wrong with a file.
 
 Tests with the marker `browser` look at the page in Chromium (Debian: apt-get install chromium; pip install playwright).
 """
@@ -201,7 +201,7 @@ import { PerspectiveCamera, Scene } from "three";
 import { ATHForest, ATHLoader, type ATHMotion } from "athcodec-three";
 const ath = await new ATHLoader().setWorkerLimit(2).loadAsync("tree.ath");
 new Scene().add(ath.object);
-ath.motion.setDepth("auto").setTime(2).addEventListener("depth", (event) => { const depth: number = event.depth; });
+ath.motion.setLevel("auto").setTime(2).addEventListener("level", (event) => { const level: number = event.level; });
 const { clips, clip }: ATHMotion = ath.motion.play("storm", { fade: 0.5 });
 const name: string = clips[0].loop ? clips[0].name : clip.name;
 const forest = new ATHForest(ath);
@@ -288,21 +288,21 @@ def positions_of(page, call: str) -> np.ndarray:
 
 
 @browser_test
-def test_every_depth_shows_the_positions_that_python_decodes(opened, sample_ath):
+def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath):
     """In the worker, in the texture, and as the vertex shader reads it."""
     with Line({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         size = float(np.ptp(decoder.positions(0), axis=0).max())
-        for depth in range(decoder.level_count):
+        for level in range(decoder.level_count):
             for frame in (0, 41, decoder.frame_count - 1):
-                wanted = decoder.positions(frame, depth)
+                wanted = decoder.positions(frame, level)
                 seconds = float(decoder.time[frame] - decoder.time[0])
-                decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {depth})")
+                decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {level})")
                 assert np.array_equal(decoded.astype(np.float32), wanted.astype(np.float32))
-                assert page.evaluate(f"athcodecViewer.shown({seconds}, {depth})")["depth"] == depth
+                assert page.evaluate(f"athcodecViewer.shown({seconds}, {level})")["level"] == level
                 for way in ("uploaded", "onGraphics"):
                     shown = positions_of(page, f"athcodecViewer.{way}()")
-                    assert np.abs(shown - wanted).max() < 1e-6 * size, (depth, frame, way)
+                    assert np.abs(shown - wanted).max() < 1e-6 * size, (level, frame, way)
 
 
 def play(page, clip) -> None:
@@ -318,14 +318,14 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
         for index, clip in reversed(list(enumerate(first.clips))):
             play(page, index)
             decoder = first.play(clip.name)
-            for depth in (0, decoder.level_count - 1):
+            for level in (0, decoder.level_count - 1):
                 for frame in sorted({0, clip.frame_count // 2, clip.frame_count - 1}):
-                    wanted, seconds = decoder.positions(frame, depth), float(decoder.time[frame] - decoder.time[0])
-                    decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {depth})")
+                    wanted, seconds = decoder.positions(frame, level), float(decoder.time[frame] - decoder.time[0])
+                    decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {level})")
                     assert np.abs(decoded - wanted).max() < 1e-6 * np.ptp(wanted)  # times are rounded
-                    page.evaluate(f"athcodecViewer.shown({seconds}, {depth})")
+                    page.evaluate(f"athcodecViewer.shown({seconds}, {level})")
                     shown = positions_of(page, "athcodecViewer.onGraphics()")
-                    assert np.abs(shown - wanted).max() < 2e-6 * np.ptp(wanted), (clip.name, depth, frame)
+                    assert np.abs(shown - wanted).max() < 2e-6 * np.ptp(wanted), (clip.name, level, frame)
 
 
 @browser_test
@@ -382,15 +382,15 @@ FADE = """async (level) => {
   const still = async () => { await pictured(); return [...motion.uploaded()]; };
   const first = pictured();
   motion.wrap = "clamp";
-  motion.setDepth(level).setTime(100);
+  motion.setLevel(level).setTime(100);
   await first;
-  await until(() => motion.depth === level);
+  await until(() => motion.level === level);
   const begun = new Promise((done) => motion.addEventListener("clip", done));
   motion.addEventListener("frame", ({ frame }) => { if (motion.switching === "waiting") waiting.push(frame); });
   motion.play("gust", { fade: 4, at: 100 });
   await begun;
   const { frame } = motion;
-  await until(() => motion.complete && motion.depth === level);
+  await until(() => motion.complete && motion.level === level);
   const found = { waiting, frame, before: [...motion.uploaded()] };
   let next = still();
   motion.setTime(101);
@@ -496,15 +496,15 @@ def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
 
 
 @browser_test
-def test_only_the_depth_that_is_looked_at_is_fetched(opened, gusty_ath):
+def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
     data = gusty_ath.read_bytes()
     with Line({"tree.ath": data}, rate=100_000) as line, athcodec.open(gusty_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion")
-        page.evaluate("athcodecViewer.setDepth('1')")
+        page.evaluate("athcodecViewer.setLevel('1')")
         page.wait_for_function(
-            "() => athcodecViewer.motion.readyDepth >= 1 && athcodecViewer.plants[0].ath.attributes.radius")
+            "() => athcodecViewer.motion.readyLevel >= 1 && athcodecViewer.plants[0].ath.attributes.radius")
         time.sleep(1)
-        assert page.evaluate("athcodecViewer.motion.depth") == 1
+        assert page.evaluate("athcodecViewer.motion.level") == 1
         assert line.sent("tree.ath") < 0.6 * len(data) and decoder.level_count > 2
 
 
@@ -527,13 +527,13 @@ def cut_after(path: Path, level: int) -> bytes:
 
 @browser_test
 @pytest.mark.parametrize("ranges", [True, False])
-def test_a_truncated_file_plays_to_its_depth(opened, sample_ath, ranges):
+def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
     data = cut_after(sample_ath, 1) + b"xx"
     with Line({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
-        page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyDepth === 1")
+        page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyLevel === 1")
         page.keyboard.press("l")
         page.wait_for_function("() => athcodecViewer.counters.pictures > 8")
-        assert page.evaluate("athcodecViewer.motion.depth") == 1
+        assert page.evaluate("athcodecViewer.motion.level") == 1
         shown = positions_of(page, "athcodecViewer.decoded(1, 1)")
         with athcodec.open(sample_ath) as whole:
             frame = int(np.argmin(np.abs(whole.time - whole.time[0] - 1)))
@@ -563,7 +563,7 @@ def test_what_is_whole_of_a_damaged_file_plays(opened, sample_ath):
         assert "damaged" in page.inner_text("#note")
         page.keyboard.press("l")
         page.wait_for_function("() => athcodecViewer.counters.pictures > 20")
-        assert page.evaluate("athcodecViewer.motion.depth") >= 1
+        assert page.evaluate("athcodecViewer.motion.level") >= 1
 
 
 @browser_test
@@ -575,12 +575,12 @@ def test_an_exported_page_plays_from_the_disk(opened, sample_ath, tmp_path):
 
 
 @browser_test
-def test_a_thousand_instances_are_drawn_each_at_its_depth(opened, sample_ath):
+def test_a_thousand_instances_are_drawn_each_at_its_level(opened, sample_ath):
     with Line({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(1000)")
         forest = "athcodecViewer.state.forest"
-        page.wait_for_function(f"() => {forest}?.baked.length === athcodecViewer.motion.depthCount")
+        page.wait_for_function(f"() => {forest}?.baked.length === athcodecViewer.motion.levelCount")
         page.wait_for_function(f"() => {forest}.counts.reduce((a, b) => a + b, 0) > 300", timeout=60_000)
         counts = page.evaluate(f"[...{forest}.counts, {forest}.culled]")
         assert sum(counts) == 1000 and sum(count > 0 for count in counts[:-1]) > 1
@@ -648,7 +648,7 @@ def smooth_normals(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 @browser_test
-def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
+def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
     clip = tube(40, 12, 30)
     quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
                       for r in range(39) for k in range(12)], np.int32)
@@ -661,12 +661,12 @@ def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
     with Line({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
-        for depth in range(decoder.level_count):
-            page.evaluate(f"athcodecViewer.shown({decoder.time[20] - decoder.time[0]}, {depth})")
+        for level in range(decoder.level_count):
+            page.evaluate(f"athcodecViewer.shown({decoder.time[20] - decoder.time[0]}, {level})")
             shown = positions_of(page, "athcodecViewer.onGraphics('normals')")
-            wanted = smooth_normals(decoder.positions(20, depth).astype(float), quads)
+            wanted = smooth_normals(decoder.positions(20, level).astype(float), quads)
             turned = np.abs(wanted - smooth_normals(clip.rest.astype(float), quads)).max()
-            assert turned > 0.3 and (shown * wanted).sum(axis=1).min() > np.cos(np.radians(8)), depth
+            assert turned > 0.3 and (shown * wanted).sum(axis=1).min() > np.cos(np.radians(8)), level
 
 
 @browser_test
@@ -681,7 +681,7 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
         assert pressed("Space", "athcodecViewer.state.playing") is False
         pressed("Home", "0")
         assert pressed("ArrowRight", "athcodecViewer.state.time") == pytest.approx(1 / 30, rel=1e-3)
-        assert pressed("-", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.depthCount") - 1
+        assert pressed("-", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.levelCount") - 1
         assert pressed("a", "athcodecViewer.motion.automatic") is True
         assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Node"
         assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Skeleton"
