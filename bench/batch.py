@@ -75,8 +75,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 broken += _differences(Path(folder, f"loop_{number}"), out)
         files = [path.stat().st_size for path in Path(folder, "loop_0").iterdir()]
     rows = [{"workers": name, "clips": args.clips, "bytes": sum(files)}
-            | {what: median(each[what] for each in rounds) for what in rounds[0]}
-            | {"clips/s": args.clips / median(each["clips s"] for each in rounds)} for name, rounds in runs.items()]
+            | {column: median(figures[column] for figures in rounds) for column in rounds[0]}
+            | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)} for name, rounds in runs.items()]
     note = NOTE.format(frames=args.frames, vertices=vertices, rounds=args.rounds)
     return {"tables": [table(f"Many clips, bound {args.rel_error:g}", rows, note),
                        table("One worker over several", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}

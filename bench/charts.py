@@ -66,7 +66,8 @@ def _batch(axes, rows: Rows) -> None:
 
 
 def _remote(axes, rows: Rows) -> None:
-    own = [row for row in rows if row["plants"] == max(each["plants"] for each in rows)]
+    most = max(row["plants"] for row in rows)
+    own = [row for row in rows if row["plants"] == most]
     places = range(len(own))
     for shift, column, colour in ((-0.2, "needed", COLOURS[1]), (0.2, "bytes", COLOURS[0])):
         axes.barh([place + shift for place in places], [row[column] for row in own], 0.4, color=colour,

@@ -58,12 +58,12 @@ def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, depth: int | N
 
 
 @contextmanager
-def stand_of(path: Path) -> Iterator[Stand]:
+def replicated_plants(path: Path) -> Iterator[ReplicatedPlants]:
     with athcodec.read_hdf5(path) as clip:
-        yield Stand(clip, path.stem)
+        yield ReplicatedPlants(clip, path.stem)
 
 
-class Stand:
+class ReplicatedPlants:
     """Copies of one plant, all in one place, and its motion for as many frames as wanted."""
 
     def __init__(self, clip: athcodec.MotionClip, name: str) -> None:

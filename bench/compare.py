@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from math import exp, log
 from typing import Any
 
+from bench.codec_registry import OURS
 from bench.curves import Curve, mean_saving
-from bench.opponents import OURS
 
 Point = dict[str, Any]
 

@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             rows.append(scene.row(paper, played))
             parts.append(scene.parts(paper, played))
             broken += scene.differences(played)
-        unit_rows = [row for each in units.values() for row in _unit_rows(each)]
+        unit_rows = [row for clips in units.values() for row in _unit_rows(clips)]
         facts = units[args.clips[0]][0].facts
     note = NOTE.format(**facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE,
                        rounds=args.rounds)
@@ -201,8 +201,8 @@ def _side(file: Path) -> float:
 
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
     measured = _output(program, "units", rounds, *files)
-    return [Unit(file, measured["choice_us"], each["prepare_ms"], measured["pose_us"])
-            for file, each in zip(files, measured["clips"], strict=True)]
+    return [Unit(file, measured["choice_us"], clip["prepare_ms"], measured["pose_us"])
+            for file, clip in zip(files, measured["clips"], strict=True)]
 
 
 def _output(program: Path, *words: object) -> Any:
@@ -273,7 +273,7 @@ class Scene:
             f"{len(self.distances)}", *(f"{self.clip_of(i)} {distance!r} {self.phase_of(i)}"
                                         for i, distance in enumerate(self.distances.tolist()))]))
         runs = [_output(program, "play", file, max(unit.seconds for unit in self.units), RATE) for _ in range(rounds)]
-        return runs[0] | {name: median(each[name] for each in runs) for name in runs[0] if name.endswith("_ms")}
+        return runs[0] | {name: median(figures[name] for figures in runs) for name in runs[0] if name.endswith("_ms")}
 
     def row(self, paper: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
         on_paper, measured = _ms(paper), _ms(played)

@@ -46,8 +46,8 @@ def measure(path: Path, rel_error: float) -> dict[str, Any]:
         began = time.perf_counter()
         found = athcodec.find_branches(bare)
         seconds = time.perf_counter() - began
-        true, ours = (athcodec.encode(each, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
-                      for each in (clip, discovery.with_branches(bare, found)))
+        true, ours = (athcodec.encode(variant, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
+                      for variant in (clip, discovery.with_branches(bare, found)))
         return {"clip": path.stem, "vertices": clip.vertex_count, "branches": clip.branch_count,
                 "found": len(found.branch_parent), "by": found.method, "right": right_percent(found, clip),
                 "seconds": seconds, "true bytes": true, "found bytes": ours, "more": 100 * (ours / true - 1)}

@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 rows.append(json.loads(_process("encode", args.vertices, frames, "" if args.made else path, jobs,
                                                 args.effort, args.rel_error)))
     for row in rows:
-        first = next(each for each in rows if each["threads"] == row["threads"])
-        single = [each for each in rows if each["threads"] == 1 and each["frames"] == row["frames"]]
+        first = next(other for other in rows if other["threads"] == row["threads"])
+        single = [other for other in rows if other["threads"] == 1 and other["frames"] == row["frames"]]
         row["linear"] = row["seconds"] / row["frames"] / (first["seconds"] / first["frames"])
         row["speed-up"] = single[0]["seconds"] / row["seconds"] if single else None
     title = f"Large clips, bound {args.rel_error:g}, effort {args.effort}"
@@ -91,7 +91,7 @@ def made(vertices: int, frames: int, seed: int = 0) -> MotionClip:
     across = np.cross(heading, rng.normal(size=(count, 3)))
     across *= (0.05 * length / np.linalg.norm(across, axis=1))[:, None]
     hertz, phase = rng.uniform(0.3, 1.0, count) * 2 ** (depth / 2), rng.uniform(0, 2 * np.pi, count)
-    stems_of = [np.flatnonzero(depth == each) for each in range(depth.max() + 1)]
+    stems_of = [np.flatnonzero(depth == order) for order in range(depth.max() + 1)]
 
     def read(start: int, stop: int) -> np.ndarray:
         out = np.empty((stop - start, count * STEM, 3), np.float32)

@@ -2,7 +2,7 @@
 
 It must not grow with the number of frames. All encodings have segments as long as those of the single clip,
 so that the number of frames alone differs. Every encoding, and every writing of a longer clip, is a process
-of its own (peak.py), because a process inherits the peak of the one that starts it: this one stays as small
+of its own (memory_worker.py), because a process inherits the peak of the one that starts it: this one stays as small
 as its imports.
 """
 
@@ -61,7 +61,7 @@ def _segment_frames(path: Path) -> int:
 
 
 def _process(*words: str) -> dict[str, int]:
-    command = [sys.executable, "-m", "bench.peak", *words]
+    command = [sys.executable, "-m", "bench.memory_worker", *words]
     done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
     return json.loads(done.stdout)
 

@@ -13,8 +13,8 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
+from bench.codec_registry import OURS
 from bench.compare import Point, is_pca, measured
-from bench.opponents import OURS
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7A7A7A")
 MARKERS = "svDP<>pXh8*d^"

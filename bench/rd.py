@@ -1,7 +1,7 @@
 """Rate and distortion of athcodec beside baselines and programs: every codec, at every bound, on every clip.
 
 Each codec makes the smallest file it can within the bound; one process encodes, another decodes the bytes and
-measures (point.py). A codec that is missing, breaks the bound, crashes or takes too long is a row that says
+measures (rd_worker.py). A codec that is missing, breaks the bound, crashes or takes too long is a row that says
 so. With --json the results are kept as they come: a run that was stopped goes on where it was, and what is
 there from the same clip, code and versions is not measured again. Then what follows from the points: mean
 savings and ratios (compare.py), the growing prefix of one file and what it costs (progressive.py).
@@ -24,9 +24,9 @@ from typing import Any
 import athcodec
 from bench import compare, data, progressive
 from bench.clips import REL_ERROR
+from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
 from bench.codecs import Codec
 from bench.curves import Curve
-from bench.opponents import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
 from bench.store import Store
 from bench.suite import SUITES, Case, cases, digest
 from bench.tables import cpu_model, environment, table
@@ -185,11 +185,11 @@ def _measure(job: _Job) -> dict[str, Any]:
 
 
 class _Failed(Exception):
-    """A process of point.py ended without a result."""
+    """A process of rd_worker.py ended without a result."""
 
 
 def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
-    command = [sys.executable, "-m", "bench.point", *words]
+    command = [sys.executable, "-m", "bench.rd_worker", *words]
     with subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                           start_new_session=True) as process:
         try:

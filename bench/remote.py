@@ -20,9 +20,9 @@ import numpy as np
 
 import athcodec
 from athcodec.remote import READ_AHEAD
-from bench.clips import add_rel_error, stand_of
-from bench.line import Line
+from bench.clips import ReplicatedPlants, add_rel_error, replicated_plants
 from bench.tables import table
+from bench.throttled_server import ThrottledServer
 
 PLANTS, FRAMES, FRAME, LATENCY, ROUNDS = (1, 20), 1000, 700, 0.05, 5
 TARGET = 4  # requests to open a file and show a frame of it coarsely
@@ -54,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, broken = [], []
-    with tempfile.TemporaryDirectory() as folder, stand_of(args.of) as stand:
+    with tempfile.TemporaryDirectory() as folder, replicated_plants(args.of) as replicated:
         for plants in args.plants:
-            file = _make(stand, Path(folder), plants, args)
+            file = _make(replicated, Path(folder), plants, args)
             for row, lines in _rows(file, args):
                 rows.append({"plants": plants} | row)
                 broken += lines
@@ -65,9 +65,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": [table("A clip behind a URL", rows, note)], "broken": broken}
 
 
-def _make(stand, folder: Path, plants: int, args: argparse.Namespace) -> Path:
+def _make(replicated: ReplicatedPlants, folder: Path, plants: int, args: argparse.Namespace) -> Path:
     source, file = folder / "clip.h5", folder / NAME
-    stand.write(source, plants, args.frames)
+    replicated.write(source, plants, args.frames)
     with athcodec.read_hdf5(source) as clip:
         athcodec.encode(clip, file, rel_error=args.rel_error, effort=args.effort, attributes="none")
     return file
@@ -90,7 +90,7 @@ def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any]
     for what, (step, allowed) in _steps(args.frame).items():
         row = {"what": what, "requests": 0, "allowed": allowed, "bytes": 0, "needed": _needed(file, step)}
         for name, latency in (("s", 0.0), (f"s at {1e3 * args.latency:g} ms", args.latency)):
-            with Line({NAME: data}, latency=latency) as server:
+            with ThrottledServer({NAME: data}, latency=latency) as server:
                 row[name], row["requests"], row["bytes"] = _measure(server, step, args.rounds)
                 answered = len(server.log) // args.rounds, server.sent(NAME) // args.rounds
         lines = []
@@ -102,7 +102,7 @@ def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any]
         yield row | {"bytes/needed": row["bytes"] / row["needed"], "file": len(data)}, lines
 
 
-def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
+def _measure(server: ThrottledServer, step: Step, rounds: int) -> tuple[float, int, int]:
     """Seconds, the median of some rounds; requests and bytes of one."""
     seconds = []
     for _ in range(rounds):

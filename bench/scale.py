@@ -23,7 +23,7 @@ from statistics import median
 from typing import Any
 
 import athcodec
-from bench.clips import Stand, add_rel_error, stand_of
+from bench.clips import ReplicatedPlants, add_rel_error, replicated_plants
 from bench.decode import compile_program
 from bench.suite import cases
 from bench.tables import table
@@ -141,21 +141,21 @@ def _series(args: argparse.Namespace, folder: Path) -> Iterator[_Clip]:
     if args.clips:
         yield from _clips("given", args.clips)
         return
-    stands, stand_frames, lengths, plants = SIZES[args.suite]
-    with stand_of(args.of) as stand:
-        for count in stands:
-            yield _made("copies", stand, folder, count, stand_frames)
+    copies, copy_frames, lengths, plants = SIZES[args.suite]
+    with replicated_plants(args.of) as replicated:
+        for count in copies:
+            yield _made("copies", replicated, folder, count, copy_frames)
         for frames in lengths:
-            yield _made("repeated frames", stand, folder, plants, frames)
+            yield _made("repeated frames", replicated, folder, plants, frames)
     if args.suite == "full":
         for series, names in REAL.items():
             yield from _clips(series, names)
 
 
-def _made(series: str, stand: Stand, folder: Path, plants: int, frames: int) -> _Clip:
+def _made(series: str, replicated: ReplicatedPlants, folder: Path, plants: int, frames: int) -> _Clip:
     path = folder / f"{plants}x{frames}.h5"
-    stand.write(path, plants, frames)
-    return _Clip(series, f"{stand.name} x {plants}", path, plants)
+    replicated.write(path, plants, frames)
+    return _Clip(series, f"{replicated.name} x {plants}", path, plants)
 
 
 def _clips(series: str, words: Iterable[str]) -> Iterator[_Clip]:

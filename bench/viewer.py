@@ -20,8 +20,8 @@ import numpy as np
 import athcodec
 from bench.browser import chromium
 from bench.clips import add_clips, add_rel_error
-from bench.line import WEB, Line
 from bench.tables import table
+from bench.throttled_server import WEB, ThrottledServer
 
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
@@ -152,40 +152,40 @@ def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
 
 
-def _page(browser, line: Line, name: str | None = None):
+def _page(browser, server: ThrottledServer, name: str | None = None):
     page = browser.new_page(viewport={"width": 960, "height": 600})
-    page.goto(line.page(name))
+    page.goto(server.page(name))
     page.wait_for_function("() => globalThis.athcodecViewer")
     page.wait_for_timeout(1000)
     return page
 
 
 def _starts(browser, files: dict[str, bytes], args: argparse.Namespace) -> dict[str, Any]:
-    with Line(files, rate=args.line * MEGABIT) as line:
-        rounds = [_open(browser, line) for _ in range(args.rounds)]
-        page = _page(browser, line)
+    with ThrottledServer(files, rate=args.line * MEGABIT) as server:
+        rounds = [_open(browser, server) for _ in range(args.rounds)]
+        page = _page(browser, server)
         others = {name: page.evaluate(FETCH, name) for name in ("tree.raw", "tree.glb")}
         page.close()
-    with Line(files, rate=SLOW) as line:
-        first = _open(browser, line, until="athcodecViewer.counters.firstMotion")["motion"]["bytes"]
-    motion = [each["motion"]["ms"] / 1000 for each in rounds]
+    with ThrottledServer(files, rate=SLOW) as server:
+        first = _open(browser, server, until="athcodecViewer.counters.firstMotion")["motion"]["bytes"]
+    motion = [opening["motion"]["ms"] / 1000 for opening in rounds]
     ath = {"file": ".ath", "size": len(files["tree.ath"]),
-           "picture": statistics.median(each["picture"]["ms"] for each in rounds) / 1000,
+           "picture": statistics.median(opening["picture"]["ms"] for opening in rounds) / 1000,
            "motion": statistics.median(motion), "slowest": max(motion), "bytes": first,
            "share": first / len(files["tree.ath"]),
-           "all": statistics.median(each["all"] for each in rounds)}
+           "all": statistics.median(opening["all"] for opening in rounds)}
     rows = [ath] + [{"file": name, "size": found["size"], "motion": found["seconds"]} for name, found in others.items()]
     return {"starts": rows, "tasks": {
-        "rounds": args.rounds, "by the clock": [max(each["tasks"], default=0) for each in rounds],
-        "processor": [each["processor"] for each in rounds],
-        "over 50 ms": sum(ms > LONGEST_TASK for each in rounds for ms in each["tasks"])}}
+        "rounds": args.rounds, "by the clock": [max(opening["tasks"], default=0) for opening in rounds],
+        "processor": [opening["processor"] for opening in rounds],
+        "over 50 ms": sum(ms > LONGEST_TASK for opening in rounds for ms in opening["tasks"])}}
 
 
 ALL_HERE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
 
 
-def _open(browser, line: Line, until: str = ALL_HERE) -> dict[str, Any]:
-    page = _page(browser, line)
+def _open(browser, server: ThrottledServer, until: str = ALL_HERE) -> dict[str, Any]:
+    page = _page(browser, server)
     page.evaluate(OBSERVE)
     browser.start_tracing(page=page, categories=["toplevel"])
     page.evaluate("athcodecViewer.open('/tree.ath', 'tree.ath')")
@@ -226,8 +226,8 @@ def _promises(clip: str, found: dict[str, Any]) -> list[str]:
 
 def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
     rows = []
-    with Line({"tree.ath": data}) as line:
-        page = _page(browser, line, "tree.ath")
+    with ThrottledServer({"tree.ath": data}) as server:
+        page = _page(browser, server, "tree.ath")
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate("athcodecViewer.forestOf(10)")
@@ -236,10 +236,10 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
             page.evaluate(f"athcodecViewer.forestOf({count})")
             both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
             for _ in range(ROUNDS):  # by turns: what else the machine does meets both
-                for detail, found in both.items():
+                for detail, timings in both.items():
                     page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
-                    found.append(page.evaluate("athcodecViewer.timeForest(1)"))
-            on, off = (min(found, key=lambda each: each["ms"]) for found in both.values())
+                    timings.append(page.evaluate("athcodecViewer.timeForest(1)"))
+            on, off = (min(timings, key=lambda timing: timing["ms"]) for timings in both.values())
             rows.append({"instances": count, "in view": count - on["unseen"], "by depth": on["counts"],
                          "detail on": on["ms"], "detail off": off["ms"], "off / on": off["ms"] / on["ms"],
                          "vertices on": on["vertices"], "vertices off": off["vertices"]})
@@ -248,8 +248,8 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
 
 
 def _modes(browser, data: bytes) -> list[dict[str, Any]]:
-    with Line({"tree.ath": data}) as line:
-        page = _page(browser, line, "tree.ath")
+    with ThrottledServer({"tree.ath": data}) as server:
+        page = _page(browser, server, "tree.ath")
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
         depths = page.evaluate("athcodecViewer.motion.depthCount")

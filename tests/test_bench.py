@@ -73,7 +73,7 @@ def test_levels_end_within_the_bound_and_stay_closed_where_the_papers_gape(tmp_p
 
 
 def test_motions_of_one_plant_take_less_in_one_file_and_keep_the_bound(tmp_path):
-    _, result = run_bench(tmp_path, "joined", "--motions", "3", "--rel-error", "1e-3")
+    _, result = run_bench(tmp_path, "motions", "--motions", "3", "--rel-error", "1e-3")
     [[row]] = tables_of(result)
     assert row["kept"] and row["bytes, one file"] < row["bytes, a file each"] and row["frames"] == 120 - 3 * 4
     assert 0 < row["seam"] <= 2 and result["broken"] == []
@@ -289,12 +289,12 @@ def test_what_a_frame_behind_a_url_takes_is_counted_and_limited(tmp_path, bushy_
 
 
 @pytest.mark.slow
-def test_the_drill_finds_every_clip_once(tmp_path):
-    _, result = run_bench(tmp_path, "drill", "--clips", "16", "--frames", "20", "--effort", "fast")
+def test_a_batch_under_fault_injection_encodes_every_clip_once(tmp_path):
+    _, result = run_bench(tmp_path, "fault-injection", "--clips", "16", "--frames", "20", "--effort", "fast")
     runs, [end] = tables_of(result)
     assert result["broken"] == [] and runs[0]["exit code"] == -9
     assert [(row["done"], row["failed"]) for row in runs[2:]] == [(1, 0), (0, 0)]
-    assert sum(row["new"] for row in runs) == end["files"] == end["once"] == end["verified"] == end["same"] == 16
+    assert sum(row["new"] for row in runs) == end["files"] == end["once"] == end["verified"] == end["identical"] == 16
 
 
 # ---- the whole of it ----

@@ -13,12 +13,12 @@ import pytest
 
 from athcodec.clip import MotionClip
 from bench.codecs import Source, check
+from bench.codecs.baseline import Choice, Ladder, Search
 from bench.codecs.baselines import BASELINES
 from bench.codecs.coder import DamagedStream, RangeCoder, Reader, Writer, Zstd, read_varint, varint
 from bench.codecs.lengyel import Parts, _rotation_vectors, _rotations
 from bench.codecs.ours import Athcodec
 from bench.codecs.tree import VertexOrder, differences, sums, vertex_order
-from bench.codecs.tuned import Choice, Ladder, Search
 
 ROOT = Path(__file__).resolve().parent.parent
 BOUND = 3e-4  # over the diagonal
@@ -27,7 +27,7 @@ CODERS = [RangeCoder(), Zstd()]
 
 @pytest.fixture(autouse=True)
 def short_search(monkeypatch):
-    monkeypatch.setattr("bench.codecs.tuned.Baseline.rounds", 1)
+    monkeypatch.setattr("bench.codecs.baseline.Baseline.rounds", 1)
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 from bench.browser import chromium  # noqa: E402
-from bench.line import WEB, Line  # noqa: E402
+from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
 VIEWER = ROOT / "athcodec" / "viewer"
@@ -90,7 +90,7 @@ def test_nothing_else_of_the_computer_is_served(served):
 
 def test_a_file_behind_a_url_is_passed_on_range_by_range(sample_ath):
     data = sample_ath.read_bytes()
-    with Line({"tree.ath": data}) as line, viewing(f"{line.address}tree.ath") as address:
+    with ThrottledServer({"tree.ath": data}) as line, viewing(f"{line.address}tree.ath") as address:
         line.log.clear()
         with get(address.replace("?file=", ""), Range="bytes=5-9") as answer:
             assert (answer.status, answer.read()) == (206, data[5:10])
@@ -290,7 +290,7 @@ def positions_of(page, call: str) -> np.ndarray:
 @browser_test
 def test_every_depth_shows_the_positions_that_python_decodes(opened, sample_ath):
     """In the worker, in the texture, and as the vertex shader reads it."""
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         size = float(np.ptp(decoder.positions(0), axis=0).max())
         for depth in range(decoder.level_count):
@@ -313,7 +313,7 @@ def play(page, clip) -> None:
 
 @browser_test
 def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley_ath):
-    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
         for index, clip in reversed(list(enumerate(first.clips))):
             play(page, index)
@@ -331,7 +331,7 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
 @browser_test
 def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
     data = windy_ath.read_bytes()
-    with Line({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
+    with ThrottledServer({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
         clips = {clip.name: clip for clip in decoder.clips}
         common = {chunk.offset for chunk in decoder.container.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
 
@@ -358,7 +358,7 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
 
 @browser_test
 def test_the_clip_before_goes_on_until_the_next_is_here_and_fades_into_it(opened, windy_ath):
-    with Line({"tree.ath": windy_ath.read_bytes()}, rate=200_000) as line, athcodec.open(windy_ath) as decoder:
+    with ThrottledServer({"tree.ath": windy_ath.read_bytes()}, rate=200_000) as line, athcodec.open(windy_ath) as decoder:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.setPlaying(false)")
         found = page.evaluate(FADE, decoder.level_count - 1)
@@ -405,7 +405,7 @@ FADE = """async (level) => {
 
 @browser_test
 def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, medley_ath, medley_clips):
-    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
         deepest = first.level_count - 1
         for index, clip in enumerate(first.clips):
@@ -436,7 +436,7 @@ def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, me
 
 @browser_test
 def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_ath, sample_ath):
-    with Line({"tree.ath": medley_ath.read_bytes(), "one.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes(), "one.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         assert page.locator("#clip option").all_inner_texts() == ["calm ↻", "Böe", "still", "round ↻"]
 
@@ -463,7 +463,7 @@ def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_a
 
 @browser_test
 def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
-    with Line({"tree.ath": windy_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": windy_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(30)")
         drawn = """athcodecViewer.state.forest.children.filter(({ visible }) => visible)
@@ -486,7 +486,7 @@ def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
 @browser_test
 def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with Line({"tree.ath": data}, rate=60_000) as line:
+    with ThrottledServer({"tree.ath": data}, rate=60_000) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         first = page.evaluate("athcodecViewer.counters.firstMotion")
         assert first["bytes"] <= 0.15 * len(data)
@@ -498,7 +498,7 @@ def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
 @browser_test
 def test_only_the_depth_that_is_looked_at_is_fetched(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with Line({"tree.ath": data}, rate=100_000) as line, athcodec.open(gusty_ath) as decoder:
+    with ThrottledServer({"tree.ath": data}, rate=100_000) as line, athcodec.open(gusty_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion")
         page.evaluate("athcodecViewer.setDepth('1')")
         page.wait_for_function(
@@ -511,7 +511,7 @@ def test_only_the_depth_that_is_looked_at_is_fetched(opened, gusty_ath):
 @browser_test
 def test_a_server_without_ranges_sends_a_download_that_plays_while_it_grows(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with Line({"tree.ath": data}, rate=60_000, ranges=False) as line:
+    with ThrottledServer({"tree.ath": data}, rate=60_000, ranges=False) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         assert page.evaluate("athcodecViewer.counters.firstMotion.bytes") < 0.5 * len(data)
         page.wait_for_function("() => athcodecViewer.motion.complete", timeout=60_000)
@@ -529,7 +529,7 @@ def cut_after(path: Path, level: int) -> bytes:
 @pytest.mark.parametrize("ranges", [True, False])
 def test_a_truncated_file_plays_to_its_depth(opened, sample_ath, ranges):
     data = cut_after(sample_ath, 1) + b"xx"
-    with Line({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
+    with ThrottledServer({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyDepth === 1")
         page.keyboard.press("l")
         page.wait_for_function("() => athcodecViewer.counters.pictures > 8")
@@ -547,7 +547,7 @@ def test_a_truncated_file_plays_to_its_depth(opened, sample_ath, ranges):
     (None, "cannot be fetched")])
 def test_a_file_that_cannot_be_shown_is_said_to_be(opened, sample_ath, damage, words):
     files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
-    with Line(files) as line:
+    with ThrottledServer(files) as line:
         page = opened(line.page("tree.ath"), "document.getElementById('message').checkVisibility()")
         assert words in page.inner_text("#message h2") and page.inner_text("#message p").strip()
 
@@ -558,7 +558,7 @@ def test_what_is_whole_of_a_damaged_file_plays(opened, sample_ath):
     with athcodec.open(sample_ath) as decoder:
         at = decoder.info()["depths"][1]["bytes"] + 50
     damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1:]
-    with Line({"tree.ath": damaged}) as line:
+    with ThrottledServer({"tree.ath": damaged}) as line:
         page = opened(line.page("tree.ath"), "!document.getElementById('note').hidden")
         assert "damaged" in page.inner_text("#note")
         page.keyboard.press("l")
@@ -576,7 +576,7 @@ def test_an_exported_page_plays_from_the_disk(opened, sample_ath, tmp_path):
 
 @browser_test
 def test_a_thousand_instances_are_drawn_each_at_its_depth(opened, sample_ath):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(1000)")
         forest = "athcodecViewer.state.forest"
@@ -621,7 +621,7 @@ def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
         clip.check()
         athcodec.encode(clip, tmp_path / name, rel_error=1e-3)
         files[name] = (tmp_path / name).read_bytes()
-    with Line(files) as line:
+    with ThrottledServer(files) as line:
         for name in files:
             page = opened(line.page(name))
             page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.index.count > 0")
@@ -658,7 +658,7 @@ def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
     clip.check()
     path = tmp_path / "tube.ath"
     athcodec.encode(clip, path, rel_error=1e-3)
-    with Line({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
+    with ThrottledServer({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
         for depth in range(decoder.level_count):
@@ -671,7 +671,7 @@ def test_normals_turn_with_the_surface_at_every_depth(opened, tmp_path):
 
 @browser_test
 def test_the_page_works_by_keyboard(opened, sample_ath):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
 
         def pressed(key: str, then: str):
@@ -697,7 +697,7 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
 @browser_test
 @pytest.mark.parametrize("size, scheme", [((390, 800), "light"), ((390, 800), "dark"), ((1280, 800), "dark")])
 def test_nothing_runs_out_of_the_screen(opened, sample_ath, size, scheme):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"), color_scheme=scheme)
         page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import (
     DEAD_ZONES,
@@ -26,7 +27,6 @@ from bench.codecs.pca import (
     write_basis,
 )
 from bench.codecs.tree import VertexOrder, read_order, read_pose, vertex_order, write_order, write_pose
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 WEIGHT_STEPS = 32
 
@@ -63,15 +63,15 @@ class Coddyac(Baseline):
         )
         basis = write_basis(writer, basis[:count], steps, trajectories)
         units = fitted_to(basis, rows).reshape(len(order.source), -1, count) / step
-        reach = _reach(order, pose)
-        weights = writer.table(_weights(units, order, reach))
+        step_ratio = _step_ratio(order, pose)
+        weights = writer.table(_weights(units, order, step_ratio))
         q = np.zeros(units.shape, np.int64)
 
         def add(vertices: np.ndarray, predicted: np.ndarray) -> np.ndarray:
             q[vertices] = quantised(units[vertices] - predicted, settings["dead_zone"])
             return q[vertices]
 
-        _predicted(order, reach, weights, units.shape, add)
+        _predicted(order, step_ratio, weights, units.shape, add)
         writer.rows(trajectories.to_axes(q.reshape(-1, count)))
         return order
 
@@ -83,11 +83,11 @@ class Coddyac(Baseline):
         basis = read_basis(reader, trajectories)
         weights = reader.table()
         q = trajectories.from_axes(reader.rows(), len(basis)).reshape(len(order.source), -1, len(basis))
-        units = _predicted(order, _reach(order, pose), weights, q.shape, lambda vertices, _: q[vertices])
+        units = _predicted(order, _step_ratio(order, pose), weights, q.shape, lambda vertices, _: q[vertices])
         return trajectories.motion(units.reshape(-1, len(basis)) @ (basis * step)) + pose[:, :, None], order
 
 
-def _reach(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
+def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
     """(N, 1, 1): how far a vertex is from the one before, over the distance of that from the one before it;
     0: none.
     """
@@ -98,13 +98,13 @@ def _reach(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
     return np.where(before2 >= 0, np.minimum(ratio, 2), 0)[:, None, None]
 
 
-def _weights(units: np.ndarray, order: VertexOrder, reach: np.ndarray) -> np.ndarray:
+def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
     """(2, K) integers: weights of the vertex before, and of its step, that foretell each component best."""
     some = np.flatnonzero(order.before >= 0)
     own, near = units[some], units[order.before[some]]
-    step = reach[some] * (near - units[order.before2[some]])
+    step = step_ratio[some] * (near - units[order.before2[some]])
     noise = np.minimum(1 / 12, (units**2).mean(axis=(0, 1)))
-    along, r1, r2 = own.shape[0] * own.shape[1], reach[some].mean(), (reach[some] ** 2).mean()
+    along, r1, r2 = own.shape[0] * own.shape[1], step_ratio[some].mean(), (step_ratio[some] ** 2).mean()
     a = (near**2).sum(axis=(0, 1)) + noise * along
     b = (near * step).sum(axis=(0, 1)) + noise * along * r1
     c = (step**2).sum(axis=(0, 1)) + 2 * noise * along * r2
@@ -115,7 +115,7 @@ def _weights(units: np.ndarray, order: VertexOrder, reach: np.ndarray) -> np.nda
 
 
 def _predicted(
-    order: VertexOrder, reach: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
+    order: VertexOrder, step_ratio: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
 ) -> np.ndarray:
     """Coefficients (N, W, K) in steps: what the weights foretell and `residual(vertices, predicted)`."""
     units = np.zeros(shape)
@@ -123,7 +123,7 @@ def _predicted(
     for vertices in order.generations:
         before, before2 = order.before[vertices], order.before2[vertices]
         base = units[before]
-        predicted = near * base + (along * reach[vertices]) * (base - units[before2])
+        predicted = near * base + (along * step_ratio[vertices]) * (base - units[before2])
         predicted[before < 0] = 0
         units[vertices] = predicted + residual(vertices, predicted)
     return units

@@ -10,10 +10,10 @@ from itertools import product
 
 import numpy as np
 
-from bench.codecs.peer import (
+from bench.codecs.program import (
     FLAT_LAYOUTS,
     CannotKeep,
-    Peer,
+    Program,
     deflate,
     from_planes,
     from_zigzag,
@@ -26,7 +26,7 @@ from bench.codecs.peer import (
 )
 
 
-class Half(Peer):
+class Half(Program):
     name, module, package = "float16 or integers + zstd", "zstandard", "zstandard"
     forms = ("integers", "floats")
     strengths = (0,)  # a half is a half

@@ -15,6 +15,7 @@ import numpy as np
 
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import DEAD_ZONES, STEPS, Trajectories, cosines, principal, read_group, write_group
 from bench.codecs.tree import (
@@ -27,7 +28,6 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 LEAST_EXTENT = 1e-3  # of the part's largest: what is flatter has no stretch of its own
 STILL = 1e-3  # pull towards no turn, which decides the twist of straight parts

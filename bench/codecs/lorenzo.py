@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.tree import (
     ORDERS,
@@ -22,7 +23,6 @@ from bench.codecs.tree import (
     vertex_order,
     write_order,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings
 
 
 def write_lorenzo(writer: Writer, q: np.ndarray, order: VertexOrder, in_time: int, along: int) -> None:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.codecs.peer import Peer, deflate, from_zigzag, inflate, join, narrowest, split, zigzag
+from bench.codecs.program import Program, deflate, from_zigzag, inflate, join, narrowest, split, zigzag
 
 STRIDE = 256  # the most bytes of one element
 
 
-class Meshopt(Peer):
+class Meshopt(Program):
     name, module, package = "meshoptimizer", "meshoptimizer", "meshoptimizer"
 
     def choices(self, form: str) -> list:

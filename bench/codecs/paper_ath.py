@@ -15,6 +15,7 @@ import numpy as np
 from athcodec.ath import Ath, Thresholds, stem_maps, survey
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.lorenzo import read_lorenzo, write_lorenzo
 from bench.codecs.tree import (
@@ -27,7 +28,6 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 BITS = Split((12, 16, 20), 1)
 

@@ -25,6 +25,7 @@ from functools import cache
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.tree import (
     ORDERS,
@@ -39,7 +40,6 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 COARSEST_BASIS = -2  # half octaves
 STEPS = Ladder.geometric(0.5, 12, 2.0, 4)

@@ -11,12 +11,12 @@ from itertools import product
 
 import numpy as np
 
-from bench.codecs.peer import LAYOUTS, Peer, all_of, each
+from bench.codecs.program import LAYOUTS, Program, decode_arrays, encode_arrays
 
 ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 
 
-class Sz3(Peer):
+class Sz3(Program):
     name, module, package = "SZ3", "pysz", "pysz"
     forms = lossless_forms = ("floats",)
 
@@ -34,7 +34,7 @@ class Sz3(Peer):
             config.cmprAlgo = getattr(pysz.szAlgorithm, algorithm)
             return pysz.sz.compress(part, config)[0].tobytes()
 
-        return each(encode, values, layout)
+        return encode_arrays(encode, values, layout)
 
     def decode_floats(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         pysz = self.load()
@@ -42,4 +42,4 @@ class Sz3(Peer):
         def decode(blob: bytes, part: tuple[int, ...]) -> np.ndarray:
             return pysz.sz.decompress(np.frombuffer(blob, np.uint8), np.float32, part)[0]
 
-        return all_of(decode, data, choice[0], shape)
+        return decode_arrays(decode, data, choice[0], shape)

@@ -1,7 +1,7 @@
 """Two processes of their own for rd.py: one encodes a clip with a codec, another decodes and measures.
 
-    python -m bench.point encode CODEC CLIP.h5 BOUND FILE
-    python -m bench.point decode CODEC CLIP.h5 BOUND FILE
+    python -m bench.rd_worker encode CODEC CLIP.h5 BOUND FILE
+    python -m bench.rd_worker decode CODEC CLIP.h5 BOUND FILE
 
 The second one has nothing of the first but the file, so that what it gives is in those bytes; it reads the
 clip only when it has decoded. Peak memory is that of the whole process. A codec that crashes takes only its
@@ -22,10 +22,10 @@ import numpy as np
 
 import athcodec
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from bench.codec_registry import chosen
 from bench.codecs import Source
-from bench.codecs.peer import CannotKeep
-from bench.opponents import chosen
-from bench.peak import peak_bytes
+from bench.codecs.program import CannotKeep
+from bench.memory_worker import peak_bytes
 
 ENCODES, QUICK_ENCODE = 3, 1.0  # an encoder that takes longer than these seconds runs once
 DECODES, DECODE_SECONDS = 7, 5.0  # fewer decodes, at least three, where they take longer than this together

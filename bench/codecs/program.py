@@ -311,7 +311,7 @@ class Setup:
     choice: int = 0
 
 
-class Peer:
+class Program:
     """A real program as a Codec; see bench.codecs. Subclasses say how it takes integers, floats or both.
 
     `choices(form)` lists the program's own settings; `encode_*` and `decode_*` get one of them. Floats have a
@@ -579,14 +579,14 @@ def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials
     raise CannotKeep("allowed error: no value keeps the bound")
 
 
-def each(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
-    """Every array of a layout by itself."""
+def encode_arrays(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
+    """Encodes every array of a layout separately."""
     return join([encode(part) for part in parts(values, layout)])
 
 
-def all_of(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
+def decode_arrays(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
            shape: tuple[int, int, int]) -> np.ndarray:
-    """The inverse of each: `decode` gets bytes and a shape."""
+    """The inverse of encode_arrays: `decode` gets bytes and a shape."""
     blobs: Iterable[bytes] = split(data)
     return whole([decode(blob, part) for blob, part in zip(blobs, part_shapes(shape, layout), strict=True)],
                  layout, shape)

@@ -46,11 +46,11 @@ def _row(path: Path, count: int, blend: int, rel_error: float) -> dict[str, Any]
         file = Path(folder, "a.ath")
         whole = athcodec.encode(clip, file, rel_error=rel_error, attributes="none")
         bound, motions = whole.max_error_bound, dict(_windows(clip, count, blend))
-        apart = [athcodec.encode(each, file, max_error=bound, attributes="none").bytes for each in motions.values()]
+        apart = [athcodec.encode(motion, file, max_error=bound, attributes="none").bytes for motion in motions.values()]
         joined = athcodec.encode(athcodec.join(motions), file, max_error=bound, attributes="none")
         with athcodec.open(file, strict=True) as decoder:
-            error = max(measure(each, decoder.play(name)).max_error for name, each in motions.items())
-    return {"clip": path.stem, "motions": count, "frames": sum(each.frame_count for each in motions.values()),
+            error = max(measure(motion, decoder.play(name)).max_error for name, motion in motions.items())
+    return {"clip": path.stem, "motions": count, "frames": sum(motion.frame_count for motion in motions.values()),
             "bytes, one clip": whole.bytes, "bytes, a file each": sum(apart), "bytes, one file": joined.bytes,
             "one file / a file each": joined.bytes / sum(apart), "seam": max(s.error for s in joined.seams) / bound,
             "kept": error <= bound}

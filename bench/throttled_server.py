@@ -15,7 +15,7 @@ TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 PIECE = 1460  # bytes of a packet
 
 
-class Line(ThreadingHTTPServer):
+class ThrottledServer(ThreadingHTTPServer):
     """Serves the viewer, and `files` by name, on 127.0.0.1: a context manager.
 
     rate: bytes a second, None as fast as it goes; of files alone, so that the page can be there already. latency:
@@ -31,7 +31,7 @@ class Line(ThreadingHTTPServer):
         self.log: list[list] = []
         self._free, self._turn = 0.0, threading.Lock()
 
-    def __enter__(self) -> Line:
+    def __enter__(self) -> ThrottledServer:
         threading.Thread(target=self.serve_forever, args=(0.02,), daemon=True).start()
         return self
 
@@ -52,7 +52,7 @@ class Line(ThreadingHTTPServer):
         return self.address + ("?" + "&".join(asked) if asked else "")
 
     def sent(self, name: str) -> int:
-        return sum(size for each, _, size in self.log if each == name)
+        return sum(size for file, _, size in self.log if file == name)
 
     def wait(self, size: int) -> None:
         """Until `size` bytes more have gone through the line."""
@@ -67,7 +67,7 @@ class Line(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True  # the end of an answer would wait 40 ms
-    server: Line
+    server: ThrottledServer
 
     def do_GET(self) -> None:
         name = self.path.split("?")[0].lstrip("/") or "index.html"

@@ -1,7 +1,7 @@
 """A process of its own for memory.py: encodes a clip and prints its peak memory, or writes a longer clip.
 
-    python -m bench.peak encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES
-    python -m bench.peak repeat CLIP.h5 OUT.h5 TIMES
+    python -m bench.memory_worker encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES
+    python -m bench.memory_worker repeat CLIP.h5 OUT.h5 TIMES
 """
 
 from __future__ import annotations
