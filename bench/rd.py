@@ -2,8 +2,8 @@
 
 Each codec makes the smallest file it can within the bound; one process encodes, another decodes the bytes and
 measures (rd_worker.py). A codec that is missing, breaks the bound, crashes or takes too long is a row that says
-so. With --json the results are kept as they come: a run that was stopped goes on where it was, and what is
-there from the same clip, code and versions is not measured again. Then what follows from the points: mean
+so. With --json results are saved as they are measured: a run that was stopped resumes there, and a result of
+the same clip, code and versions is not measured again. Then what follows from the points: mean
 savings and ratios (compare.py), the growing prefix of one file and what it costs (progressive.py).
 """
 
@@ -84,9 +84,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    file, args.json = args.json, None  # written by the store; a listing is no result
     if args.list:
         return _listing(args)
-    store = Store(args.json, environment(args.argv), KEYS)
+    store = Store(file, environment(args.argv), KEYS)
     codecs, bounds = _codecs(args), tuple(args.bounds or BOUNDS[args.suite])
     clips = cases(args.clips, args.suite)
     for case in clips:
@@ -107,7 +108,6 @@ def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
 
 
 def _listing(args: argparse.Namespace) -> dict[str, Any]:
-    args.json = None  # a list is no result: what is in the file stays
     codecs = [{"codec": codec.name, "kind": codec.kind, "can run": codec.missing() or "yes"}
               for codec in all_codecs()]
     clips = [{"clip": name, "what": data.describe(name)} for name in data.SUITES[args.suite]]
@@ -233,7 +233,7 @@ def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str,
 
 def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None,
             ) -> dict[str, Any]:
-    """All results, and tables of those of these clips and bounds (None: all bounds)."""
+    """Tables of the results of these clips and bounds (None: all bounds)."""
     tables = [_clips_table([row for row in contents["clips"] if row["clip"] in clips])]
     points = [point for point in contents["points"]
               if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))]
@@ -251,7 +251,7 @@ def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds:
         tables += _level_tables(contents, clip)
     if len(clips) > 1:
         tables.append(table("Ratios over all clips", compare.over_clips(all_ratios), OVER_CLIPS_NOTE))
-    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))} | contents
+    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))}
 
 
 def title(clip: str) -> str:
@@ -275,9 +275,8 @@ def _row(point: dict[str, Any]) -> dict[str, Any]:
                 "bits": point["bits"]}
     if "max" in point:
         row |= {"max": point["max"], "RMS": point["rms"], "KG %": point["kg"], "motion": point["motion"]}
-    if point["status"] == OK:
-        return _ordered(row | {"settings": _words(point["settings"])})
-    return _ordered(row | {"settings": f"{point['status'].upper()}: {point['why']}".replace("|", "/")})
+    settings = point["settings"] if point["status"] == OK else f"{point['status'].upper()}: {point['why']}"
+    return _ordered(row | {"settings": settings.replace("|", "/")})
 
 
 COLUMNS = ("codec", "bound", "bytes", "bits", "max", "RMS", "KG %", "motion", "encode s", "runs", "decode s",
@@ -286,15 +285,6 @@ COLUMNS = ("codec", "bound", "bytes", "bits", "max", "RMS", "KG %", "motion", "e
 
 def _ordered(row: dict[str, Any]) -> dict[str, Any]:
     return {name: row.get(name) for name in COLUMNS}
-
-
-def _words(settings: Any) -> str:
-    """Settings on one line."""
-    if isinstance(settings, dict):
-        return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
-    if isinstance(settings, list):
-        return " ".join(map(_words, settings))
-    return f"{settings:.4g}" if isinstance(settings, float) else str(settings).replace("|", "/")
 
 
 def _processors(points: list[dict[str, Any]]) -> str:

@@ -35,7 +35,6 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
     [codec] = chosen([codec_name]).values()
     with athcodec.read_hdf5(clip_path) as clip:
         bound = rel_bound * Source(clip).diagonal
-        loaded = peak_bytes()
         runs: list[float] = []
         while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
             source = _loaded(clip)  # a new one: codecs may keep with it what they have worked out
@@ -43,8 +42,8 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
             runs.append(seconds)
     peak = peak_bytes()
     file.write_bytes(data)
-    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "loaded_bytes": loaded,
-            "encode_peak_bytes": peak, "settings": _plain(codec.settings)}
+    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "encode_peak_bytes": peak,
+            "settings": _words(codec.settings)}
 
 
 def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
@@ -92,15 +91,13 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
     return errors
 
 
-def _plain(settings: Any) -> Any:
-    """Settings as JSON holds them."""
+def _words(settings: Any) -> str:
+    """Settings on one line."""
     if isinstance(settings, dict):
-        return {str(name): _plain(value) for name, value in settings.items()}
+        return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
     if isinstance(settings, (list, tuple, np.ndarray)):
-        return [_plain(value) for value in settings]
-    if isinstance(settings, np.generic):
-        return settings.item()
-    return settings if isinstance(settings, (str, int, float, bool, type(None))) else str(settings)
+        return " ".join(map(_words, settings))
+    return f"{settings:.4g}" if isinstance(settings, (float, np.floating)) else str(settings)
 
 
 if __name__ == "__main__":

@@ -7,11 +7,10 @@ pictures of plots.py and charts.py beside them. Measures nothing: a verb that ha
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
-from bench import charts, plots, rd
+from bench import charts, plots, rd, store
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -44,7 +43,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def write(folder: Path) -> dict[str, Any]:
     """Writes report.md and pictures into the folder of the results; the verb's result says what."""
-    results = [(path.stem, json.loads(path.read_text())) for path in sorted(folder.glob("*.json"))]
+    results = [(path.stem, store.read(path)) for path in sorted(folder.glob("*.json"))]
     results = sorted(((name, result) for name, result in results if "command" in result),
                      key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)))
     if not results:
