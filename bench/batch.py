@@ -21,7 +21,7 @@ import numpy as np
 import athcodec
 from athcodec import batch
 from athcodec.batch.show import Show
-from bench.clips import add_rel_error
+from bench.clips import add_effort, add_rel_error, add_source
 from bench.tables import table
 
 COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
@@ -49,16 +49,20 @@ class _Clock(Show):
         self.last = time.perf_counter()
 
 
+def add_windows(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the clips to encode, and how."""
+    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="number of clips (default %(default)s)")
+    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="frames per clip (default %(default)s)")
+    add_source(parser)
+    add_effort(parser)
+    add_rel_error(parser)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="how many (default %(default)s)")
-    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of each (default %(default)s)")
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what they are windows of (default: the sample)")
+    add_windows(parser)
     parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
                         help="numbers of workers; the first is what others are compared with (default 1 2)")
     parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="default", help="(default %(default)s)")
-    add_rel_error(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -76,7 +80,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         files = [path.stat().st_size for path in Path(folder, "loop_0").iterdir()]
     rows = [{"workers": name, "clips": args.clips, "bytes": sum(files)}
             | {column: median(figures[column] for figures in rounds) for column in rounds[0]}
-            | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)} for name, rounds in runs.items()]
+            | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)}
+            for name, rounds in runs.items()]
     note = NOTE.format(frames=args.frames, vertices=vertices, rounds=args.rounds)
     return {"tables": [table(f"Many clips, bound {args.rel_error:g}", rows, note),
                        table("One worker over several", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
-import shutil
 import subprocess
 import tempfile
 import time
@@ -30,6 +28,8 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_rel_error
+from bench.codecs.coder import CORE, compile_c
+from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
 
 try:
@@ -40,8 +40,7 @@ except ImportError:
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
 TABLES = ("target", "whole", "levels", "memory", "instances")
 GZIP_CHUNK = 1 << 20
-SZ3_LAYOUTS = {"T,N,3": (0, 1, 2), "N,T,3": (1, 0, 2), "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0),
-               "T,3N": (0, 1, 2), "3N,T": (1, 2, 0)}
+SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")
 SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 
 TARGET_NOTE = """
@@ -162,20 +161,11 @@ class Case:
 
 def compile_program(folder: Path, name: str = "decode") -> Path:
     """The C program of that name here with the decoder's sources, as CMakeLists.txt names and compiles them."""
-    here = Path(__file__).resolve().parent
-    core = here.parent / "athcodec" / "core"
-    cmake = (core / "CMakeLists.txt").read_text()
-    sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)
-    compiler = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
+    sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
-    if compiler is None:
-        raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
-    flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
     program = folder / name
-    options = ["-std=c11", "-O3", *flags, f"-I{core}"]
-    files = [here / f"{name}.c", *(core / name for name in sources[1].split())]
-    subprocess.run([*compiler.split(), *options, "-o", program, *files, "-lm"], check=True)
+    compile_c(program, [Path(__file__).with_name(f"{name}.c"), *(CORE / source for source in sources[1].split())])
     return program
 
 
@@ -256,11 +246,8 @@ class _Sz3:
     def __init__(self, case: Case, displaced: bool, layout: str, algorithm: str) -> None:
         self.name = f"{'displacements' if displaced else 'positions'} {layout} {algorithm}"
         self._rest = case.rest if displaced else np.float32(0)
-        self._axes = SZ3_LAYOUTS[layout]
-        values = np.ascontiguousarray((case.positions - self._rest).transpose(self._axes))
-        self._unfolded = values.shape
-        if "3N" in layout:
-            values = values.reshape((len(values), -1) if layout == "T,3N" else (-1, values.shape[-1]))
+        self._layout = layout
+        [values] = arrays_of(case.positions - self._rest, layout)
         self._shape = values.shape
         config = pysz.szConfig()
         config.errorBoundMode = pysz.szErrorBoundMode.ABS
@@ -278,8 +265,8 @@ class _Sz3:
         return 1e3 * (time.perf_counter() - start)
 
     def _max_error(self, case: Case) -> float:
-        values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0].reshape(self._unfolded)
-        return case.error_of(values.transpose(np.argsort(self._axes)) + self._rest)
+        values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0]
+        return case.error_of(from_arrays([values], self._layout, case.positions.shape) + self._rest)
 
 
 # ---- tables ----

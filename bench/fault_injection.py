@@ -22,8 +22,7 @@ from typing import Any
 import athcodec
 from athcodec.batch.inputs import sha256
 from athcodec.batch.runs import MANIFEST
-from bench.batch import COUNT, FRAMES, encode_in_loop, make_clips
-from bench.clips import add_rel_error
+from bench.batch import add_windows, encode_in_loop, make_clips
 from bench.tables import table
 
 WORKERS = 2
@@ -43,12 +42,7 @@ checksums checked, every level decoded; identical: the same bytes as from athcod
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="number of clips (default %(default)s)")
-    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="frames per clip (default %(default)s)")
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="clip that they are windows of (default: the sample)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="default", help="(default %(default)s)")
-    add_rel_error(parser)
+    add_windows(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -113,7 +107,7 @@ class _FaultyBatch:
     def _wait(self, process: subprocess.Popen, lines: int) -> None:
         while len(self._lines()) < lines:
             if process.poll() is not None:
-                raise SystemExit(f"fault-injection: the run ended with exit code {process.returncode}; expected it to go on")
+                raise SystemExit(f"fault-injection: the run ended early, with exit code {process.returncode}")
             time.sleep(0.02)
 
     def _lines(self) -> list[dict[str, Any]]:

@@ -48,7 +48,7 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
-from bench.clips import add_rel_error
+from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program
 from bench.tables import table
 
@@ -123,15 +123,14 @@ class Unit:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what the clips are made of (default: the sample)")
+    add_source(parser)
     parser.add_argument("--instances", type=int, nargs="+", default=list(INSTANCES), metavar="N")
     parser.add_argument("--clips", type=int, nargs="+", default=list(CLIPS), metavar="N", help="unique ones")
     parser.add_argument("--phases", type=int, nargs="+", default=list(PHASES), metavar="N",
                         help="that instances of a clip may have; 0: each its own")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    add_effort(parser, "fast")
     add_rel_error(parser)
 
 

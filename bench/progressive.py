@@ -27,7 +27,7 @@ from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
 from athcodec.search import Search
 from athcodec.transform import DEFAULT_SEGMENT
-from bench.clips import Encoded, encoded
+from bench.clips import Encoded, encoded, measure
 
 TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
 ROUNDING = 1e-6  # the error table holds float32
@@ -62,7 +62,7 @@ def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[st
     single = []
     for bound in (*(bound for bound in looser if bound > rel_error), rel_error):
         with encoded(clip_path, bound) as result:
-            meter = _measured(result.clip, result.decoder, 0, result.clip.frame_count, None)
+            meter = measure(result.clip, result.decoder)
             single.append({"bound": bound, "bytes": result.summary.bytes, "max": meter.max_error / diagonal,
                            "rms": meter.rms_error / diagonal})
     broken = [f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
@@ -83,7 +83,7 @@ def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
     rows = []
     for level, segment, end in _boundaries(decoder):
         with athcodec.open(io.BytesIO(whole[:end])) as cut:
-            decoded[segment] = _measured(clip, cut, *decoder.segments[segment], level)
+            decoded[segment] = measure(clip, cut, level, slice(*decoder.segments[segment]))
         level_of[segment] = level
         if len(level_of) == len(decoder.segments):
             done = sum(shown == level for shown in level_of.values())
@@ -105,14 +105,6 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
             before = ends.get((level, segment), before)
             found.append((level, segment, before))
     return found
-
-
-def _measured(clip: athcodec.MotionClip, decoder: athcodec.Decoder, start: int, stop: int,
-              depth: int | None) -> ErrorMeter:
-    meter = ErrorMeter()
-    for first, frames in decoder.blocks(depth, frames=slice(start, stop)):
-        meter.add(clip.block(first, first + len(frames)), frames)
-    return meter
 
 
 def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:

@@ -20,7 +20,7 @@ import numpy as np
 
 import athcodec
 from athcodec.remote import READ_AHEAD
-from bench.clips import ReplicatedPlants, add_rel_error, replicated_plants
+from bench.clips import ReplicatedPlants, add_effort, add_rel_error, add_source, replicated_plants
 from bench.tables import table
 from bench.throttled_server import ThrottledServer
 
@@ -39,8 +39,7 @@ Step = Callable[[athcodec.Decoder], Any]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="the plant (default: the sample)")
+    add_source(parser)
     parser.add_argument("--plants", type=int, nargs="+", default=list(PLANTS), metavar="N",
                         help="copies of it in a clip (default 1 20)")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
@@ -48,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--latency", type=float, default=LATENCY, metavar="SECONDS",
                         help="before an answer (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=athcodec.encoder.EFFORTS, default="fast", help="(default %(default)s)")
+    add_effort(parser, "fast")
     add_rel_error(parser)
 
 

@@ -17,7 +17,8 @@ RESULTS = Path(__file__).resolve().parent / "results"
 TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
           "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
           "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "large": "Large clips",
-          "forest": "Forests", "batch": "Many clips", "fault-injection": "A batch under fault injection", "remote": "Behind a URL"}
+          "forest": "Forests", "batch": "Many clips", "fault-injection": "A batch under fault injection",
+          "remote": "Behind a URL"}
 
 ORDER = {verb: place for place, verb in enumerate(TITLES)}
 

@@ -23,7 +23,7 @@ from statistics import median
 from typing import Any
 
 import athcodec
-from bench.clips import ReplicatedPlants, add_rel_error, replicated_plants
+from bench.clips import ReplicatedPlants, add_rel_error, add_source, replicated_plants
 from bench.decode import compile_program
 from bench.suite import cases
 from bench.tables import table
@@ -62,8 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a series of your own: files CLIP.h5, or names of clips of this benchmark")
     parser.add_argument("--suite", choices=tuple(SIZES), default="quick",
                         help="how far the series go that are made here (default %(default)s)")
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what they are made of (default: the sample)")
+    add_source(parser)
     for name, count in (("encodes", ENCODES), ("decodes", DECODES)):
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N",
                             help="runs that medians are of (default %(default)s)")

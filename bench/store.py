@@ -1,9 +1,8 @@
 """Results that are saved as they are measured: a JSON file that a long run extends, and that the next run resumes.
 
 A result is identified by a few keys and carries what it depends on (versions, digests); it is up to date as long as
-these are the same. The file holds a table for each kind of result: its columns, one line per row (null: the result has
-no such value), and for columns of text, lists and objects, whose values repeat, the distinct values, which rows refer to
-by index.
+these are the same. The file holds a table for each kind of result: its columns, and one line per row (null: no such
+value). Values of text, lists and objects repeat: a row has an index into the distinct values of such a column.
 """
 
 from __future__ import annotations
@@ -69,8 +68,8 @@ def _table_of(results: Results) -> dict[str, Any]:
         return distinct[column].setdefault(json.dumps(value), len(distinct[column]))
 
     rows = [[cell(column, result.get(column)) for column in columns] for result in results]
-    return {"columns": columns, "distinct": {column: list(map(json.loads, texts)) for column, texts in distinct.items()},
-            "rows": rows}
+    values = {column: [json.loads(text) for text in texts] for column, texts in distinct.items()}
+    return {"columns": columns, "distinct": values, "rows": rows}
 
 
 def _results_of(table: dict[str, Any]) -> Results:

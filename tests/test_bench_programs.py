@@ -138,6 +138,6 @@ def test_a_program_that_errs_is_caught(piece, monkeypatch):
         return (integers * grid.step * 0.9).astype(np.float32)
 
     monkeypatch.setattr(Grid, "positions", wrong)
-    monkeypatch.setattr("bench.codecs.program.worst", lambda positions, decoded: 0.0)
+    monkeypatch.setattr("bench.codecs.program.largest_error", lambda positions, decoded: 0.0)
     with pytest.raises(BoundBroken, match="float16"):
         check(codec, piece, 1e-3 * piece.diagonal)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -35,7 +35,11 @@ class Ladder:
     def geometric(cls, low: float, high: float, start: float, per_octave: int = 2) -> Ladder:
         count = round(np.log2(high / low) * per_octave)
         values = tuple(round(low * 2 ** (i / per_octave), 6) for i in range(count + 1))
-        return cls(values, int(np.argmin(np.abs(np.log(np.array(values) / start)))))
+        return cls(values, 0).starting_at(start)
+
+    def starting_at(self, value: float) -> Ladder:
+        """The same numbers; the search starts at the one nearest to `value`."""
+        return replace(self, start=int(np.argmin(np.abs(np.log(np.array(self.values) / value)))))
 
 
 @dataclass(frozen=True)

@@ -14,19 +14,20 @@ from __future__ import annotations
 import numpy as np
 
 from bench.codecs import Source
-from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import (
-    DEAD_ZONES,
-    STEPS,
-    Trajectories,
+    GRID,
     fitted_to,
-    mean_motion,
+    grid_of,
     read_basis,
+    read_front,
+    significant,
     source_basis,
     write_basis,
+    write_front,
 )
-from bench.codecs.tree import VertexOrder, read_order, read_pose, vertex_order, write_order, write_pose
+from bench.codecs.tree import VertexOrder
 
 WEIGHT_STEPS = 32
 
@@ -35,34 +36,19 @@ class Coddyac(Baseline):
     title = "trajectory PCA + hierarchy (CoDDyAC)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "keep": Ladder.geometric(0.01, 2.5, 0.2),
-            "basis": Ladder.geometric(0.05, 4, 0.4),
-            "joint": Split((0, 1)),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.25),
-        }
+        return grid_of(
+            "step keep basis joint dead_zone pose",
+            keep=GRID["keep"].starting_at(0.2),
+            basis=GRID["basis"].starting_at(0.4),
+            pose=GRID["pose"].starting_at(0.25),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, "hierarchy")
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        trajectories = Trajectories(bool(settings["joint"]), writer.count(motion.shape[2]))
-        writer.count(settings["joint"])
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        rows = trajectories.rows(motion + (mean - pose)[:, :, None])
-        values, basis = source_basis(source, order, trajectories)
-        count = max(1, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
-        steps = (
-            settings["basis"]
-            * step
-            * np.sqrt(len(rows) / trajectories.frames)
-            / np.maximum(values[:count], 1e-30)
-        )
-        basis = write_basis(writer, basis[:count], steps, trajectories)
-        units = fitted_to(basis, rows).reshape(len(order.source), -1, count) / step
+        order, trajectories, pose, motion, step = write_front(writer, source, bound, settings)
+        rows = trajectories.rows(motion)
+        spectrum = source_basis(source, order, trajectories)
+        basis = write_basis(writer, *significant(spectrum, rows, step, settings, trajectories, 1), trajectories)
+        units = fitted_to(basis, rows).reshape(len(order.source), -1, len(basis)) / step
         step_ratio = _step_ratio(order, pose)
         weights = writer.table(_weights(units, order, step_ratio))
         q = np.zeros(units.shape, np.int64)
@@ -72,14 +58,11 @@ class Coddyac(Baseline):
             return q[vertices]
 
         _predicted(order, step_ratio, weights, units.shape, add)
-        writer.rows(trajectories.to_axes(q.reshape(-1, count)))
+        writer.rows(trajectories.to_axes(q.reshape(-1, len(basis))))
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose, step = read_pose(reader, order), reader.single()
+        order, trajectories, pose, step = read_front(reader)
         basis = read_basis(reader, trajectories)
         weights = reader.table()
         q = trajectories.from_axes(reader.rows(), len(basis)).reshape(len(order.source), -1, len(basis))

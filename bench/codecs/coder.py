@@ -18,6 +18,7 @@ import shutil
 import struct
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from ctypes import c_double, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -48,26 +49,24 @@ def compiler() -> list[str] | None:
     return found.split() if found else None
 
 
-@cache
-def library(writes: bool) -> ctypes.CDLL:
-    """coder.c for one direction; compiled once per process."""
+def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
+    """Compiles C with the options that CMakeLists.txt gives the core."""
     command = compiler()
     if command is None:
         raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
     flags = re.findall(r"^\s*(-f[\w=-]+)", (CORE / "CMakeLists.txt").read_text(), re.MULTILINE)
+    command += ["-std=c11", "-O3", *flags, f"-I{CORE}", *options]
+    subprocess.run([*command, "-o", target, *sources, "-lm"], check=True)
+
+
+@cache
+def library(writes: bool) -> ctypes.CDLL:
+    """coder.c for one direction; compiled once per process."""
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
-    options = [
-        "-std=c11",
-        "-O3",
-        *flags,
-        f"-I{CORE}",
-        "-shared",
-        "-fPIC",
-        *(["-DATH_ENCODING"] if writes else []),
-    ]
-    subprocess.run([*command, *options, "-o", file, Path(__file__).with_name("coder.c"), "-lm"], check=True)
+    options = ["-shared", "-fPIC", *(["-DATH_ENCODING"] if writes else [])]
+    compile_c(file, [Path(__file__).with_name("coder.c")], *options)
     loaded = ctypes.CDLL(str(file))
     arguments = {
         "bench_rows": [c_int32] * 3 + [c_void_p],

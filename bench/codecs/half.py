@@ -14,14 +14,14 @@ from bench.codecs.program import (
     FLAT_LAYOUTS,
     CannotKeep,
     Program,
+    arrays_of,
     deflate,
+    from_arrays,
     from_planes,
     from_zigzag,
     inflate,
     narrowest,
-    parts,
     planes,
-    whole,
     zigzag,
 )
 
@@ -54,11 +54,11 @@ class Half(Program):
 
 def _packed(numbers: np.ndarray, choice, thorough: bool) -> bytes:
     layout, shuffled = choice
-    [row] = parts(numbers, layout)
+    [row] = arrays_of(numbers, layout)
     return deflate(planes(row.ravel()) if shuffled else row.tobytes(), 19 if thorough else 9)
 
 
 def _unpacked(data: bytes, dtype: str, choice, shape: tuple[int, int, int]) -> np.ndarray:
     layout, shuffled = choice
     raw = inflate(data)
-    return whole([from_planes(raw, dtype) if shuffled else np.frombuffer(raw, dtype)], layout, shape)
+    return from_arrays([from_planes(raw, dtype) if shuffled else np.frombuffer(raw, dtype)], layout, shape)

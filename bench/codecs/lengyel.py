@@ -17,7 +17,7 @@ from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
-from bench.codecs.pca import DEAD_ZONES, STEPS, Trajectories, cosines, principal, read_group, write_group
+from bench.codecs.pca import GRID, Trajectories, cosines, grid_of, principal, read_group, write_group
 from bench.codecs.tree import (
     VertexOrder,
     memo,
@@ -38,22 +38,18 @@ class Lengyel(Baseline):
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         depths = tuple(range(min(3, int(source.hierarchy.branch_depth.max())) + 1))
-        return {
-            "rigid": Choice((0, 1)),
-            "joint": Choice((0, 1), 1),
-            "depth": Split(depths),
-            "step": STEPS,
-            "learned": Choice((0, 1)),
-            "keep_tracks": Ladder.geometric(0.01, 2.5, 0.1),
-            "tracks": Ladder.geometric(0.18, 2, 0.7),
-            "keep": Ladder.geometric(0.01, 40, 0.3),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "pose_of": Choice(("mean", "rest")),
-            "differences": Choice((0, 1, 2), 2),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.25),
-            "first": Choice(("tracks", "shapes")),
-        }
+        return grid_of(
+            "rigid joint depth step learned keep_tracks tracks keep basis pose_of differences dead_zone pose first",
+            rigid=Choice((0, 1)),
+            joint=Choice((0, 1), 1),
+            depth=Split(depths),
+            learned=Choice((0, 1)),
+            keep_tracks=GRID["keep"].starting_at(0.1),
+            tracks=Ladder.geometric(0.18, 2, 0.7),
+            keep=Ladder.geometric(0.01, 40, 0.3),
+            pose_of=Choice(("mean", "rest")),
+            pose=GRID["pose"].starting_at(0.25),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
         order = vertex_order(source, "hierarchy")

@@ -42,8 +42,22 @@ from bench.codecs.tree import (
 )
 
 COARSEST_BASIS = -2  # half octaves
-STEPS = Ladder.geometric(0.5, 12, 2.0, 4)
-DEAD_ZONES = Ladder((0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8), 2)
+GRID: dict[str, Ladder | Choice] = {
+    "step": Ladder.geometric(0.5, 12, 2.0, 4),
+    "keep": Ladder.geometric(0.01, 2.5, 0.15),
+    "basis": Ladder.geometric(0.05, 4, 0.7),
+    "joint": Split((0, 1)),
+    "differences": Choice((0, 1, 2), 2),
+    "first": Choice(("tracks", "shapes")),
+    "dead_zone": Ladder((0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8), 2),
+    "pose": Ladder.geometric(0.05, 2, 0.5),
+    "order": Choice(ORDERS, 1),
+}
+
+
+def grid_of(names: str, **own: Ladder | Choice) -> dict[str, Ladder | Choice]:
+    """Settings by name, in the order of the search: those of GRID, and the codec's own."""
+    return {name: own.get(name) or GRID[name] for name in names.split()}
 
 
 # ---- trajectories and bases ----
@@ -213,6 +227,21 @@ def read_coefficients(reader: Reader, order: VertexOrder, trajectories: Trajecto
     return q.reshape(-1, len(degrees))
 
 
+def significant(
+    spectrum: tuple[np.ndarray, np.ndarray],
+    rows: np.ndarray,
+    step: float,
+    settings: Settings,
+    trajectories: Trajectories,
+    least: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The basis vectors that are worth their bytes, at least `least`, and the step of each."""
+    values, basis = spectrum
+    count = max(least, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
+    steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / np.maximum(values[:count], 1e-30)
+    return basis[:count], steps
+
+
 def write_group(
     writer: Writer,
     motion: np.ndarray,
@@ -227,13 +256,10 @@ def write_group(
 
     Returns what a reader will have.
     """
-    values, basis = spectrum
     rows = trajectories.rows(motion)
-    count = writer.count(int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
-    if count == 0:
+    basis, steps = significant(spectrum, rows, step, settings, trajectories)
+    if writer.count(len(basis)) == 0:
         return np.zeros_like(motion)
-    values, basis = values[:count], basis[:count]
-    steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / values
     if settings["first"] == "shapes":
         q = quantised(rows @ basis.T / step, settings["dead_zone"])
         shapes = q.astype(np.float64)
@@ -265,6 +291,28 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
     return trajectories.motion((coefficients * step) @ basis)
 
 
+# ---- what all of them store ----
+
+
+def write_front(
+    writer: Writer, source: Source, bound: float, settings: Settings
+) -> tuple[VertexOrder, Trajectories, np.ndarray, np.ndarray, float]:
+    """Order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
+    order = vertex_order(source, settings.get("order", "hierarchy"))
+    write_order(writer, order)
+    mean, motion = mean_motion(source, order)
+    frames = writer.count(motion.shape[2])
+    trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
+    pose = write_pose(writer, order, mean, settings["pose"] * bound)
+    return order, trajectories, pose, motion + (mean - pose)[:, :, None], writer.single(settings["step"] * bound)
+
+
+def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, float]:
+    """Order, kind of trajectories, mean pose (N, 3) and step."""
+    order, frames = read_order(reader), reader.count()
+    return order, Trajectories(bool(reader.count()), frames), read_pose(reader, order), reader.single()
+
+
 # ---- the baselines ----
 
 
@@ -273,46 +321,19 @@ class GlobalPca(Baseline):
     degrees: tuple[int, ...] = (0,)  # of linear prediction
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "keep": Ladder.geometric(0.01, 2.5, 0.15),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "joint": Split((0, 1)),
-            "differences": Choice((0, 1, 2), 2),
-            "first": Choice(("tracks", "shapes")),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.5),
-            "lpc": Choice(self.degrees),
-            "order": Choice(ORDERS, 1),
-        }
+        return grid_of(
+            "step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees)
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, settings["order"])
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        frames = writer.count(motion.shape[2])
-        trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        motion = motion + (mean - pose)[:, :, None]
-        write_group(
-            writer,
-            motion,
-            order,
-            source_basis(source, order, trajectories),
-            step,
-            settings,
-            trajectories,
-            settings["lpc"],
-        )
+        order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
+        spectrum = source_basis(source, order, trajectories)
+        write_group(writer, motion, order, spectrum, step, settings, trajectories, settings["lpc"])
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose = read_pose(reader, order)
-        return read_group(reader, order, reader.single(), trajectories) + pose[:, :, None], order
+        order, trajectories, pose, step = read_front(reader)
+        return read_group(reader, order, step, trajectories) + pose[:, :, None], order
 
 
 class PredictedPca(GlobalPca):
@@ -330,28 +351,13 @@ class ClusteredPca(Baseline):
     turns = 8
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "clusters": Ladder(self.counts, 4),
-            "keep": Ladder.geometric(0.01, 2.5, 0.15),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "joint": Split((0, 1)),
-            "differences": Choice((0, 1, 2), 2),
-            "first": Choice(("tracks", "shapes")),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.5),
-            "order": Choice(ORDERS, 1),
-        }
+        return grid_of(
+            "step clusters keep basis joint differences first dead_zone pose order",
+            clusters=Ladder(self.counts, 4),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, settings["order"])
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        trajectories = Trajectories(bool(settings["joint"]), writer.count(motion.shape[2]))
-        writer.count(settings["joint"])
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        motion = motion + (mean - pose)[:, :, None]
+        order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
         groups, spectra = self._clusters(source, order, settings["clusters"], trajectories)
         writer.count(len(spectra))
         writer.table(np.diff(groups, prepend=0)[:, None])
@@ -363,12 +369,9 @@ class ClusteredPca(Baseline):
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose, step, count = read_pose(reader, order), reader.single(), reader.count()
-        groups = np.cumsum(reader.table()[:, 0])
-        positions = np.repeat(pose[:, :, None], frames, axis=2)
+        order, trajectories, pose, step = read_front(reader)
+        count, groups = reader.count(), np.cumsum(reader.table()[:, 0])
+        positions = np.repeat(pose[:, :, None], trajectories.frames, axis=2)
         for group in range(count):
             members = np.flatnonzero(groups == group)
             positions[members] += read_group(reader, VertexOrder(members), step, trajectories)

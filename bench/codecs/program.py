@@ -12,7 +12,7 @@ will be decoded, so that its rounding adds no error. No program is imported befo
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -22,7 +22,7 @@ from types import ModuleType
 import numpy as np
 import zstandard
 
-from bench.codecs import Source
+from bench.codecs import Source, blocks, largest_error
 
 AXES = {"T,N,3": (0, 1, 2), "T,3N": (0, 1, 2), "N,T,3": (1, 0, 2), "3N,T": (1, 2, 0),
         "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0), "3|T,N": (2, 0, 1), "3|N,T": (2, 1, 0)}
@@ -37,7 +37,6 @@ COARSER = (1.05, 1.03, 1.02, 1.015, 1.01, 1.007, 1.005, 1.003, 1.001, 1.0, 0.999
 CORNER = 2 / np.sqrt(3)  # step of a grid over the distance from a cell's centre to its corners
 NEARLY = COARSER.index(0.999)
 SAMPLE_FRAMES = 512
-BLOCK = 1 << 20
 BEAM = 6
 HEAD = struct.Struct("<6BII")
 
@@ -120,7 +119,7 @@ def unpack_integers(data: bytes, count: int) -> np.ndarray:
 # ---- arrays ----
 
 
-def parts(values: np.ndarray, layout: str) -> list[np.ndarray]:
+def arrays_of(values: np.ndarray, layout: str) -> list[np.ndarray]:
     """(T, N, 3) as the arrays that a program gets."""
     frames, vertices, _ = values.shape
     turned = np.ascontiguousarray(values.transpose(AXES[layout]))
@@ -130,12 +129,12 @@ def parts(values: np.ndarray, layout: str) -> list[np.ndarray]:
     return [turned.reshape(flat.get(layout, turned.shape))]
 
 
-def part_shapes(shape: tuple[int, int, int], layout: str) -> list[tuple[int, ...]]:
-    return [part.shape for part in parts(np.broadcast_to(np.int8(0), shape), layout)]
+def array_shapes(shape: tuple[int, int, int], layout: str) -> list[tuple[int, ...]]:
+    return [part.shape for part in arrays_of(np.broadcast_to(np.int8(0), shape), layout)]
 
 
-def whole(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int, int]) -> np.ndarray:
-    """The inverse of parts."""
+def from_arrays(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int, int]) -> np.ndarray:
+    """The inverse of arrays_of."""
     turned = np.concatenate([piece.reshape(-1) for piece in pieces])
     turned = turned.reshape([shape[axis] for axis in AXES[layout]])
     return np.ascontiguousarray(turned.transpose(np.argsort(AXES[layout])))
@@ -179,22 +178,6 @@ def from_ordered_bits(bits: np.ndarray) -> np.ndarray:
     return np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits).view(np.float32)
 
 
-def blocks(values: np.ndarray) -> Iterator[slice]:
-    """Of the first axis, so that copies in doubles stay small."""
-    length = max(1, BLOCK // values[0].size)
-    return (slice(start, start + length) for start in range(0, len(values), length))
-
-
-def worst(positions: np.ndarray, decoded: np.ndarray) -> float:
-    """Largest Euclidean distance; infinite where something is not a number."""
-    largest = 0.0
-    for block in blocks(positions):
-        gap = decoded[block].astype(np.float64) - positions[block]
-        distance = float(np.sqrt(np.einsum("...k,...k->...", gap, gap).max()))
-        largest = max(largest, distance if distance >= 0 else np.inf)
-    return largest
-
-
 # ---- a clip, and its grid ----
 
 
@@ -222,7 +205,7 @@ class Grid:
 
     def keeps(self, positions: np.ndarray, bound: float) -> bool:
         parts = (positions[block] for block in blocks(positions))
-        return all(worst(part, self.positions(self.integers(part))) <= bound for part in parts)
+        return all(largest_error(part, self.positions(self.integers(part))) <= bound for part in parts)
 
     def pack(self) -> bytes:
         return struct.pack("<4d", self.step, *self.origin)
@@ -484,7 +467,7 @@ class Program:
             decoded = self.decode_floats(data, values.shape, choice)
             if setup.pose != "none":
                 decoded = (pose + decoded).astype(np.float32)
-            return data, worst(case.positions, decoded)
+            return data, largest_error(case.positions, decoded)
 
         if self.lossless:
             data = self.encode_floats(values, None, choice, thorough)
@@ -581,12 +564,12 @@ def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials
 
 def encode_arrays(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
     """Encodes every array of a layout separately."""
-    return join([encode(part) for part in parts(values, layout)])
+    return join([encode(part) for part in arrays_of(values, layout)])
 
 
 def decode_arrays(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
            shape: tuple[int, int, int]) -> np.ndarray:
     """The inverse of encode_arrays: `decode` gets bytes and a shape."""
     blobs: Iterable[bytes] = split(data)
-    return whole([decode(blob, part) for blob, part in zip(blobs, part_shapes(shape, layout), strict=True)],
+    return from_arrays([decode(blob, part) for blob, part in zip(blobs, array_shapes(shape, layout), strict=True)],
                  layout, shape)
