@@ -31,7 +31,7 @@ DISTRIBUTIONS = ("athcodec", "numpy", "zstandard")
 
 
 def all_codecs() -> Iterator[Codec]:
-    """Every codec of this benchmark, athcodec first, lossless ones last; modules are imported in turn."""
+    """Every codec of this benchmark, athcodec first, lossless ones last; modules are imported one by one."""
     for module, attribute in SOURCES:
         yield from _codecs_of(importlib.import_module(module), attribute)
     yield from lossless()
@@ -54,9 +54,9 @@ def is_lossless(codec: Codec) -> bool:
 
 
 def chosen(names: Iterable[str]) -> dict[str, Codec]:
-    """Codecs by name or as MODULE:NAME; none named: all that are not lossless.
+    """Codecs by name or as MODULE:NAME; without names all that are not lossless.
 
-    Raises SystemExit for a name that there is not.
+    Raises SystemExit for an unknown name.
     """
     names = list(names)
     return {name: _named(name) for name in names} if names else {

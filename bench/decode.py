@@ -1,8 +1,8 @@
-"""Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; beside SZ3, HDF5.
+"""Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; compared with SZ3 and HDF5.
 
-One thread. The decoder is timed by decode.c, compiled here with the core's own sources and flags: no Python
-is in its loops. Whole decoding takes turns with SZ3 (pysz, where it is installed) and h5py; all see the same
-machine. The decoder's frames are compared with those of athcodec.open by their checksum.
+One thread. The decoder is timed by decode.c, compiled here with the core's own sources and flags, so that no Python is
+in its loops. Runs of whole decoding alternate with SZ3 (pysz, where it is installed) and h5py, so that conditions are
+the same for all. The decoder's frames are compared with those of athcodec.open by their checksum.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 TARGET_NOTE = """
 Targets: for tree_8k at a bound of 1e-4; printed for every clip. Whole decoding: every segment prepared at the
 deepest level, entropy decoding included, and every frame written as float32 in the source's order; the file
-is open. Playing with decoding: a segment's preparation spread over
-its frames, and showing each between two frames. Prepared: showing alone. Vertices: ath_positions, all of
+is open. Playing with decoding: a segment's preparation divided by its frames, and the evaluation of a pose
+between two frames. Prepared: the evaluation alone. Vertices: ath_positions, all of
 them, in the file's order; matrices: ath_matrices and ath_exact, what a renderer needs. Bytes of level 1:
-prelude and what ath_ranges names. Seek: a random frame, its segment prepared from nothing and the frame
-written; the target is that this costs one segment's preparation, whose mean is given. Memory over positions: all
-that playing takes (table Memory) over one segment's float32 positions.
+prelude and what ath_ranges names. Seek: a random frame, its segment prepared and the frame
+written; the target is the mean cost of preparing one segment. Memory over positions: all memory
+for playing (table Memory) over one segment's float32 positions.
 """
 
 WHOLE_NOTE = """
-All in turns, {rounds} rounds; ratio: this one's median over athcodec's. Each writes into memory that it has
-written before. The last athcodec row opens the file and builds its bases too, as the others do. SZ3 bounds
-values, not distances: it gets bound/sqrt(3), and a distance reaches the bound only where all three axes do.
+Readers alternate, {rounds} rounds; ratio: the reader's median over athcodec's. Each writes into memory that it has
+written before. The second athcodec row includes opening the file and building its bases, as the others do. SZ3 bounds
+values, not distances: its bound is bound/sqrt(3), and a distance reaches the bound only where all three axes do.
 It compresses positions or displacements from the rest pose (then without the rest pose, and without adding
-it again), in {layouts} layouts with {algorithms} algorithms: the set-up with the smallest file, and the
+it again), in {layouts} layouts with {algorithms} algorithms: the configuration with the smallest file, and the
 fastest one. HDF5: float32 positions, gzip 4 with shuffle, chunks of whole frames, exact. Where an .ath file
 was given, these two hold its decoded frames.
 """
@@ -71,15 +71,15 @@ preparation. CRC-32C: of all frames, float32, source order. Bytes with the prelu
 """
 
 MEMORY_NOTE = """
-Bytes. File: as fed, whole; opened: ath_open; bases: ath_build; work: one preparation; segments: prepared
+Bytes. File: all of it in memory; opened: ath_open; bases: ath_build; work: one preparation; segments: prepared
 ones. Nothing else is allocated. Over positions: their sum over the float32 positions of the longest
 segment.
 """
 
 INSTANCES_NOTE = """
-Instances of the clip, each at its own place of the loop, for one second at 30 pictures a second: matrices
-and exact vertices of each written, one instance behind the other, into 64 MiB in turn. Segments are
-prepared before and shared. Even mix: the levels by turns.
+Instances of the clip, each at its own time, for one second at 30 pictures a second: matrices
+and exact vertices of each are written one after the other into a buffer of 64 MiB. Segments are
+prepared before and shared. Even mix: levels in rotation.
 """
 
 
@@ -120,11 +120,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     ], "broken": broken}
 
 
-# ---- what is measured ----
+# ---- clips and the program ----
 
 
 class Case:
-    """A clip's float32 positions and its file, with the program that times the decoder on it."""
+    """A clip's float32 positions and its .ath file, with the program that times the decoder on it."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float, program: Path) -> None:
         self.path, self._program = path, program
@@ -160,7 +160,7 @@ class Case:
 
 
 def compile_program(folder: Path, name: str = "decode") -> Path:
-    """The C program of that name here with the decoder's sources, as CMakeLists.txt names and compiles them."""
+    """Compiles NAME.c of this folder with the decoder's sources and flags of CMakeLists.txt."""
     sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
@@ -169,12 +169,12 @@ def compile_program(folder: Path, name: str = "decode") -> Path:
     return program
 
 
-# ---- whole decoding beside others ----
+# ---- whole decoding, compared with others ----
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Another way to the clip's frames: `read` returns its milliseconds."""
+    """Another reader of the clip's frames; `read` returns the milliseconds of one run."""
 
     name: str
     bytes: int
@@ -185,7 +185,7 @@ class _Reader:
 def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     others = [*_sz3_readers(case), _hdf5_reader(case, folder)]
     decode, opening, read = [], [], {other.name: [] for other in others}
-    for number in range(rounds + 1):  # the first one does not count
+    for number in range(rounds + 1):  # the first round is a warm-up
         ours = case.program("once")
         theirs = {other.name: other.read() for other in others}
         if number:
@@ -231,7 +231,7 @@ def _hdf5_reader(case: Case, folder: Path) -> _Reader:
 
 
 def _sz3_readers(case: Case) -> list[_Reader]:
-    """The set-up with the smallest file, and the one that is decoded fastest."""
+    """The configuration with the smallest file, and the one that decodes fastest."""
     if pysz is None:
         return []
     setups = [_Sz3(case, *setup) for setup in product((False, True), SZ3_LAYOUTS, SZ3_ALGORITHMS)]
@@ -241,7 +241,7 @@ def _sz3_readers(case: Case) -> list[_Reader]:
 
 
 class _Sz3:
-    """The clip compressed by SZ3 in one set-up."""
+    """The clip compressed by SZ3 in one configuration."""
 
     def __init__(self, case: Case, displaced: bool, layout: str, algorithm: str) -> None:
         self.name = f"{'displacements' if displaced else 'positions'} {layout} {algorithm}"

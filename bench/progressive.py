@@ -1,12 +1,11 @@
-"""What a growing prefix of one .ath file shows, and what it costs that a file can be cut at all.
+"""The error of growing prefixes of one .ath file, and the cost in bytes of levels that can be truncated.
 
-The curve: after every level and segment of one file, the bytes so far and the error of what they show, where
-segments that have the next level already show it. Errors are measured on what athcodec decodes from just that
-many bytes; those that follow from the file's own table stand beside them. The yardstick are files of their
-own, each coded for a looser bound.
+The curve: after every level and segment of one file, the bytes so far and the error of the decoded positions; segments
+whose next level is complete use it. Errors are measured on what athcodec decodes from exactly that many bytes, beside
+those that the file's table states. They are compared with separate files, each coded for a looser bound.
 
-The cost: the same clip coded without intermediate depths, with the encoder's own stages: the same settings,
-every stem's modes together in one stream per segment, no maps of nodes, a table of one level.
+The cost: the same clip coded without intermediate levels by the encoder's own stages: the same settings, every stem's
+modes in one stream per segment, no maps of nodes, a table of one level.
 """
 
 from __future__ import annotations
@@ -33,21 +32,20 @@ TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
 ROUNDING = 1e-6  # the error table holds float32
 
 CURVE_NOTE = """
-Bytes of the file from its start; segments: how many of them show this level, the others the one before. Max
-and RMS over the diagonal, decoded from a file that ends there; 'table' is what the file itself says of it.
-Single file: bytes of a file of its own, coded for a bound that leaves the same largest error, on the straight
-line (log-log) between files coded for looser bounds; prefix/single is what one file for all distances costs.
+Bytes: length of the prefix; segments: number at this level, the others are at the one before. Max and RMS over
+the diagonal, decoded from the prefix; 'table': as stated in the file. Single file: bytes of a separate file with
+the same largest error, interpolated (log-log) between files coded for looser bounds; prefix/single: the cost of one
+file for all distances.
 """
 
 COST_NOTE = """
-Bytes of whole files. AFFINES: maps of nodes, which only a file that is cut needs. Early split: a leaf of the
-ATH that is one short stem has its first modes in the stream of its node's level and the rest one level
-deeper; the clip was coded again with each stem's modes together, levels otherwise kept, and this is what
-that saves. One stream: what is saved by coding all levels, unsplit, in one stream per segment. All three at
-the file's steps, with the best of its rotation factors and time bases for all levels (split and unsplit: or
-those of the file), corrections counted; below 0: nothing is saved. Table: entries for chunks and errors of
-the levels before the last. Without: the file less AFFINES, table and the better of the other two; cost: what
-the file has above that.
+Bytes of whole files. AFFINES: maps of nodes, which only truncated files need. Early split: a leaf of the ATH
+that is one short stem has its first modes in the stream of its node's level and the rest one level deeper; this
+is the saving of coding each stem's modes together, with levels otherwise unchanged. One stream: the saving of coding
+all levels, unsplit, in one stream per segment. All three with the file's steps and the best of its rotation factors
+and time bases for all levels (split and unsplit: or those of the file), including corrections; below 0: no saving.
+Table: entries for chunks and errors of the levels before the last. Without: the file less AFFINES, table and the
+larger of the two savings; cost: the excess of the file over that.
 """
 
 
@@ -55,7 +53,7 @@ the file has above that.
 
 
 def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[str, Any]:
-    """{"steps": rows by growing prefix, "single": files of their own at looser bounds, "broken": lines}."""
+    """{"steps": rows by growing prefix, "single": separate files at looser bounds, "broken": lines}."""
     with encoded(clip_path, rel_error) as result:
         diagonal = _diagonal(result)
         steps = _steps(result, diagonal)
@@ -78,7 +76,7 @@ def _diagonal(result: Encoded) -> float:
 def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
     decoder, clip = result.decoder, result.clip
     whole = result.summary.path.read_bytes()
-    decoded: dict[int, ErrorMeter] = {}  # what each segment shows at best so far
+    decoded: dict[int, ErrorMeter] = {}  # by segment, at its deepest complete level
     level_of: dict[int, int] = {}
     rows = []
     for level, segment, end in _boundaries(decoder):
@@ -132,25 +130,25 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
 
 
 def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
-    """One row: bytes of a file, what each thing that serves its levels takes, and bytes without them."""
+    """One row: bytes of a file, bytes of each part that serves its levels, and bytes without them."""
     with encoded(clip_path, rel_error) as result:
         chunks, sizes = result.decoder.container.chunks, result.summary.chunk_bytes
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
     with athcodec.read_hdf5(clip_path) as clip:
-        return _cost(_Again(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
+        return _cost(_Recoding(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
 
 
-def _cost(again: _Again, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
+def _cost(recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
           bytes_: int) -> dict[str, Any]:
-    stored = again.streams(again.settings)
+    stored = recoding.streams(recoding.settings)
     in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
     if stored != in_file:
-        raise RuntimeError(f"{again.name}: got {stored} bytes of motion when coding "
+        raise RuntimeError(f"{recoding.name}: got {stored} bytes of motion when coding "
                            f"again; expected the {in_file} of the file")
-    uniform = again.of_one_level()
-    split = min(stored, *(again.streams(settings) for settings in uniform))
-    unsplit = min(again.streams(settings, split=False) for settings in (again.settings, *uniform))
-    merged = min(again.streams(settings, split=False, one_level=True) for settings in uniform)
+    uniform = recoding.of_one_level()
+    split = min(stored, *(recoding.streams(settings) for settings in uniform))
+    unsplit = min(recoding.streams(settings, split=False) for settings in (recoding.settings, *uniform))
+    merged = min(recoding.streams(settings, split=False, one_level=True) for settings in uniform)
     table = (TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
              + ERROR_ENTRY * (levels - 1) * segments)
     affines = sizes.get("AFFINES", 0)
@@ -161,12 +159,12 @@ def _cost(again: _Again, chunks: list[ct.Chunk], sizes: dict[str, int], levels: 
 
 
 def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
-    """Chunks that a file of one level would not have; the others stand at the last one."""
+    """Whether a file of one level would not have the chunk."""
     return chunk.kind == ct.AFFINES or (chunk.kind in (ct.STEMS, ct.SHAPES) and chunk.level < last)
 
 
-class _Again:
-    """The clip in the encoder's own stages, at the settings that the encoder finds."""
+class _Recoding:
+    """The clip coded by the encoder's own stages, at the settings that the encoder finds."""
 
     def __init__(self, clip: athcodec.MotionClip, rel_error: float) -> None:
         hierarchy = hierarchy_of(clip)
@@ -180,7 +178,7 @@ class _Again:
         self.settings = self._search.found()
 
     def of_one_level(self) -> list[Settings]:
-        """Settings that a single stream could have: what the levels have now, the same for all of them."""
+        """Settings for a single stream: those of each level in turn, applied to all levels."""
         levels = len(self.settings.omega)
         pairs = sorted(set(zip(self.settings.omega, self.settings.learned, strict=True)))
         return [replace(self.settings, omega=(omega,) * levels, learned=(learned,) * levels)

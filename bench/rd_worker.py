@@ -1,11 +1,11 @@
-"""Two processes of their own for rd.py: one encodes a clip with a codec, another decodes and measures.
+"""The worker processes of rd.py: one encodes a clip with a codec, another decodes and measures.
 
     python -m bench.rd_worker encode CODEC CLIP.h5 BOUND FILE
     python -m bench.rd_worker decode CODEC CLIP.h5 BOUND FILE
 
-The second one has nothing of the first but the file, so that what it gives is in those bytes; it reads the
-clip only when it has decoded. Peak memory is that of the whole process. A codec that crashes takes only its
-own process with it. BOUND is a fraction of the bounding box's diagonal. Prints one line of JSON.
+The second gets only the file from the first, so that its output depends on these bytes alone; it reads the clip after
+decoding. Peak memory is that of the whole process. A codec that crashes ends only its own process. BOUND is a fraction
+of the bounding box's diagonal. Prints one line of JSON.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
         bound = rel_bound * Source(clip).diagonal
         runs: list[float] = []
         while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
-            source = _loaded(clip)  # a new one: codecs may keep with it what they have worked out
+            source = _loaded(clip)  # a new one, since codecs may cache results in it
             seconds, data = _timed(lambda: codec.encode(source, bound))
             runs.append(seconds)
     peak = peak_bytes()
@@ -49,7 +49,7 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
 def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
     [codec] = chosen([codec_name]).values()
     data = file.read_bytes()
-    decoded = codec.decode(data)  # a warm-up that counts for memory alone
+    decoded = codec.decode(data)  # a warm-up: only its memory counts
     peak = peak_bytes()
     runs: list[float] = []
     while len(runs) < DECODES and (len(runs) < 3 or sum(runs) < DECODE_SECONDS):
@@ -75,7 +75,7 @@ def _timed(step: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
-    """Errors over the diagonal, and in words what is wrong with them, if anything."""
+    """Errors over the diagonal; "broken" describes a wrong type, shape or error."""
     shape = source.positions.shape
     if getattr(decoded, "shape", None) != shape or decoded.dtype != np.float32:
         is_array = isinstance(decoded, np.ndarray)

@@ -1,8 +1,8 @@
-"""The viewer in Chromium: time to first motion on a slow line, long tasks, size of the bundles, forests.
+"""The viewer in Chromium: time to first motion on a slow connection, long tasks, size of the bundles, forests.
 
-The page is open and empty when a file is asked for, as it is when a viewer opens one file after the other, and as it
-is taken to be for the formats beside it. Those count as shown when their last byte is here: reading them comes on top.
-Drawing is in software: of frame times only the ratios tell anything about a graphics processor.
+The page is loaded and empty when a file is requested, as in a viewer that opens several files; the same is assumed for
+the other formats. These count as shown when their last byte has arrived; parsing is not included. Rendering is in
+software: only ratios of frame times are meaningful for a graphics processor.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ MODES = """async ([name, mode, depths, frames]) => {
 }"""
 
 NOTE_START = """
-Seconds from asking for the file until a picture has been drawn, until one has that differs from it (motion), and
-until all is here, medians. Bytes: that had come at first motion on a line so slow that they count. Raw and GLB: until
-their last byte is here.
+Seconds from the request of the file until a picture is drawn, until a different one is drawn (motion), and until the
+file is complete, medians. Bytes: received at first motion, on a slow connection. Raw and GLB: until their last byte has
+arrived.
 """
 NOTE_TASKS = """
 The longest task of the page's main thread in each round, while a file streams in until all of it is shown: by the
@@ -77,12 +77,12 @@ clock, as the long-task observer has it (0: none over 50 ms), and in processor t
 programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
 NOTE_FOREST = """
-Milliseconds from choosing depths until the picture is drawn, in software, the fastest of seven, by turns;
+Milliseconds from choosing levels until the picture is drawn, in software, the fastest of seven, alternating;
 vertices are those drawn.
 """
 NOTE_MODES = """
-Milliseconds from asking the worker for a frame until it is drawn, medians; bytes: that go to the graphics processor for
-it. Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
+Milliseconds from requesting a frame from the worker until it is drawn, medians; bytes: sent to the graphics processor.
+Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
 """
 
 
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             found = _starts(browser, files, args)
             starts += [{"clip": path.stem} | row for row in found["starts"]]
             tasks.append({"clip": path.stem} | found["tasks"])
-            broken += _promises(path.stem, found)
+            broken += _missed_targets(path.stem, found)
             forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
             modes += [{"clip": path.stem} | row for row in _modes(browser, files["tree.ath"])]
     sizes = [{"file": name, "bytes": (WEB / name).stat().st_size} for name in (*OURS, "three.js", "OrbitControls.js")]
@@ -181,10 +181,10 @@ def _starts(browser, files: dict[str, bytes], args: argparse.Namespace) -> dict[
         "over 50 ms": sum(ms > LONGEST_TASK for opening in rounds for ms in opening["tasks"])}}
 
 
-ALL_HERE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
+COMPLETE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
 
 
-def _open(browser, server: ThrottledServer, until: str = ALL_HERE) -> dict[str, Any]:
+def _open(browser, server: ThrottledServer, until: str = COMPLETE) -> dict[str, Any]:
     page = _page(browser, server)
     page.evaluate(OBSERVE)
     browser.start_tracing(page=page, categories=["toplevel"])
@@ -201,14 +201,14 @@ def _open(browser, server: ThrottledServer, until: str = ALL_HERE) -> dict[str, 
 
 
 def _longest_task(events: list[dict[str, Any]]) -> float:
-    """Milliseconds of processor time of a renderer's main thread."""
+    """Milliseconds of processor time of the longest task of a renderer's main thread."""
     threads = {(event["pid"], event["tid"]) for event in events
                if event["name"] == "thread_name" and event["args"]["name"] == "CrRendererMain"}
     return max(event.get("tdur", 0) / 1000 for event in events
                if event.get("ph") == "X" and (event["pid"], event["tid"]) in threads)
 
 
-def _promises(clip: str, found: dict[str, Any]) -> list[str]:
+def _missed_targets(clip: str, found: dict[str, Any]) -> list[str]:
     ath, *others = found["starts"]
     broken = []
     if ath["motion"] > MOST_SECONDS:
@@ -235,7 +235,7 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
         for count in counts:
             page.evaluate(f"athcodecViewer.forestOf({count})")
             both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
-            for _ in range(ROUNDS):  # by turns: what else the machine does meets both
+            for _ in range(ROUNDS):  # alternating, so that other load on the machine affects both
                 for detail, timings in both.items():
                     page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
                     timings.append(page.evaluate("athcodecViewer.timeForest(1)"))

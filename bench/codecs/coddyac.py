@@ -4,8 +4,8 @@ Vasa and Skala, "CoDDyAC: connectivity driven dynamic mesh compression", 3DTV-CO
 learned basis of trajectories; each vertex has few coefficients, predicted from those of its decoded
 neighbours, and the integer differences are coded. Here the neighbours are those of the branch hierarchy, in
 place of the parallelogram on a mesh: the vertex below, and its step from the one before that, in proportion
-to the distances in the coded pose. Both are weighted per component, by least squares that know of the
-quantisation noise (an addition, as are corrections and the dead zone). The basis is coded as in pca.py, not
+to the distances in the coded pose. Both are weighted per component, by least squares that account for
+the quantisation noise (an addition, as are corrections and the dead zone). The basis is coded as in pca.py, not
 by its own prediction (Vasa and Skala, "COBRA", 2009).
 """
 
@@ -71,9 +71,7 @@ class Coddyac(Baseline):
 
 
 def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
-    """(N, 1, 1): how far a vertex is from the one before, over the distance of that from the one before it;
-    0: none.
-    """
+    """(N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
     before, before2 = order.before, order.before2
     own = np.linalg.norm(pose - pose[before], axis=1)
     last = np.linalg.norm(pose[before] - pose[before2], axis=1)
@@ -82,7 +80,7 @@ def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
 
 
 def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
-    """(2, K) integers: weights of the vertex before, and of its step, that foretell each component best."""
+    """(2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
     some = np.flatnonzero(order.before >= 0)
     own, near = units[some], units[order.before[some]]
     step = step_ratio[some] * (near - units[order.before2[some]])
@@ -100,7 +98,7 @@ def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> n
 def _predicted(
     order: VertexOrder, step_ratio: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
 ) -> np.ndarray:
-    """Coefficients (N, W, K) in steps: what the weights foretell and `residual(vertices, predicted)`."""
+    """Coefficients (N, W, K) in steps: the weighted prediction plus `residual(vertices, predicted)`."""
     units = np.zeros(shape)
     near, along = weights / WEIGHT_STEPS
     for vertices in order.generations:

@@ -1,7 +1,7 @@
-"""float16, or integers of as many bits as the bound needs, and zstd at level 19: no codec at all.
+"""float16, or integers of as many bits as the bound needs, and zstd at level 19: without a codec.
 
 Halves keep a bound only where displacements are small against it; integers on its grid always do. Bytes are
-shuffled where that pays. Left out: an entropy coder of its own (see the baselines for those).
+shuffled where that is smaller. Left out: an entropy coder (see the baselines).
 """
 
 from __future__ import annotations

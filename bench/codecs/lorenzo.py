@@ -1,5 +1,4 @@
-"""Baseline: positions on a grid, differences along time and from vertex to vertex, and an entropy coder. No
-model.
+"""Baseline: positions on a grid, differences in time and from vertex to vertex, and an entropy coder.
 
 The Lorenzo predictor of Ibarria and Rossignac ("Dynapack", SCA 2003) in all degrees: differences
 of degree 0 to 3 in time of differences of degree 0 to 2 along the order of vertices. The grid is searched
@@ -26,7 +25,7 @@ from bench.codecs.tree import (
 
 
 def write_lorenzo(writer: Writer, q: np.ndarray, order: VertexOrder, in_time: int, along: int) -> None:
-    """Integers (N, 3, T); the first frame apart, since it is a pose."""
+    """Integers (N, 3, T); the first frame separately, since it is a pose."""
     residual = differences(q, order, along)
     if in_time == 0:
         writer.count(0)

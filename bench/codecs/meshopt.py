@@ -1,4 +1,4 @@
-"""meshoptimizer (Kapoulkine 2016 and later): its vertex codec, version 1, then zstd where it pays.
+"""meshoptimizer (Kapoulkine 2016 and later): its vertex codec, version 1, then zstd where that is smaller.
 
 Elements are vertices with one or many frames each, or frames with many vertices each: the codec takes
 differences of neighbouring elements, byte by byte. Integers are as narrow as they can be. Left out: its

@@ -148,7 +148,7 @@ class _Pieces:
 
 
 def _write_entries(writer: Writer, entries: np.ndarray, settings: Settings) -> np.ndarray:
-    """(T, pieces, k) as integers over their range; returns what a reader will have."""
+    """(T, pieces, k) as integers over their range; returns what a reader will decode."""
     low = writer.single(entries.min())
     step = writer.single(max(entries.max() - low, 1e-30) / (2 ** settings["bits"] - 2))
     q = np.rint((entries - low) / step).astype(np.int64)

@@ -9,12 +9,12 @@
 * Sattler, Sarlette and Klein, "Simple and efficient compression of animation sequences", SCA 2005:
   trajectories in clusters with a basis each (Lloyd's algorithm with the distance to a cluster's basis).
 
-Left out of all: rigid motion taken off before (a plant is rooted), and meshes' connectivity (the order of
-vertices does). The mean of each vertex is subtracted and coded. Of the two factors the larger has one step
-for all (what is uniform error in the positions); each component of the smaller one gets the precision that it
-needs. Basis vectors are coded as they are, or by the cosines of their own (for the smooth ones), whatever is
-smaller. None of the papers predicts coefficients from a neighbour's; here each component may be, by
-differences of the integers along the order of vertices, because that halves the sizes.
+Left out of all: removal of rigid motion (a plant is rooted), and meshes' connectivity (the order of vertices
+replaces it). The mean of each vertex is subtracted and coded. The larger of the two factors has a
+uniform step (uniform error in the positions); each component of the smaller one gets the precision that it needs. Basis
+vectors are coded as they are or by their cosine transform (for smooth ones), whichever is smaller. None of the papers
+predicts coefficients from a neighbour's; here each component may be, by differences of the integers along the order of
+vertices, because that halves the sizes.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def source_basis(
 def write_basis(
     writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories, lpc: int = 0
 ) -> np.ndarray:
-    """Basis rows (K, length), each at about its step; returns what a reader will have."""
+    """Basis rows (K, length), each at about its step; returns what a reader will decode."""
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
@@ -254,7 +254,7 @@ def write_group(
 ) -> np.ndarray:
     """Motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
 
-    Returns what a reader will have.
+    Returns what a reader will decode.
     """
     rows = trajectories.rows(motion)
     basis, steps = significant(spectrum, rows, step, settings, trajectories)
@@ -273,7 +273,7 @@ def write_group(
 
 
 def _inverse(normal: np.ndarray) -> np.ndarray:
-    """Of a matrix that least squares solve with; components that quantised to nothing stay out."""
+    """Of the normal matrix of least squares, regularised for components that are quantised to zero."""
     return np.linalg.inv(normal + max(1e-12 * np.trace(normal) / len(normal), 1e-30) * np.eye(len(normal)))
 
 
@@ -291,7 +291,7 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
     return trajectories.motion((coefficients * step) @ basis)
 
 
-# ---- what all of them store ----
+# ---- the common front of an encoding ----
 
 
 def write_front(
@@ -347,7 +347,7 @@ class PredictedPca(GlobalPca):
 class ClusteredPca(Baseline):
     title = "clustered PCA (Sattler)"
     counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96)
-    rank = 8  # of the bases that the clusters are formed by
+    rank = 8  # of the bases that define the clusters
     turns = 8
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
@@ -393,21 +393,21 @@ class ClusteredPca(Baseline):
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
     def _lloyd(self, rows: np.ndarray, count: int, rows_per_vertex: int, vertices: int) -> np.ndarray:
-        """Vertices by the basis that leaves the least of them; starts from runs of neighbours."""
+        """Clusters of vertices by the basis with the smallest residual; starts from runs of neighbours."""
         groups = np.arange(vertices) * count // vertices
         coefficients = (
             rows @ principal(rows)[1][:24].T
-        )  # what matters of the motion, small enough to iterate on
+        )  # the main part of the motion, small enough to iterate on
         for _ in range(self.turns):
-            left = np.full((count, vertices), np.inf)
+            residuals = np.full((count, vertices), np.inf)
             for group in range(count):
                 mine = coefficients[np.repeat(groups == group, rows_per_vertex)]
                 if len(mine):
                     basis = principal(mine)[1][: self.rank]
-                    rest = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
-                    left[group] = rest.reshape(vertices, -1).sum(axis=1)
-            moved = left.argmin(axis=0)
-            if np.array_equal(moved, groups):
+                    residual = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
+                    residuals[group] = residual.reshape(vertices, -1).sum(axis=1)
+            nearest = residuals.argmin(axis=0)
+            if np.array_equal(nearest, groups):
                 break
-            groups = moved
+            groups = nearest
         return np.unique(groups, return_inverse=True)[1]

@@ -1,8 +1,8 @@
 """pcodec (Loncaric and others 2025; pcodec): numbers in bins by their distribution, after differences.
 
-It is lossless; what it gets are integers on the coarsest grid within the bound, in every order of the
-numbers, with its own choice of differences, none, first or second ones, or its linear prediction. Left out:
-its modes for floats, which grids leave nothing to.
+It is lossless; its input are integers on the coarsest grid within the bound, in every order of the numbers,
+with its own choice of differences, none, first or second ones, or its linear prediction. Left out:
+its modes for floats, which are useless on a grid.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""What every real program needs to take part: layouts, grids, poses, predictors, and the search among them.
+"""Common parts of the programs: layouts, grids, poses, predictors, and the search among them.
 
-A program sees numbers, not motion. So that each is at its best it is offered, and the search chooses: the
+A program compresses numbers, not motion. For its best result, the search tries: the
 vertices in the source's or in the hierarchy's order; positions, or displacements from the rest pose, the mean
 pose or the first frame; integers on a grid as coarse as the bound allows, or floats where the program bounds
 their error itself; differences over time and along the vertices, exact on integers; and the program's own
-layouts and settings. Setups are compared on a piece of the clip, the best few on all of it. What is
-subtracted and how vertices are reordered is stored and counted. Displacements are taken from the pose as it
+layouts and settings. Setups are compared on a piece of the clip, the best few on all of it. The pose that is
+subtracted and the order of vertices are stored and counted. Displacements are taken from the pose as it
 will be decoded, so that its rounding adds no error. No program is imported before it is used.
 """
 
@@ -151,7 +151,7 @@ def _sum(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def predict(values: np.ndarray, predictor: str) -> np.ndarray:
-    """(T, N, 3) int32: what is left of each after those before it; exact, modulo 2**32."""
+    """(T, N, 3) int32 residuals; exact, modulo 2**32."""
     for axis in _predictor_axes(predictor):
         values = _difference(values, axis)
     return values
@@ -218,7 +218,7 @@ class Grid:
 
 @dataclass
 class Case:
-    """A clip in one order of its vertices, and what is worked out once for all setups."""
+    """A clip in one order of its vertices, and values computed once for all setups."""
 
     positions: np.ndarray
     rest: np.ndarray
@@ -284,7 +284,7 @@ def cases_of(source: Source, exact: bool) -> dict[str, Case]:
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that is chosen; `choice` is the program's own."""
+    """All settings; `choice` is an index into the program's own."""
 
     form: str
     order: str = "source"
@@ -295,7 +295,7 @@ class Setup:
 
 
 class Program:
-    """A real program as a Codec; see bench.codecs. Subclasses say how it takes integers, floats or both.
+    """A program as a Codec; see bench.codecs. Subclasses define how it encodes integers, floats or both.
 
     `choices(form)` lists the program's own settings; `encode_*` and `decode_*` get one of them. Floats have a
     strength: the error that a value may have, or one of `strengths`, the exactest last; None: exact.
@@ -356,7 +356,7 @@ class Program:
             self._descend(form, order, lambda setup: self._size(pieces, setup, bound, sizes))
         ranked = sorted((size, number, setup) for number, (setup, size) in enumerate(sizes.items())
                         if np.isfinite(size))
-        # what fails on all of the clip makes room for the next
+        # a setup that fails on the whole clip is replaced by the next
         done: list[tuple[bytes, Setup]] = []
         for _, _, setup in ranked:
             data = self._write(cases[setup.order], setup, bound, thorough=True)
@@ -384,7 +384,7 @@ class Program:
         return placed
 
     def _words(self, setup: Setup) -> dict:
-        """The setup without what its form has no use for."""
+        """The setup without settings that its form does not use."""
         unused = "predictor" if setup.form == "floats" else "pose_step"
         words = {name: value for name, value in asdict(setup).items() if name != unused}
         if setup.pose == "none":
@@ -394,7 +394,7 @@ class Program:
     # -- choosing --
 
     def _descend(self, form: str, order: str, size: Callable[[Setup], float]) -> None:
-        """What the program does, then for its best few what it gets, and both again."""
+        """Searches the program's settings, then poses for the best few, and both once more."""
         integers = form == "integers"
         predictors = self.predictors if integers else ("none",)
         steps = (1.0,) if integers else POSE_STEPS
@@ -542,7 +542,7 @@ def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[i
 
 
 def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials: int) -> bytes:
-    """The smallest within the bound: the allowed error is moved until what it causes just keeps the bound."""
+    """The smallest within the bound: the allowed error is adjusted until the resulting error just keeps the bound."""
     allowed, kept, broken, best = bound / np.sqrt(3), 0.0, np.inf, None
     for trial in range(trials + 20):
         data, error = encode(allowed)

@@ -1,7 +1,7 @@
 """SZ3 (Liang and others, IEEE Trans. Big Data 2023; pysz): prediction within an absolute error bound.
 
 Lorenzo and regression, interpolation, or its choice of both, in every layout. Its bound holds for single
-values; the one it gets is moved until the distances that it causes just keep theirs. Left out: its relative
+values; it is adjusted until the resulting distances just keep the bound. Left out: its relative
 and norm bounds.
 """
 

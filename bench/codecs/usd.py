@@ -1,8 +1,8 @@
-"""USD crates (Pixar 2016 and later; usd-core): what a .usdc file needs for the motion as time samples.
+"""USD crates (Pixar 2016 and later; usd-core): size of a .usdc file with the motion as time samples.
 
 Two entries. Points are what every USD program plays: float3, or half3 where halves keep the bound, as
-positions or as displacements. Integers are the best that the crate's own integer compression does on the grid
-of the bound, in attributes that only a reader made for them understands. Left out: value clips, which spread
+positions or as displacements. Integers use the crate's integer compression on the grid of the bound,
+in attributes that only a special reader understands. Left out: value clips, which spread
 the samples over files; faces.
 """
 
