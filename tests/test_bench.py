@@ -21,7 +21,7 @@ from athcodec.container import KIND_NAMES
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import charts, compare, paper, plots  # noqa: E402
+from bench import charts, codec_registry, compare, paper, plots  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
 
@@ -62,14 +62,14 @@ def test_sizes_come_with_a_bound_that_was_measured_and_kept(tmp_path):
     assert {"rotations", "learned"} <= choices.keys()
 
 
-def test_levels_end_within_the_bound_and_stay_closed_where_the_papers_gape(tmp_path):
+def test_levels_end_within_the_bound_and_have_no_gaps_where_the_papers_have(tmp_path):
     text, result = run_bench(tmp_path, "levels", "--rel-error", "1e-3")
     levels, gaps = tables_of(result)
     assert levels[-1]["max"] <= 1e-3 and result["broken"] == []
     assert [row["level"] for row in levels] == list(range(len(levels)))
     assert cells_of(text, "Levels")["nodes"] == "1"
-    gaping = [row for row in gaps if row["joints"]]
-    assert gaping and all(row["max"] < 1e-6 < 1e-3 < row["paper max"] for row in gaping)
+    open_joints = [row for row in gaps if row["joints"]]
+    assert open_joints and all(row["max"] < 1e-6 < 1e-3 < row["paper max"] for row in open_joints)
 
 
 def test_motions_of_one_plant_take_less_in_one_file_and_keep_the_bound(tmp_path):
@@ -174,7 +174,7 @@ def test_ratios_take_the_best_of_each_kind_and_the_best_pca_at_equal_rms():
     assert rows["PCA", "KG 0.01 %"]["ratio"] is None
 
 
-def test_what_goes_wrong_with_a_codec_is_a_row_that_says_so(tmp_path, bushy_file):
+def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
     names = ("Rounded", "TooCoarse", "Aborting", "Raising", "Remembering", "Absent")
     text, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3",
                              "--codecs", *(f"bench_codecs:{name}" for name in names))
@@ -202,7 +202,7 @@ def test_a_codec_that_takes_too_long_is_stopped(tmp_path, bushy_file):
     assert (point["status"], point["why"]) == ("too slow", "encode: longer than 2 s")
 
 
-def test_a_run_measures_only_what_is_not_there_yet(tmp_path, bushy_file):
+def test_a_run_measures_only_missing_results(tmp_path, bushy_file):
     def run(*bounds):
         return run_bench(tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", *bounds,
                          COUNT=str(count))[1]["points"]
@@ -217,14 +217,14 @@ def test_a_run_measures_only_what_is_not_there_yet(tmp_path, bushy_file):
     assert more[0] == first[0] and count.read_text().startswith(encodes) and count.read_text() != encodes
 
 
-def test_a_codec_that_is_missing_does_not_wipe_out_what_was_measured_of_it(tmp_path, bushy_file):
+def test_results_of_a_codec_stay_when_it_is_no_longer_installed(tmp_path, bushy_file):
     words = ("rd", bushy_file, "--bounds", "1e-3", "--codecs", "bench_codecs:Uninstallable")
     [point] = run_bench(tmp_path, *words)[1]["points"]
     assert point["status"] == "ok"
     assert run_bench(tmp_path, *words, UNINSTALLED="1")[1]["points"] == [point]
 
 
-def test_results_are_kept_as_they_come_and_are_no_longer_valid_when_code_has_changed(tmp_path):
+def test_results_are_saved_at_once_and_are_invalid_when_code_has_changed(tmp_path):
     file = tmp_path / "results.json"
     store = Store(file, {"command": "rd"}, {"points": ("clip",)})
     store.add("points", {"clip": "tree", "bytes": 3, "depends": {"zip": "1.0"}})
@@ -245,7 +245,19 @@ def test_results_read_back_as_they_were_saved_one_row_each(tmp_path):
     assert text.count("coarse " * 9) == text.count('"zip"') == 1 and text.count("[0,0.5,") == 1
 
 
-def test_a_growing_prefix_shows_what_the_table_of_the_file_says(tmp_path, bushy_file):
+def test_fingerprints_of_code_ignore_comments_and_layout_alone(tmp_path):
+    def code(name, text):
+        file = tmp_path / name
+        file.write_text(text)
+        return codec_registry._code(file)
+
+    plain = code("a.py", "def f(x):\n    return (x + 1)\n")
+    assert plain == code("b.py", '"""Adds."""\nimport os\n\ndef f( x ):  # one\n    return x + 1')
+    assert plain != code("c.py", "def f(x):\n    return x + 2\n")
+    assert code("a.c", "int f;") == code("b.c", "/* one */ int  f;\n// two\n") != code("c.c", "int g;")
+
+
+def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path, bushy_file):
     _, result = run_bench(tmp_path, "rd", bushy_file, "--codecs", "athcodec", "--bounds", "1e-3")
     [curve], [cost], [whole] = result["curves"], result["costs"], result["points"]
     steps = curve["steps"]
@@ -286,7 +298,7 @@ def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
     assert row["kB/s"] == row["predicted kB/s"] == 0 and result["broken"] == []
 
 
-def test_what_a_frame_behind_a_url_takes_is_counted_and_limited(tmp_path, bushy_file):
+def test_requests_and_bytes_of_a_frame_behind_a_url_are_counted_and_limited(tmp_path, bushy_file):
     _, result = run_bench(tmp_path, "remote", "--of", bushy_file, "--plants", "1", "20", "--frames", "300", "--frame",
                           "250", "--rounds", "1", "--latency", "0.01")
     [rows] = tables_of(result)

@@ -67,7 +67,7 @@ def test_programs_keep_the_bound_and_are_decoded_from_their_bytes_alone(codec, r
 
 
 @pytest.mark.parametrize("codec", lossless(), ids=names(lossless()))
-def test_lossless_programs_give_every_bit_back(codec, piece, capsys):
+def test_lossless_programs_decode_the_same_bits(codec, piece, capsys):
     if runs(codec, capsys):
         data, decoded = check(codec, piece, 0.0)
         assert decoded.tobytes() == piece.positions.tobytes()
