@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 from bench.codecs import BoundBroken, Source, check  # noqa: E402
-from bench.codecs.peer import CannotKeep, Grid  # noqa: E402
+from bench.codecs.program import CannotKeep, Grid  # noqa: E402
 from bench.codecs.programs import CLASSES, PROGRAMS, lossless  # noqa: E402
 
 MODULES = {kind.module: kind.package for kind in CLASSES}
@@ -131,6 +131,6 @@ def test_a_program_that_breaks_the_bound_is_caught(piece, monkeypatch):
         return (integers * grid.step * 0.9).astype(np.float32)
 
     monkeypatch.setattr(Grid, "positions", wrong)
-    monkeypatch.setattr("bench.codecs.peer.worst", lambda positions, decoded: 0.0)
+    monkeypatch.setattr("bench.codecs.program.largest_error", lambda positions, decoded: 0.0)
     with pytest.raises(BoundBroken, match="float16"):
         check(codec, piece, 1e-3 * piece.diagonal)

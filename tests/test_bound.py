@@ -86,12 +86,12 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
 # ---- what cannot be kept is refused ----
 
 
-@pytest.mark.parametrize("scale, wide", [(1e-300, True), (1e-160, True), (1e-100, True), (1e-40, True),
+@pytest.mark.parametrize("scale, is_float64", [(1e-300, True), (1e-160, True), (1e-100, True), (1e-40, True),
                                          (1e-40, False), (1e-36, False)])
-def test_plants_too_small_for_the_steps_of_a_file_are_refused(scale, wide, scratch):
+def test_plants_too_small_for_the_steps_of_a_file_are_refused(scale, is_float64, scratch):
     """float64 clips of 1e-200 came back hundreds of bounds off, as squares of their errors are 0; of 1e-40,
     encoding never ended, as no step of a file is that small."""
-    attack = Attack(scale=scale, wide=wide, actions=("walk",))
+    attack = Attack(scale=scale, is_float64=is_float64, actions=("walk",))
     assert broken_promises(attack, scratch) == []
     clip = attack.clip()
     with pytest.raises(BoundError, match="expected more than 1e-35, the smallest that a file can hold"):

@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 from bench.browser import chromium  # noqa: E402
-from bench.line import WEB, Line  # noqa: E402
+from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
 VIEWER = ROOT / "athcodec" / "viewer"
@@ -91,7 +91,7 @@ def test_nothing_else_of_the_computer_is_served(served):
 
 def test_a_file_behind_a_url_is_passed_on_range_by_range(sample_ath):
     data = sample_ath.read_bytes()
-    with Line({"tree.ath": data}) as line, viewing(f"{line.address}tree.ath") as address:
+    with ThrottledServer({"tree.ath": data}) as line, viewing(f"{line.address}tree.ath") as address:
         line.log.clear()
         with get(address.replace("?file=", ""), Range="bytes=5-9") as answer:
             assert (answer.status, answer.read()) == (206, data[5:10])
@@ -284,7 +284,7 @@ def windy_ath(gusty_tree, tmp_path_factory):
     return path
 
 
-class HeldLine(Line):
+class HeldServer(ThrottledServer):
     """A line that can be held after some more bytes of its files, until it is released."""
 
     def __init__(self, files: dict[str, bytes], after: float = math.inf, **options):
@@ -310,7 +310,7 @@ class HeldLine(Line):
         super().__exit__(*error)
 
 
-def settle(page, line: Line) -> None:
+def settle(page, line: ThrottledServer) -> None:
     """Waits until many pictures have been drawn, for each of which the worker is asked, and nothing was fetched."""
     before = None
     while before != line.log:
@@ -326,7 +326,7 @@ def positions_of(page, call: str) -> np.ndarray:
 @browser_test
 def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath):
     """In the worker, in the texture, and as the vertex shader reads it."""
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"))
         size = float(np.ptp(decoder.positions(0), axis=0).max())
         for level in range(decoder.level_count):
@@ -349,7 +349,7 @@ def play(page, clip) -> None:
 
 @browser_test
 def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley_ath):
-    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
         for index, clip in reversed(list(enumerate(first.clips))):
             play(page, index)
@@ -367,7 +367,7 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
 @browser_test
 def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
     data = windy_ath.read_bytes()
-    with Line({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
+    with ThrottledServer({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
         clips = {clip.name: clip for clip in decoder.clips}
         common = {chunk.offset for chunk in decoder.file.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
 
@@ -394,7 +394,7 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
 
 @browser_test
 def test_the_clip_before_goes_on_until_the_next_is_here_and_fades_into_it(opened, windy_ath):
-    with HeldLine({"tree.ath": windy_ath.read_bytes()}) as line, athcodec.open(windy_ath) as decoder:
+    with HeldServer({"tree.ath": windy_ath.read_bytes()}) as line, athcodec.open(windy_ath) as decoder:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.setPlaying(false)")
         line.hold()
@@ -450,7 +450,7 @@ FADE = """async (level) => {
 
 @browser_test
 def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, medley_ath, medley_clips):
-    with Line({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes()}) as line, athcodec.open(medley_ath) as first:
         page = opened(line.page("tree.ath"))
         deepest = first.level_count - 1
         for index, clip in enumerate(first.clips):
@@ -481,7 +481,7 @@ def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, me
 
 @browser_test
 def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_ath, sample_ath):
-    with Line({"tree.ath": medley_ath.read_bytes(), "one.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": medley_ath.read_bytes(), "one.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         assert page.locator("#clip option").all_inner_texts() == ["calm ↻", "Böe", "still", "round ↻"]
 
@@ -508,7 +508,7 @@ def test_clips_are_chosen_from_a_list_by_key_and_in_the_address(opened, medley_a
 
 @browser_test
 def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
-    with Line({"tree.ath": windy_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": windy_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(30)")
         drawn = """athcodecViewer.state.forest.children.filter(({ visible }) => visible)
@@ -531,7 +531,7 @@ def test_instances_of_a_forest_play_clips_of_their_own(opened, windy_ath):
 @browser_test
 def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with HeldLine({"tree.ath": data}, after=len(data) / 7) as line:
+    with HeldServer({"tree.ath": data}, after=len(data) / 7) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         assert line.log[0][1] == 0 and line.sent("tree.ath") <= len(data) / 7
         line.release()
@@ -542,7 +542,7 @@ def test_it_moves_before_a_seventh_of_the_file_has_come(opened, gusty_ath):
 @browser_test
 def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with HeldLine({"tree.ath": data}, after=len(data) / 7) as line, athcodec.open(gusty_ath) as decoder:
+    with HeldServer({"tree.ath": data}, after=len(data) / 7) as line, athcodec.open(gusty_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion")
         page.evaluate("athcodecViewer.setLevel('1')")
         line.release()
@@ -556,7 +556,7 @@ def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
 @browser_test
 def test_a_server_without_ranges_sends_a_download_that_plays_while_it_grows(opened, gusty_ath):
     data = gusty_ath.read_bytes()
-    with HeldLine({"tree.ath": data}, after=len(data) / 2, ranges=False) as line:
+    with HeldServer({"tree.ath": data}, after=len(data) / 2, ranges=False) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.counters.firstMotion")
         assert line.sent("tree.ath") <= len(data) / 2
         line.release()
@@ -575,7 +575,7 @@ def cut_after(path: Path, level: int) -> bytes:
 @pytest.mark.parametrize("ranges", [True, False])
 def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
     data = cut_after(sample_ath, 1) + b"xx"
-    with Line({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
+    with ThrottledServer({"tree.ath": data}, ranges=ranges) as line, athcodec.open(sample_ath) as decoder:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.readyLevel === 1")
         page.keyboard.press("l")
         page.wait_for_function("() => athcodecViewer.counters.pictures > 8")
@@ -593,7 +593,7 @@ def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
     (None, "cannot be fetched")])
 def test_the_page_says_that_a_file_cannot_be_shown(opened, sample_ath, damage, words):
     files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
-    with Line(files) as line:
+    with ThrottledServer(files) as line:
         page = opened(line.page("tree.ath"), "document.getElementById('message').checkVisibility()")
         assert words in page.inner_text("#message h2") and page.inner_text("#message p").strip()
 
@@ -604,7 +604,7 @@ def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
     with athcodec.open(sample_ath) as decoder:
         at = decoder.file.info()["levels"][1]["bytes"] + 50
     damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1:]
-    with Line({"tree.ath": damaged}) as line:
+    with ThrottledServer({"tree.ath": damaged}) as line:
         page = opened(line.page("tree.ath"), "!document.getElementById('note').hidden")
         assert "damaged" in page.inner_text("#note")
         page.keyboard.press("l")
@@ -622,7 +622,7 @@ def test_an_exported_page_plays_from_the_disk(opened, sample_ath, tmp_path):
 
 @browser_test
 def test_a_thousand_instances_are_drawn_each_at_its_level(opened, sample_ath):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
         page.evaluate("athcodecViewer.forestOf(1000)")
         forest = "athcodecViewer.state.forest"
@@ -667,7 +667,7 @@ def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
         clip.check()
         athcodec.encode(clip, tmp_path / name, rel_error=1e-3)
         files[name] = (tmp_path / name).read_bytes()
-    with Line(files) as line:
+    with ThrottledServer(files) as line:
         for name in files:
             page = opened(line.page(name))
             page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.index.count > 0")
@@ -704,7 +704,7 @@ def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
     clip.check()
     path = tmp_path / "tube.ath"
     athcodec.encode(clip, path, rel_error=1e-3)
-    with Line({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
+    with ThrottledServer({"tube.ath": path.read_bytes()}) as line, athcodec.open(path) as decoder:
         page = opened(line.page("tube.ath"))
         page.wait_for_function("() => athcodecViewer.plants[0].ath.geometry?.hasAttribute('normal')")
         for level in range(decoder.level_count):
@@ -717,7 +717,7 @@ def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
 
 @browser_test
 def test_the_page_works_by_keyboard(opened, sample_ath):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"))
 
         def pressed(key: str, then: str):
@@ -743,7 +743,7 @@ def test_the_page_works_by_keyboard(opened, sample_ath):
 @browser_test
 @pytest.mark.parametrize("size, scheme", [((390, 800), "light"), ((390, 800), "dark"), ((1280, 800), "dark")])
 def test_no_control_lies_outside_the_screen(opened, sample_ath, size, scheme):
-    with Line({"tree.ath": sample_ath.read_bytes()}) as line:
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         page = opened(line.page("tree.ath"), color_scheme=scheme)
         page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
