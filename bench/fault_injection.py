@@ -152,7 +152,7 @@ class _FaultyBatch:
 def _is_intact(path: Path) -> bool:
     try:
         with athcodec.open(path, strict=True) as decoder:
-            decoder.check()
+            decoder.file.check()
     except athcodec.errors.AthError:
         return False
     return True
