@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from athcodec import errors
 from athcodec.ath import Ath, Thresholds, build_ath
+from athcodec.ath_file import AthFile
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder, open
@@ -17,8 +18,8 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.sources import read, read_hdf5, sample_path
 
 __version__ = "0.1.0"
-__all__ = ["Ath", "ClipView", "Decoder", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode", "errors",
-           "find_branches", "join", "looped", "open", "read", "read_hdf5", "sample_path", "split", "truncate",
+__all__ = ["Ath", "AthFile", "ClipView", "Decoder", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode",
+           "errors", "find_branches", "join", "looped", "open", "read", "read_hdf5", "sample_path", "split", "truncate",
            "write", "write_hdf5"]
 
 

@@ -112,7 +112,7 @@ _PLAYING = {  # core/ath.h
     "ath_positions": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_positions_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_matrices_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
-    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
 _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h

@@ -11,7 +11,7 @@ import os
 import threading
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 
@@ -142,7 +142,7 @@ class AthFile:
         self.bytes_read = 0
         self._lock = threading.Lock()
         self._owned = not hasattr(path, "read")
-        self._source: Any = _opened(path) if self._owned else path
+        self._source = _opened(path) if self._owned else cast(Any, path)
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
             self.core = self._open_core()

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,8 +27,17 @@ RESERVED_NAMES = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Joints in a tree: joint_parent (J,) int32, -1 for a root, each behind its parent; vertex_joint (N,) int32, the
-    joint with the largest weight on each vertex, -1 for none; names (J,)."""
+    """The joints that move a clip's vertices, as far as its source says; only finding branches looks at them.
+
+    Parameters
+    ----------
+    joint_parent : (J,) int32 array
+        Parent of each joint, which comes before it; -1 for a root.
+    vertex_joint : (N,) int32 array
+        The joint with the largest weight on each vertex, -1 for none.
+    names : (J,) sequence of str, optional
+        Names of the joints.
+    """
 
     joint_parent: np.ndarray
     vertex_joint: np.ndarray
@@ -37,8 +46,17 @@ class Skin:
 
 @dataclass(frozen=True)
 class ClipRange:
-    """A run of frames that is a clip of its own in the file: `name`, how many frames, and whether it is a loop, whose
-    first frame follows its last."""
+    """A run of frames that is a clip of its own in a file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the clip.
+    frame_count : int
+        Number of its frames.
+    loop : bool, optional
+        Whether its first frame follows its last.
+    """
 
     name: str
     frame_count: int
@@ -49,42 +67,69 @@ class ClipRange:
 class MotionClip:
     """One moving plant: T frames of N vertices, on B branches where they are known.
 
-    positions      (T, N, 3) float32 or float64, in `metadata["unit"]`: an array, or anything that has shape
-                   and dtype and is sliced by frames (an h5py.Dataset, a numpy.memmap). Never read whole.
-    time           (T,) seconds, strictly increasing (within each clip range); becomes float64. The steps may differ.
-    vertex_branch  (N,) integers, the branch of each vertex; becomes int32. None, and branch_parent too: not known,
-                   see discovery.py.
-    branch_parent  (B,) integers, -1 for a root (several are allowed); becomes int32.
-    rest           (N, 3) float32 or float64; becomes float64, `rest_dtype` keeps what was given. None: made
-                   from the motion as `rest_pose` says.
-    rest_pose      "first" (the first frame) or "mean" (of all frames, one pass over the clip); used where
-                   rest is None.
-    stem_index     (N,) integers, the place of each vertex on its stem, 0 at the base. None where the vertices
-                   of every branch already run from base to tip in the order of their numbers.
-    edges, faces   (E, 2) and (F, k) vertex numbers of any integer dtype, or None. Polygons of different sizes are the
-                   attributes face_vertex_counts (F,) and face_vertex_indices (C,) in place of faces; see `polygons`.
-    attributes     further named static arrays (radius, colours ...) of any shape; numbers, booleans,
-                   bytes or records of them. They have a row per vertex, branch, face or corner of a face, or none of
-                   that: metadata["domains"] says which, {"uv": "corner"}, where the number of rows does not.
-    metadata       "unit", "up_axis" and whatever else describes the clip: str, int, float, bool, lists and dicts of
-                   them. "fps" and "start_frame": the rate and the number of the first frame in the tool that made it,
-                   whose frames are then start_frame + time * fps. "part_names": the objects that the vertices belong
-                   to, one after the other, their numbers of vertices in the attribute part_vertex_counts.
-    clip_ranges    where it is several clips one after the other, or a loop: tuple of ClipRange, which make up all
-                   frames and have names of their own; joining.py makes such clips. Empty: one clip without a name.
-    skin           the joints that moved the vertices, where a source has them; not stored, only for discovery.py.
-    resource       something with close(), closed with the clip: the open file behind lazily read positions.
-    unchanged      a function that tells whether what the positions are read from is as it was when the clip was made.
+    The structure is checked when the clip is made, the positions while they are read in blocks of frames, so that a
+    clip may be larger than memory. A clip is a context manager that closes the file behind it.
 
-    Raises ClipError at construction where the structure is wrong, and from block() and blocks() at the first
-    position that is NaN or infinite.
+    Parameters
+    ----------
+    positions : (T, N, 3) array of float32 or float64
+        Positions of the vertices in ``metadata["unit"]``: an array, or anything that has a shape and a dtype and is
+        sliced by frames, such as an h5py.Dataset or a numpy.memmap. Never read whole.
+    time : (T,) array
+        Seconds, strictly increasing within each clip range, in steps that may differ. Becomes float64.
+    vertex_branch : (N,) array of integers, optional
+        The branch of each vertex. Becomes int32. None, as is branch_parent then, where branches are not known; see
+        `find_branches`.
+    branch_parent : (B,) array of integers, optional
+        The branch that each branch grows on, -1 for a root, of which there may be several. Becomes int32.
+    rest : (N, 3) array of float32 or float64, optional
+        The rest pose. Becomes float64; `rest_dtype` keeps the dtype that was given. None: made of the motion, see
+        rest_pose.
+    edges : (E, 2) array of integers, optional
+        Pairs of vertices.
+    faces : (F, k) array of integers, optional
+        Vertices of each polygon. Polygons of different sizes are the attributes face_vertex_counts (F,) and
+        face_vertex_indices (C,) instead; `polygons` gives either.
+    attributes : dict of str to array, optional
+        Further named static arrays (radius, colours ...) of any shape: numbers, booleans, bytes or records of them.
+        They have a row per vertex, branch, face or corner of a face, or none of that: ``metadata["domains"]`` says
+        which, as in ``{"uv": "corner"}``, where the number of rows does not.
+    metadata : dict, optional
+        "unit", "up_axis" and whatever else describes the clip: str, int, float, bool, lists and dicts of them. "fps"
+        and "start_frame" are the rate, and the number of the first frame, in the tool that made the clip: its frames
+        are start_frame + time * fps. "part_names" are the objects that the vertices belong to, one after the other;
+        the attribute part_vertex_counts has their numbers of vertices.
+    rest_pose : {"first", "mean"}, optional
+        How the rest pose is made where none is given: the first frame, or the mean of all, which reads the clip once.
+    stem_index : (N,) array of integers, optional
+        The place of each vertex on its stem, 0 at the base. None where the vertices of every branch run from base to
+        tip in the order of their numbers.
+    clip_ranges : tuple of ClipRange, optional
+        The clips that the frames are, one after the other, or the only one, where it has a name or is a loop; `join`
+        and `looped` make such clips. Empty: one clip without a name.
+    resource : object with close(), optional
+        Closed with the clip: the open file behind positions that are read when they are asked for.
+    unchanged : callable, optional
+        Says, without arguments, whether what the positions are read from is as it was when the clip was made.
+    skin : Skin, optional
+        The joints that moved the vertices. Not stored in .ath files; `find_branches` uses it.
+
+    Attributes
+    ----------
+    rest_dtype : numpy.dtype
+        float32 or float64: the dtype in which the rest pose was given or made, and in which files store it.
+
+    Raises
+    ------
+    ClipError
+        Where the structure is wrong; by `block` and `blocks`, at the first position that is not a finite number.
     """
 
     positions: Any
     time: np.ndarray
     vertex_branch: np.ndarray | None = None
     branch_parent: np.ndarray | None = None
-    rest: np.ndarray | None = None
+    rest: np.ndarray = field(default=cast(Any, None))  # None only until it has been made
     edges: np.ndarray | None = None
     faces: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
@@ -114,39 +159,69 @@ class MotionClip:
         self.close()
 
     def close(self) -> None:
-        """Close the file behind the clip, if there is one; positions cannot be read from it afterwards."""
+        """Close the file behind the clip, if there is one; its positions cannot be read afterwards."""
         if self.resource is not None:
             self.resource.close()
 
     @property
     def frame_count(self) -> int:
+        """Number of frames, T."""
         return len(self.time)
 
     @property
     def vertex_count(self) -> int:
+        """Number of vertices, N."""
         return int(self.positions.shape[1])
 
     @property
     def branch_count(self) -> int:
+        """Number of branches, B; 0 where they are not known."""
         return 0 if self.branch_parent is None else len(self.branch_parent)
 
     @property
     def has_branches(self) -> bool:
+        """Whether the branches are known."""
         return self.branch_parent is not None
 
     @property
+    def source_rest(self) -> np.ndarray:
+        """(N, 3) rest pose in `rest_dtype`, as it was given."""
+        return self.rest.astype(self.rest_dtype)
+
+    def replace(self, **changes: Any) -> MotionClip:
+        """The clip with other values of some parameters; the rest pose keeps its dtype unless another pose is given.
+
+        Parameters
+        ----------
+        **changes
+            Parameters of MotionClip.
+
+        Returns
+        -------
+        MotionClip
+            A new clip, which shares everything else with this one: closing either closes both.
+
+        Raises
+        ------
+        ClipError
+            Where the changed structure is wrong.
+        """
+        return replace(self, **{"rest": self.source_rest} | changes)
+
+    @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Faces of any sizes: corners per face (F,), and the vertex of each corner (C,), face after face; or None."""
+        """Faces of any sizes: numbers of corners (F,), and the vertex of each corner (C,), face after face; None where
+        there are no faces."""
         return polygons(self.faces, self.attributes)
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64 in native byte order: the dtype of the blocks."""
+        """dtype of the positions in `block` and `blocks`: float32 or float64 in native byte order."""
         return self._dtype
 
     @property
     def fps(self) -> float:
-        """Median frame rate in frames per second; for a single frame metadata["fps"], else 30."""
+        """Median frame rate in frames per second; of a single frame metadata["fps"], else 30."""
         steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.clip_range_frames])
         return float(1.0 / np.median(steps)) if len(steps) else frame_rate(self.metadata)
 
@@ -156,9 +231,14 @@ class MotionClip:
         return clip_range_frames(self.clip_ranges) if self.clip_ranges else [(0, self.frame_count)]
 
     def check(self) -> None:
-        """Check the structure and bring the small arrays to their documented dtypes; raises ClipError.
+        """Check the structure again, after fields were set, and bring the small arrays to their documented dtypes.
 
-        The positions themselves are not read here, except for a rest pose that was not given.
+        Positions are read only to make a rest pose where there is none.
+
+        Raises
+        ------
+        ClipError
+            Where the structure is wrong.
         """
         frame_count, vertex_count = self._check_positions()
         check_clip_ranges(self.clip_ranges, frame_count)
@@ -173,8 +253,14 @@ class MotionClip:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Raises ClipError at the end of the block, also instead of what it raises, where the positions come from a
-        file that somebody has written to since the clip was made."""
+        """Context in which the files behind the positions must not change.
+
+        Raises
+        ------
+        ClipError
+            At the end of the ``with`` block, also in place of an error of the block, where one of the files has been
+            written to since the clip was made.
+        """
         try:
             yield
         finally:
@@ -182,9 +268,24 @@ class MotionClip:
                 raise ClipError("positions: the file was changed while it was read, expected it to stay as it is")
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Frames start to stop - 1 as a read-only (stop - start, N, 3) array in the clip's dtype.
+        """Positions of frames `start` to `stop` - 1.
 
-        Raises IndexError for frames that do not exist, ClipError for positions that are NaN or infinite.
+        Parameters
+        ----------
+        start, stop : int
+            0 <= start < stop <= frame_count.
+
+        Returns
+        -------
+        (stop - start, N, 3) array
+            In the clip's dtype, read-only.
+
+        Raises
+        ------
+        IndexError
+            For frames that do not exist.
+        ClipError
+            Where a position is NaN, infinite or beyond 1e18, or cannot be read.
         """
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop}: expected 0 <= start < stop <= {self.frame_count}")
@@ -197,10 +298,25 @@ class MotionClip:
         return frames
 
     def blocks(self, max_frames: int | None = None) -> Iterator[tuple[int, np.ndarray]]:
-        """All frames in order as (start, block), see block().
+        """All frames in order, a block at a time.
 
-        A block has at most `max_frames` frames and 32 MiB, but at least one frame; its length is a
-        multiple of the source's HDF5 chunk length where that is no longer.
+        Parameters
+        ----------
+        max_frames : int, optional
+            Frames in a block at most. A block has at most 32 MiB too, but at least one frame; its length is a multiple
+            of the chunk length of the source's HDF5 dataset where that is no longer.
+
+        Yields
+        ------
+        start : int
+            Number of the first frame of the block.
+        block : (k, N, 3) array
+            See `block`, whose errors are raised here too.
+
+        Raises
+        ------
+        ValueError
+            For max_frames below 1.
         """
         length = self._block_length(max_frames)
         for start in range(0, self.frame_count, length):
@@ -233,13 +349,13 @@ class MotionClip:
             raise ClipError("positions: got no frames, expected at least one")
         if shape[1] == 0:
             raise ClipError("positions: got no vertices, expected at least one")
-        self._dtype = dtype.newbyteorder("=")
+        self._dtype: np.dtype = dtype.newbyteorder("=")
         return shape[0], shape[1]
 
     def _check_rest(self) -> None:
         if self.rest_pose not in ("first", "mean"):
             raise ClipError(f'rest_pose: got {self.rest_pose!r}, expected "first" or "mean"')
-        if self.rest is None:
+        if cast(np.ndarray | None, self.rest) is None:
             pose = self.block(0, 1)[0] if self.rest_pose == "first" else self._mean_pose()
             self.rest_dtype = pose.dtype
             self.rest = self._checked_rest = pose.astype(np.float64)
@@ -263,6 +379,7 @@ class MotionClip:
 
 
 def check_float_dtype(name: str, dtype: np.dtype) -> None:
+    """ClipError unless float32 or float64, in any byte order."""
     if dtype.kind != "f" or dtype.itemsize not in (4, 8):
         raise ClipError(f"{name}: got dtype {dtype}, expected float32 or float64")
 
@@ -280,13 +397,14 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
 
 
 def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
-    """(start, stop) frames of each."""
+    """(start, stop) frames of each clip range, where the first begins at frame 0."""
     stops = np.cumsum([clip_range.frame_count for clip_range in clip_ranges]).tolist()
     return list(zip([0, *stops], stops))
 
 
 def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> None:
-    """ClipError unless they make up all frames, and several of them have names that can be told apart."""
+    """ClipError unless they make up all frames and have different names that can be stored; a single one may have no
+    name."""
     if not clip_ranges:
         return
     counts = [clip_range.frame_count for clip_range in clip_ranges]
@@ -311,49 +429,56 @@ def is_name(text: str) -> bool:
 
 def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
     """(T,) float64 seconds; ClipError unless finite, strictly increasing within each clip range and one per frame."""
-    time = np.asarray(time)
-    if time.shape != (frame_count,):
-        raise ClipError(f"time: got shape {time.shape}, expected ({frame_count},), one time per frame")
-    if time.dtype.kind not in "fiu":
-        raise ClipError(f"time: got dtype {time.dtype}, expected float64 seconds")
-    time = time.astype(np.float64)
-    bad = np.flatnonzero(~np.isfinite(time))
+    times: np.ndarray = np.asarray(time)
+    if times.shape != (frame_count,):
+        raise ClipError(f"time: got shape {times.shape}, expected ({frame_count},), one time per frame")
+    if times.dtype.kind not in "fiu":
+        raise ClipError(f"time: got dtype {times.dtype}, expected float64 seconds")
+    times = times.astype(np.float64)
+    bad = np.flatnonzero(~np.isfinite(times))
     if bad.size:
-        raise ClipError(f"time: frame {bad[0]} is at {time[bad[0]]}, expected a finite number of seconds")
+        raise ClipError(f"time: frame {bad[0]} is at {times[bad[0]]}, expected a finite number of seconds")
     starts = [start for start, _ in clip_range_frames(clip_ranges)[1:]]
-    late = np.setdiff1d(np.flatnonzero(np.diff(time) <= 0), np.array(starts, int) - 1)
+    late = np.setdiff1d(np.flatnonzero(np.diff(times) <= 0), np.array(starts, int) - 1)
     if late.size:
         frame = late[0] + 1
         raise ClipError(
-            f"time: frame {frame} is at {time[frame]} after {time[frame - 1]}, expected strictly increasing"
+            f"time: frame {frame} is at {times[frame]} after {times[frame - 1]}, expected strictly increasing"
         )
-    return time
+    return times
+
+
+def stated_fps(metadata: Mapping[str, Any]) -> float | None:
+    """Frames per second in `metadata["fps"]`; None where it is missing or no positive number."""
+    fps = metadata.get("fps")
+    if isinstance(fps, (int, float)) and not isinstance(fps, bool) and 0 < fps < float("inf"):
+        return float(fps)
+    return None
 
 
 def frame_rate(metadata: Mapping[str, Any]) -> float:
     """Frames per second in `metadata["fps"]`, 30 where it is missing; ClipError for no positive number."""
-    fps = metadata.get("fps", DEFAULT_FPS)
-    is_number = isinstance(fps, (int, float)) and not isinstance(fps, bool)
-    if not is_number or not 0 < fps < float("inf"):
-        raise ClipError(f"fps: got {fps!r}, expected a positive number")
-    return float(fps)
+    fps = stated_fps(metadata) if "fps" in metadata else DEFAULT_FPS
+    if fps is None:
+        raise ClipError(f"fps: got {metadata['fps']!r}, expected a positive number")
+    return fps
 
 
 def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
     """`indices` as an array of its own integer dtype, every entry in 0 .. stop - 1; ClipError otherwise."""
     if indices is None:
         return None
-    indices = np.asarray(indices)
+    array: np.ndarray = np.asarray(indices)
     expected = f"(rows, {width or 'k'})"
-    if indices.ndim != 2 or (width is not None and indices.shape[1] != width):
-        raise ClipError(f"{name}: got shape {indices.shape}, expected {expected}")
-    if indices.dtype.kind not in "iu":
-        raise ClipError(f"{name}: got dtype {indices.dtype}, expected integers")
-    bad = np.argwhere((indices < 0) | (indices >= stop))
+    if array.ndim != 2 or (width is not None and array.shape[1] != width):
+        raise ClipError(f"{name}: got shape {array.shape}, expected {expected}")
+    if array.dtype.kind not in "iu":
+        raise ClipError(f"{name}: got dtype {array.dtype}, expected integers")
+    bad = np.argwhere((array < 0) | (array >= stop))
     if bad.size:
         row, column = bad[0]
-        raise ClipError(f"{name}: row {row} names vertex {indices[row, column]}, expected 0 to {stop - 1}")
-    return indices
+        raise ClipError(f"{name}: row {row} names vertex {array[row, column]}, expected 0 to {stop - 1}")
+    return array
 
 
 def polygons(faces: np.ndarray | None, attributes: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
@@ -435,6 +560,7 @@ def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
 
 
 def check_attributes(attributes: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
+    """Named arrays; ClipError unless the names are free, and the values numbers, booleans, bytes or records."""
     checked = {}
     for name, values in (attributes or {}).items():
         if not isinstance(name, str) or not name.strip("/") or name in RESERVED_NAMES:
@@ -470,18 +596,18 @@ def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
     ancestor = np.append(np.where(branch_parent < 0, count, branch_parent), count)
     for _ in range(count.bit_length()):
         ancestor = ancestor[ancestor]
-    # At least `count` steps have been taken, so what has not left through a root goes round.
-    left = np.flatnonzero(ancestor[:count] < count)
-    return int(ancestor[left[0]]) if left.size else None
+    # At least `count` steps up have been taken: what has not reached a root is on a cycle, or leads to one.
+    cyclic = np.flatnonzero(ancestor[:count] < count)
+    return int(ancestor[cyclic[0]]) if cyclic.size else None
 
 
 def _integers(name: str, values: Any) -> np.ndarray:
-    values = np.asarray(values)
-    if values.ndim != 1:
-        raise ClipError(f"{name}: got shape {values.shape}, expected one dimension")
-    if values.dtype.kind not in "iu":
-        raise ClipError(f"{name}: got dtype {values.dtype}, expected integers")
-    return values
+    array: np.ndarray = np.asarray(values)
+    if array.ndim != 1:
+        raise ClipError(f"{name}: got shape {array.shape}, expected one dimension")
+    if array.dtype.kind not in "iu":
+        raise ClipError(f"{name}: got dtype {array.dtype}, expected integers")
+    return array
 
 
 def _point(point: np.ndarray) -> str:

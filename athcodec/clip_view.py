@@ -17,12 +17,27 @@ from athcodec.errors import LevelUnavailable
 
 
 class ClipView:
-    """Frames `frames` of `decoder` at `level` (None: the deepest complete one), vertices in the source's order.
+    """Frames of an .ath file at one level, with the names and the meanings of MotionClip, and `affines` besides.
 
-    It has the names and the meanings of MotionClip, `affines` besides. Frame 0 is the first of the view; time and
-    metadata["start_frame"] are those that it has in the whole clip. all_clips: those frames of every clip of the file,
-    one after the other, as a MotionClip of several clip ranges has them. Raises LevelUnavailable where level or
-    frames do not exist.
+    Vertices stand in the source's order, lengths are in scene units. Frame 0 is the first of the view; time and
+    metadata["start_frame"] are those that it has in the whole clip.
+
+    Parameters
+    ----------
+    decoder : Decoder
+        The clip to show; it stays open as long as the view is used.
+    level : int, optional
+        Level of detail; by default the deepest that is complete.
+    frames : range, optional
+        Those of the clip, with step 1; by default all.
+    all_clips : bool
+        Show these frames of every clip of the file, one clip after the other, as a MotionClip of several clip ranges
+        has them.
+
+    Raises
+    ------
+    LevelUnavailable
+        Where the level or the frames do not exist.
     """
 
     def __init__(self, decoder: Decoder, level: int | None = None, frames: range | None = None, *,
@@ -42,78 +57,110 @@ class ClipView:
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
+        """(start, stop) frames of each clip."""
         return clip_range_frames(self.clip_ranges)
 
     @property
     def frame_count(self) -> int:
+        """Frames of all its clips, T."""
         return sum(len(frames) for _, frames in self._runs)
 
     @property
     def vertex_count(self) -> int:
+        """Vertices of the plant, N."""
         return self.decoder.vertex_count
 
     @property
     def branch_count(self) -> int:
+        """Branches of the plant, B."""
         return self.decoder.branch_count
 
     @property
     def dtype(self) -> np.dtype:
+        """Type of the positions, float32 or float64."""
         return self.decoder.dtype
 
     @property
     def max_error(self) -> float:
-        """The largest distance of any vertex in any frame of its clips at this level from the source."""
+        """The largest distance of any vertex in any frame of its clips at this level from the source, scene units."""
         return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)
 
     @property
     def time(self) -> np.ndarray:
+        """Seconds, (T,) float64."""
         return np.concatenate([decoder.time[frames.start : frames.stop] for decoder, frames in self._runs])
 
     @property
     def fps(self) -> float:
         """Frames per second: what the source said, else the median rate of the file, else 30."""
         said = self.metadata.get("fps")
-        is_number = isinstance(said, (int, float)) and not isinstance(said, bool) and 0 < said < float("inf")
-        return float(said) if is_number else self.decoder.fps or 30.0
+        if isinstance(said, (int, float)) and not isinstance(said, bool) and 0 < said < float("inf"):
+            return float(said)
+        return self.decoder.fps or 30.0
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
+        """Unit, up axis and whatever else the source said of the clip, or of all clips."""
         return dict(self.decoder.metadata if len(self._runs) == 1 else self.decoder.file.metadata)
 
     @property
     def rest(self) -> np.ndarray:
+        """Rest pose, (N, 3) float32 or float64, scene units."""
         return self.decoder.rest
 
     @property
     def vertex_branch(self) -> np.ndarray:
+        """The branch of each vertex, (N,) int32."""
         return self.decoder.vertex_branch
 
     @property
     def branch_parent(self) -> np.ndarray:
+        """The parent of each branch, (B,) int32, -1 for a root."""
         return self.decoder.branch_parent
 
     @property
     def stem_index(self) -> np.ndarray | None:
+        """Place of each vertex on its stem, (N,) int32, or None; see MotionClip."""
         return self.decoder.stem_index
 
     @property
     def edges(self) -> np.ndarray | None:
+        """(E, 2) vertex numbers, or None."""
         return self.decoder.edges
 
     @property
     def faces(self) -> np.ndarray | None:
+        """(F, k) vertex numbers, or None."""
         return self.decoder.faces
 
     @property
     def attributes(self) -> dict[str, np.ndarray]:
+        """Named static arrays, as the source had them."""
         return self.decoder.attributes
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Faces of any sizes: corners per face (F,), and the vertex of each corner (C,); or None."""
         return polygons(self.faces, self.attributes)
 
     def block(self, start: int, stop: int) -> np.ndarray:
-        """Frames start to stop - 1 of the view, (stop - start, N, 3)."""
+        """Positions of some frames of the view.
+
+        Parameters
+        ----------
+        start, stop : int
+            The first frame, and that behind the last.
+
+        Returns
+        -------
+        numpy.ndarray
+            (stop - start, N, 3), scene units.
+
+        Raises
+        ------
+        LevelUnavailable, FormatError
+            As Decoder.positions.
+        """
         found = []
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             own = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
@@ -122,13 +169,34 @@ class ClipView:
         return found[0] if len(found) == 1 else np.concatenate(found)
 
     def blocks(self) -> Iterator[tuple[int, np.ndarray]]:
-        """(start, (k, N, 3)) over all frames, one segment in memory at a time."""
+        """Positions of all frames, one segment in memory at a time.
+
+        Yields
+        ------
+        start : int
+            The first frame of the block.
+        block : numpy.ndarray
+            (k, N, 3), scene units.
+
+        Raises
+        ------
+        LevelUnavailable, FormatError
+            As Decoder.positions.
+        """
         for (decoder, frames), (first, _) in zip(self._runs, self.clip_range_frames):
             for start, block in decoder.blocks(self.level, frames=slice(frames.start, frames.stop)):
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """What moves as one in frame `frame` of the view; see Decoder.affines."""
+        """A frame of the view as matrices; see Decoder.affines.
+
+        Raises
+        ------
+        IndexError
+            Where the view has no such frame.
+        LevelUnavailable, FormatError
+            As Decoder.positions.
+        """
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
                 return decoder.affines(frames[frame - first], self.level)

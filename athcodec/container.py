@@ -46,12 +46,23 @@ KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "MET
 _HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
 _CHUNK = struct.Struct("<HBBIII")
 _ERRORS = struct.Struct("<ff")
-_CHECKSUM_AT = 12
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a reader accepts; FORMAT.md, "Limits"."""
+    """What a reader accepts; FORMAT.md, "Limits".
+
+    Attributes
+    ----------
+    chunks, vertices, branches, frames, attributes : int
+        Largest numbers of them.
+    hierarchy_depth : int
+        Branches on each other.
+    table_bytes, metadata_bytes, string_bytes, chunk_bytes, decoded_chunk_bytes : int
+        Largest sizes: of both tables, of metadata, of a name, of a chunk as stored, of a static array.
+    memory_bytes : int
+        What preparing a segment may take.
+    """
 
     chunks: int = 1 << 20
     table_bytes: int = 16 << 20

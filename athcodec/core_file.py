@@ -25,7 +25,9 @@ from ctypes import (
 )
 
 import numpy as np
+import numpy.typing as npt
 
+from athcodec import container
 from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
@@ -47,9 +49,9 @@ class Limits(Structure):
     _fields_ += [("memory_bytes", c_uint64)]
 
     @classmethod
-    def of(cls, limits) -> Limits:
+    def of(cls, limits: container.Limits) -> Limits:
         """Those of container.Limits that the core keeps to; more than a field can hold is its largest value."""
-        most = {name: 256 ** ctypes.sizeof(kind) - 1 for name, kind in cls._fields_ if name != "reserved"}
+        most = {field[0]: 256 ** ctypes.sizeof(field[1]) - 1 for field in cls._fields_ if field[0] != "reserved"}
         return cls(**{name: min(getattr(limits, name), largest) for name, largest in most.items()})
 
 
@@ -145,7 +147,8 @@ class File:
                                  byref(fault)), fault)
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
-        self._build, self._building = None, threading.Lock()
+        self._build: np.ndarray | None = None
+        self._building = threading.Lock()
 
     @staticmethod
     def _check(result: int, fault: Fault | None = None) -> int:
@@ -161,7 +164,7 @@ class File:
                 self._check(lib.ath_build(self._file, memory.ctypes.data, len(memory)))
                 self._build = memory
 
-    def _array(self, address: int, dtype, count: int) -> np.ndarray:
+    def _array(self, address: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
         dtype = np.dtype(dtype)
         view = np.ctypeslib.as_array(ctypes.cast(address, POINTER(c_uint8)), (count * dtype.itemsize,))
         return view.view(dtype).copy()
@@ -278,4 +281,4 @@ class File:
 
     def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
-        return lib.ath_depth_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)
+        return lib.ath_level_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)

@@ -99,6 +99,9 @@ class _OfFile(Generic[T]):
     def __init__(self, get: Callable[[AthFile], T]):
         self._get = get
 
+    def __set_name__(self, owner: type[Decoder], name: str) -> None:
+        self.__doc__ = getattr(AthFile, name).__doc__
+
     def __get__(self, decoder: Decoder, owner: type[Decoder]) -> T:
         return self._get(decoder.file)
 
@@ -125,6 +128,10 @@ class Decoder:
         The file, which all decoders of its clips share.
     clip : Clip
         The clip that is played.
+    clips, vertex_count, branch_count, level_count, full_level_count, deepest, complete, missing, max_error_bound, dtype
+        What `file` says of itself; see AthFile.
+    rest, hierarchy, vertex_branch, branch_parent, stem_index, edges, faces, attributes, error_weights
+        Static data of `file`; see AthFile.
 
     Raises
     ------
@@ -138,6 +145,7 @@ class Decoder:
     level_count = _OfFile(lambda file: file.level_count)
     full_level_count = _OfFile(lambda file: file.full_level_count)
     deepest = _OfFile(lambda file: file.deepest)
+    complete = _OfFile(lambda file: file.complete)
     missing = _OfFile(lambda file: file.missing)
     max_error_bound = _OfFile(lambda file: file.max_error_bound)
     dtype = _OfFile(lambda file: file.dtype)
@@ -250,7 +258,7 @@ class Decoder:
     # ---- motion ----
 
     def positions(self, frames: int | slice | None = None, level: int | None = None,
-                  dtype: npt.DTypeLike = None) -> np.ndarray:
+                  dtype: npt.DTypeLike | None = None) -> np.ndarray:
         """Positions of all vertices in one or several frames.
 
         Parameters
@@ -286,7 +294,7 @@ class Decoder:
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
-    def blocks(self, level: int | None = None, dtype: npt.DTypeLike = None,
+    def blocks(self, level: int | None = None, dtype: npt.DTypeLike | None = None,
                frames: int | slice | None = None) -> Iterator[tuple[int, np.ndarray]]:
         """The same, one segment in memory at a time.
 
@@ -342,9 +350,12 @@ class Decoder:
             node_matrices = core.matrices(ready, in_file, len(nodes))
             core.positions(ready, in_file, positions, core_file.FILE_ORDER)
         try:
-            maps = stem_maps(file.hierarchy, core.rest(), positions[None])
-        except np.linalg.LinAlgError:
-            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant") from None
+            with np.errstate(over="ignore", invalid="ignore"):
+                maps = stem_maps(file.hierarchy, core.rest(), positions[None])
+        except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
+            maps = np.array(np.nan)
+        if not np.isfinite(maps).all():
+            raise BadChunk(f"frame {frame}: got positions that no matrix fits; expected those of a plant")
         first = np.concatenate([nodes["first"], file.branches["first"][stems]])
         count = np.concatenate([nodes["count"], file.branches["count"][stems]])
         branch = file.hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
@@ -374,14 +385,12 @@ class Decoder:
         """
         parts, vertex_source = self.affines(frame, level), self.hierarchy.vertex_source
         full = self.positions(frame, self.deepest, np.float64)[vertex_source]
+        if not np.isfinite(full).all():
+            raise BadChunk(f"frame {frame}: got positions that are not finite; expected those of a plant")
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
             rows = slice(first, first + count)
-            try:
-                inverse = np.linalg.pinv(matrix[:, :3])
-            except np.linalg.LinAlgError:
-                raise BadChunk(f"frame {frame}: got a matrix without an inverse; expected one of a plant") from None
-            out[vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ inverse.T
+            out[vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ np.linalg.pinv(matrix[:, :3]).T
         return out
 
     def _checked_level(self, level: int | None) -> int:

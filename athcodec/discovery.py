@@ -29,20 +29,21 @@ METHODS = ("attributes", "skeleton", "edges", "components", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 
-SAMPLE_FRAMES = 12  # that are looked at
+SAMPLE_FRAMES = 12  # of the clip, which the methods look at
 NEIGHBOURS = 60  # vertices around each one among which those of other branches are looked for
 LONE_PARTS = 64  # parts of the plant, at most, whose nearest others are looked for however far they are
-QUERY = 1 << 21  # neighbours that are looked at at once
-STAYING = 300.0  # how much more it counts that a branch stays at its distance from another than how near it is
-ALIKE = 4.0  # how much more it counts against two branches that have as many vertices: no leaf hangs on a leaf
-ROOT_SIZE = 0.25  # of the largest branch: smaller ones are no trunks
+QUERY = 1 << 21  # neighbours in one query
+STAYING = 300.0  # weight of how constant the distance of two branches is, against how small it is
+ALIKE = 4.0  # further cost of two branches of the same size: no leaf grows on a leaf
+ROOT_SIZE = 0.25  # of the diagonal of the largest branch: smaller ones are no roots
 WELD = 1e-6  # of the diagonal: vertices that stay closer than this are one vertex of a mesh that was split
 COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no branches but loose points
 IN_ORDER = 0.7  # rank correlation of the source's order with the distance from the base from which on it is kept
-SMALL = 8  # vertices of a branch whose order is kept in any case
+SMALL = 8  # vertices of a branch, up to which the source's order is kept in any case
 PATCH_VERTICES = 150  # that a patch of a mesh without other branches has on average
-SMALL_PATCH, LARGE_PATCH, LARGE_MESH = 40, 600, 10_000  # that are tried besides, and vertices from which on the latter
-FREE_PATCHES = (64, 200)  # vertices of patches that hang on nothing
+SMALL_PATCH, LARGE_PATCH = 40, 600  # one of which is tried besides
+LARGE_MESH = 10_000  # vertices from which on that is the large one
+FREE_PATCHES = (64, 200)  # vertices of patches without parents
 PATCH_ROUNDS = 8
 MOST_PATCHES = 2000
 CRUMB = 12  # vertices: smaller patches join a neighbour
@@ -50,8 +51,19 @@ CRUMB = 12  # vertices: smaller patches join a neighbour
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Branches of a clip: vertex_branch (N,), branch_parent (B,), stem_index (N,) or None as in MotionClip, how they
-    were found (one of METHODS, or "file"), and one line on what they are."""
+    """Branches that were found for a clip; `str` describes them in one line.
+
+    Parameters
+    ----------
+    vertex_branch : (N,) int32 array
+        The branch of each vertex.
+    branch_parent : (B,) int32 array
+        The branch that each branch grows on, -1 for a root.
+    stem_index : (N,) int32 array or None
+        The place of each vertex on its stem, as in MotionClip.
+    method : str
+        How they were found: "attributes", "skeleton", "edges", "components", "motion", or "file".
+    """
 
     vertex_branch: np.ndarray
     branch_parent: np.ndarray
@@ -67,10 +79,10 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives, and where that goes by motion, patches of another size, patches that hang on nothing,
-    and a single one too: only a trial tells which of them makes the smallest file."""
+    """What find_branches gives; and where that goes by motion, also patches of another size, patches without parents,
+    and one single branch: only a trial shows which of them makes the smallest file."""
     seen = _Seen(clip)
-    found = _first_found(seen, METHODS, None)
+    found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
     if found.method != "motion":
@@ -82,13 +94,31 @@ def candidates(clip: MotionClip) -> list[Found]:
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
-    """Branches for a clip; those that it has are not looked at.
+    """Find branches for a clip; those that it has are not looked at.
 
-    method  one of METHODS; "auto" takes the first of them that has something to go by
-    root    a vertex of the branch that all others hang on, directly or not; None: of the largest one
+    Parameters
+    ----------
+    clip : MotionClip
+    method : str, optional
+        "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
+        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "motion": patches
+        that move rigidly. "auto": the first of these that the clip has the data for.
+    root : int, optional
+        A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
 
-    Raises ClipError where the method finds nothing to go by, MissingExtra where a package is missing, ValueError for a
-    method that does not exist.
+    Returns
+    -------
+    Found
+        The branches; a clip gets them by ``clip.replace(vertex_branch=..., branch_parent=..., stem_index=...)``.
+
+    Raises
+    ------
+    ClipError
+        Where the clip does not have the data that the method needs.
+    MissingExtra
+        Where scipy is missing.
+    ValueError
+        For a method that does not exist.
     """
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
@@ -126,16 +156,28 @@ def _first_found(seen: _Seen, methods: Sequence[str], root: int | None) -> Found
 
 
 def with_branches(clip: MotionClip, found: Found) -> MotionClip:
-    """The clip on these branches. Raises ClipError where they are not for so many vertices."""
-    return dataclasses.replace(clip, vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
-                               stem_index=found.stem_index, rest=clip.rest.astype(clip.rest_dtype))
+    """The clip on branches that were found. Raises ClipError where they are for another number of vertices."""
+    return clip.replace(vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
+                        stem_index=found.stem_index)
 
 
 # ---- results that a user keeps, edits and uses again ----
 
 
 def save(found: Found, path: str | os.PathLike[str]) -> None:
-    """Writes branches as JSON, one line per branch: its parent, and its vertices from base to tip as runs "0-5 9"."""
+    """Write branches to a JSON file that a user can edit, one line per branch.
+
+    Parameters
+    ----------
+    found : Found
+    path : str or path
+        The file: of each branch its parent, and its vertices from base to tip as runs, "0-5 9".
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    """
     order = _stem_order(found.vertex_branch, found.stem_index)
     bounds = np.searchsorted(found.vertex_branch[order], np.arange(len(found.branch_parent) + 1))
     lines = [json.dumps({"branch": branch, "parent": int(parent), "vertices": _runs(order[first:last])})
@@ -146,14 +188,31 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
 
 
 def load(path: str | os.PathLike[str]) -> Found:
-    """Branches from a file of `save`; numbers of branches may be any, in any order. Raises ClipError, OSError."""
+    """Read branches from a file of `save`.
+
+    Parameters
+    ----------
+    path : str or path
+        The numbers of the branches in it may be any, in any order.
+
+    Returns
+    -------
+    Found
+
+    Raises
+    ------
+    ClipError
+        Where the file is no such JSON, or does not have every vertex once.
+    OSError
+        Where it cannot be opened.
+    """
     with open(path, encoding="utf-8") as file:
         try:
             content = json.load(file)
             vertex_count, branches = int(content["vertex_count"]), content["branches"]
-            numbers = {each["branch"]: number for number, each in enumerate(branches)}
-            parent = np.array([numbers.get(each["parent"], -1) for each in branches], np.int64)
-            stems = [_vertices(each["vertices"], vertex_count) for each in branches]
+            numbers = {branch["branch"]: number for number, branch in enumerate(branches)}
+            parent = np.array([numbers.get(branch["parent"], -1) for branch in branches], np.int64)
+            stems = [_vertices(branch["vertices"], vertex_count) for branch in branches]
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise ClipError(f"{os.fspath(path)}: got no branches ({type(error).__name__}: {error}), expected the JSON "
                             "that athcodec hierarchy --save writes") from None
@@ -464,7 +523,8 @@ def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
-    return np.linalg.norm(high - low, axis=1)
+    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
+    return diagonals
 
 
 def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
@@ -537,12 +597,12 @@ def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarra
     length = np.linalg.norm(rest[inner[:, 0]] - rest[inner[:, 1]], axis=1)
     graph = _scipy("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
     graph.data = np.maximum(graph.data, 1e-30)  # a distance of nothing would be no link
-    way = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
+    way: np.ndarray = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
     return np.where(np.isfinite(way), way, np.linalg.norm(rest - rest[joints.base][label], axis=1))
 
 
 def _rank_correlation(label: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(B,) of each branch, between two orders of its vertices; Spearman's."""
+    """(B,) of each branch, between two orders of its vertices; Spearman's coefficient."""
     size = np.bincount(label)
     apart = np.bincount(label, (first - second).astype(np.float64) ** 2)
     return 1 - 6 * apart / np.maximum(size * (size.astype(np.float64) ** 2 - 1), 1)
@@ -599,13 +659,13 @@ def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
 
 
 def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """(B, F, 4, 3) least-squares affine maps from the rest pose, drawn to translations where vertices do not tell."""
+    """(B, F, 4, 3) least-squares affine maps from the rest pose; translations where vertices do not determine more."""
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     rest = np.concatenate([frames[0], np.ones((len(label), 1))], axis=1)[order]
     moved = (frames - frames[0])[:, order]
     squares = np.add.reduceat(rest[:, :, None] * rest[:, None, :], first)
-    products = np.stack([np.add.reduceat(rest[:, :, None] * each[:, None, :], first) for each in moved], axis=1)
+    products = np.stack([np.add.reduceat(rest[:, :, None] * frame[:, None, :], first) for frame in moved], axis=1)
     firmness = 1e-3 * np.trace(squares[:, :3, :3], axis1=1, axis2=2) + 1e-30
     squares[:, np.arange(3), np.arange(3)] += firmness[:, None]
     return np.linalg.solve(squares[:, None], products)
@@ -622,7 +682,7 @@ def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.
 
 
 def _without_crumbs(label: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Patches of few vertices go to one beside them."""
+    """Patches of few vertices are merged into a neighbour."""
     for _ in range(PATCH_ROUNDS):
         size = np.bincount(label)
         leaves = (size[label[links[:, 0]]] < CRUMB) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])

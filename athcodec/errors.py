@@ -24,49 +24,77 @@ class MissingExtra(AthError, ImportError):
 
 
 class FormatError(AthError):
-    """An .ath file cannot be decoded; `code` is its number in FORMAT.md."""
+    """An .ath file cannot be decoded.
+
+    Attributes
+    ----------
+    code : int
+        Number of the cause in FORMAT.md, "Errors"; it never changes.
+    name : str
+        Its name there.
+    """
 
     code = 1
     name = "INVALID"
 
 
 class NotAnAthFile(FormatError):
+    """The first bytes are not those of an .ath file."""
+
     code, name = 2, "NOT_AN_ATH_FILE"
 
 
 class UnsupportedVersion(FormatError):
+    """The file is of another version of the format."""
+
     code, name = 3, "UNSUPPORTED_VERSION"
 
 
 class Truncated(FormatError):
+    """The file ends before what was asked for."""
+
     code, name = 4, "TRUNCATED"
 
 
 class BadChecksum(FormatError):
+    """Bytes are not those that were written."""
+
     code, name = 5, "BAD_CHECKSUM"
 
 
 class BadHeader(FormatError):
+    """A field of the header is out of range, or contradicts the hierarchy."""
+
     code, name = 6, "BAD_HEADER"
 
 
 class BadChunkTable(FormatError):
+    """The chunk table or the error table contradicts the header or the hierarchy."""
+
     code, name = 7, "BAD_CHUNK_TABLE"
 
 
 class UnknownChunk(FormatError):
+    """The file needs a kind of chunk that this version does not know."""
+
     code, name = 8, "UNKNOWN_CHUNK"
 
 
 class BadChunk(FormatError):
+    """The content of a chunk does not decode."""
+
     code, name = 9, "BAD_CHUNK"
 
 
 class LimitExceeded(FormatError):
+    """The file asks for more than `Limits` allow."""
+
     code, name = 10, "LIMIT_EXCEEDED"
 
 
 class TrailingBytes(FormatError):
+    """The file is longer than its header says."""
+
     code, name = 11, "TRAILING_BYTES"
 
 
@@ -84,4 +112,5 @@ class RemoteError(AthError, OSError):
 
 def error_class(code: int) -> type[FormatError]:
     """The class of a code of FORMAT.md's table. KeyError: none of a file's."""
-    return {each.code: each for each in (FormatError, *FormatError.__subclasses__())}[code]
+    classes: list[type[FormatError]] = [FormatError, *FormatError.__subclasses__()]
+    return {error.code: error for error in classes}[code]

@@ -16,6 +16,7 @@ import numpy as np
 
 from athcodec.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 
 BLEND = "loop_blend"  # metadata: frames that were blended
 OWN = "clips"  # metadata: by name, what one of several clips has of its own
@@ -23,12 +24,24 @@ NAME, LOOP = "clip_name", "loop"  # metadata of files that hold a single clip an
 
 
 def join(clips: Mapping[str, MotionClip]) -> MotionClip:
-    """One clip of several by name, which go into one .ath file, in this order.
+    """Several clips of one plant as one clip, for one .ath file, which holds once what they have in common.
 
-    They have the same vertices, branches, faces, edges and attributes, which the file holds once, and the same rest
-    pose: where that of a clip is its first frame, as it is for sources without one, the others' counts. Metadata in
-    which they differ are kept for each. Closing the result closes them all. Raises ClipError where they do not fit
-    together.
+    Parameters
+    ----------
+    clips : dict of str to MotionClip
+        By name, in the order in which they come one after the other. They have the same vertices, branches, faces,
+        edges and attributes, and the same rest pose; one whose rest pose is only its first frame, as in sources without
+        one, takes that of the others. Metadata in which they differ are kept for each.
+
+    Returns
+    -------
+    MotionClip
+        A clip with a clip range for each. Closing it closes all of them.
+
+    Raises
+    ------
+    ClipError
+        Where the clips are not of one plant, a name cannot be stored, or one of them is several clips already.
     """
     if not clips:
         raise ClipError("clips: got none, expected at least one")
@@ -41,35 +54,58 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     for part in parts:
         closing.callback(part.close)
     return MotionClip(
-        _Joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
+        _joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
         first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
         stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts),
         skin=first.skin)
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
-    """The clips by name that `join` made one of; a single one that has none is "". Closing any of them closes all."""
+    """The clips that `join` made one of.
+
+    Parameters
+    ----------
+    clip : MotionClip
+
+    Returns
+    -------
+    dict of str to MotionClip
+        By name; a single clip without a name is "". Closing any of them closes all.
+    """
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
-    return {clip_range.name: _replaced(clip, positions=_Run(clip.positions, start, stop), time=clip.time[start:stop],
-                                       clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
+    return {clip_range.name: clip.replace(positions=_run(clip.positions, start, stop), time=clip.time[start:stop],
+                                    clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
             for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)}
 
 
 def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Of one of several clips: what all have in common and what it has of its own, from those of all as one."""
-    every = metadata.get(OWN)
-    own = every.get(name) if isinstance(every, dict) else None
+    """Those of one of several clips, what all have in common and what it has of its own, out of those of all."""
+    owned = metadata.get(OWN)
+    own = owned.get(name) if isinstance(owned, dict) else None
     common = {key: value for key, value in metadata.items() if key != OWN}
     return common | own if isinstance(own, dict) else common
 
 
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
-    """The clip as a loop: behind its last frame comes its first, after the mean time of a frame.
+    """The clip as a loop: its first frame follows its last, after the mean time of a frame.
 
-    blend: for a motion that does not end where it began, so many frames at its end are taken off and blended into those
-    at its beginning, which they then lead to: frame 0 is what followed the new last frame in the source. At most a
-    third of the frames. Raises ClipError.
+    Parameters
+    ----------
+    clip : MotionClip
+    blend : int, optional
+        For a motion that does not end where it began: so many frames are taken off its end and blended into those at
+        its beginning, so that frame 0 is what followed the new last frame in the source. At most a third of the frames.
+
+    Returns
+    -------
+    MotionClip
+        Closing it closes `clip`.
+
+    Raises
+    ------
+    ClipError
+        Where the clip is several clips, or has too few frames to blend.
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= blend <= clip.frame_count // 3:
@@ -78,30 +114,27 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     frames = clip.frame_count - blend
     clip_ranges = (dataclasses.replace(clip_range, frame_count=frames, loop=True),)
     if not blend:
-        return _replaced(clip, clip_ranges=clip_ranges)
-    return _replaced(clip, positions=_Blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
-                     metadata=clip.metadata | {BLEND: blend})
+        return clip.replace(clip_ranges=clip_ranges)
+    return clip.replace(positions=_blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
+                        metadata=clip.metadata | {BLEND: blend})
 
 
-def with_clip_metadata(motion: Any) -> dict[str, Any]:
-    """Metadata of a clip or a ClipView, as far as it has any, with its name and that it is a loop."""
+def clip_metadata(motion: Any) -> dict[str, Any]:
+    """Metadata of a motion, with the name of its clip and whether that is a loop, for files that hold a single clip."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
     metadata = getattr(motion, "metadata", None) or {}
     return metadata | ({NAME: clip_range.name} if clip_range.name else {}) | ({LOOP: True} if clip_range.loop else {})
 
 
 def read_clip_metadata(clip: MotionClip) -> None:
-    """Takes name and loop out of the metadata of a clip, and gives them to it. Raises ClipError."""
+    """Moves name and loop from the metadata of a clip, as clip_metadata has put them there, to its clip range.
+    Raises ClipError."""
     name, loop = clip.metadata.get(NAME), clip.metadata.get(LOOP)
     name, loop = name if isinstance(name, str) else "", loop is True
     if name or loop:
         clip.metadata = {key: value for key, value in clip.metadata.items() if key not in (NAME, LOOP)}
         clip.clip_ranges = (ClipRange(name, clip.frame_count, loop),)
         check_clip_ranges(clip.clip_ranges, clip.frame_count)
-
-
-def _replaced(clip: MotionClip, **changes: Any) -> MotionClip:
-    return dataclasses.replace(clip, rest=clip.rest.astype(clip.rest_dtype), **changes)
 
 
 def _only_clip_range(name: str, clip: MotionClip) -> ClipRange:
@@ -136,14 +169,14 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
             raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is "
                             f"{clip.rest[vertex].tolist()}, not {chosen.rest[vertex].tolist()}), expected clips of one "
                             "plant")
-    return chosen.rest.astype(chosen.rest_dtype)
+    return chosen.source_rest
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     """What all have in common, and under OWN what each has of its own."""
     every = [clip.metadata for clip in clips.values()]
     common = {key: value for key, value in every[0].items()
-              if all(key in each and each[key] == value for each in every)}
+              if all(key in metadata and metadata[key] == value for metadata in every)}
     own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
            for name, clip in clips.items()}
     own = {name: metadata for name, metadata in own.items() if metadata}
@@ -155,59 +188,38 @@ def _all_unchanged(clips: Sequence[MotionClip]) -> Any:
     return (lambda: all(check() for check in checks)) if checks else None
 
 
-class _Joined:
-    """(T, N, 3) positions of several, one after the other."""
+def _joined(parts: Sequence[Any]) -> Frames:
+    """Positions of several, one after the other."""
+    ranges = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
+    dtype = np.result_type(*(part.dtype for part in parts))
 
-    def __init__(self, parts: Sequence[Any]):
-        self._parts = parts
-        self._frames = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
-        self.dtype = np.result_type(*(part.dtype for part in parts))
-        self.shape = (self._frames[-1][1], *parts[0].shape[1:])
+    def read(start: int, stop: int) -> np.ndarray:
+        runs = [np.asarray(part[max(start, first) - first: min(stop, last) - first], dtype)
+                for part, (first, last) in zip(parts, ranges) if first < stop and start < last]
+        return runs[0] if len(runs) == 1 else np.concatenate(runs)
 
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __getitem__(self, frames: slice) -> np.ndarray:
-        start, stop, _ = frames.indices(self.shape[0])
-        runs = [np.asarray(part[max(start, first) - first: min(stop, last) - first], self.dtype)
-                for part, (first, last) in zip(self._parts, self._frames) if first < stop and start < last]
-        return runs[0] if len(runs) == 1 else np.concatenate(runs or [np.empty((0, *self.shape[1:]), self.dtype)])
+    return Frames(read, ranges[-1][1], parts[0].shape[1], dtype)
 
 
-class _Run:
-    """(stop - start, N, 3): some of the frames."""
-
-    def __init__(self, positions: Any, start: int, stop: int):
-        self._positions, self._start = positions, start
-        self.dtype, self.shape = positions.dtype, (stop - start, *positions.shape[1:])
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __getitem__(self, frames: slice) -> np.ndarray:
-        start, stop, _ = frames.indices(self.shape[0])
-        return self._positions[self._start + start: self._start + max(start, stop)]
+def _run(positions: Any, first: int, last: int) -> Frames:
+    """Frames `first` to `last` - 1."""
+    return Frames(lambda start, stop: positions[first + start: first + stop], last - first, positions.shape[1],
+                  positions.dtype)
 
 
-class _Blended:
-    """(T - blend, N, 3) positions whose first frames go from what follows their last over to their own."""
+def _blended(positions: Any, blend: int) -> Frames:
+    """All but the last `blend` frames, of which the first go from what follows the new last one over to their own."""
+    frame_count, dtype = positions.shape[0] - blend, positions.dtype
 
-    def __init__(self, positions: Any, blend: int):
-        self._positions, self._blend = positions, blend
-        self.dtype, self.shape = positions.dtype, (positions.shape[0] - blend, *positions.shape[1:])
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __getitem__(self, frames: slice) -> np.ndarray:
-        start, stop, _ = frames.indices(self.shape[0])
-        shown = np.asarray(self._positions[start:stop])
-        last = min(stop, self._blend)
+    def read(start: int, stop: int) -> np.ndarray:
+        shown, last = np.asarray(positions[start:stop]), min(stop, blend)
         if start >= last:
             return shown
-        place = np.arange(start, last)[:, None, None] / self._blend
-        weight = place * place * (3 - 2 * place)  # neither place nor speed jumps
-        leaving = np.asarray(self._positions[self.shape[0] + start: self.shape[0] + last], np.float64)
-        blended = shown.astype(self.dtype, copy=True)
-        blended[: last - start] = leaving + (shown[: last - start] - leaving) * weight
-        return blended
+        place = np.arange(start, last)[:, None, None] / blend
+        weight = place * place * (3 - 2 * place)  # smoothstep: neither positions nor speeds jump
+        leaving = np.asarray(positions[frame_count + start: frame_count + last], np.float64)
+        mixed = shown.astype(dtype, copy=True)
+        mixed[: last - start] = leaving + (shown[: last - start] - leaving) * weight
+        return mixed
+
+    return Frames(read, frame_count, positions.shape[1], dtype)

@@ -33,12 +33,30 @@ Range = tuple[int, int]
 
 
 class Remote:
-    """A seekable binary file behind `url`; `requests` and `bytes` count what was asked of the server and what
-    came.
+    """A seekable binary file behind a URL.
 
-    timeout: seconds without a byte until a request counts as failed. retries: how often it is made again.
-    Further options go to fsspec's file system, headers=... and client_kwargs=... for HTTP. Raises
-    RemoteError.
+    Parameters
+    ----------
+    url : str
+        http://, https://, or whatever else fsspec knows.
+    timeout : float
+        Seconds without a byte until a request counts as failed.
+    retries : int
+        How often a failed request is made again.
+    **options
+        For fsspec's file system, such as headers=... and client_kwargs=... for HTTP.
+
+    Attributes
+    ----------
+    requests, bytes : int
+        What was asked of the server, and what came.
+    size : int
+        Length of the file, bytes.
+
+    Raises
+    ------
+    RemoteError
+        Where the bytes cannot be had, or are no longer those of the file that was opened.
     """
 
     def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):
@@ -175,7 +193,7 @@ class _AnySystem:
         """All at once, where the file system can."""
         if not ranges:
             return []
-        starts, stops = [offset for offset, _ in ranges], [sum(each) for each in ranges]
+        starts, stops = [offset for offset, _ in ranges], [offset + size for offset, size in ranges]
         parts = self._try(lambda: self._system.cat_ranges([self._path] * len(ranges), starts, stops, on_error="raise"),
                           len(ranges))
         for (offset, size), data in zip(ranges, parts, strict=True):
@@ -232,7 +250,7 @@ class _Http:
             async with slots:
                 return await self._fetch(offset, size)
 
-        tasks = [asyncio.ensure_future(one(*each)) for each in ranges]
+        tasks = [asyncio.ensure_future(one(*wanted)) for wanted in ranges]
         try:
             return await asyncio.gather(*tasks)
         finally:

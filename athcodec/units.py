@@ -27,7 +27,15 @@ _QUANTITY = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)
 
 @dataclass(frozen=True)
 class Length:
-    """A length >= 0: `value` times `unit`, one of METRES; unit "" means scene units."""
+    """A length that a person wrote.
+
+    Parameters
+    ----------
+    value : float
+        At least 0.
+    unit : str, optional
+        "m", "cm", "mm", "km", "in" or "ft"; "" for the units of the clip.
+    """
 
     value: float
     unit: str = ""
@@ -36,10 +44,22 @@ class Length:
         return f"{self.value:g}{self.unit}"
 
     def in_scene_units(self, scene_unit: object) -> float:
-        """The length in `scene_unit`, a clip's metadata["unit"] or None where it has none.
+        """The length in the units of a clip.
 
-        A length without a unit is taken as it is. Raises BoundError where it has one and the scene's is
-        missing or not known here.
+        Parameters
+        ----------
+        scene_unit : str or None
+            ``metadata["unit"]`` of the clip.
+
+        Returns
+        -------
+        float
+            A length without a unit is taken to be in the clip's.
+
+        Raises
+        ------
+        BoundError
+            Where the length has a unit, and the clip has none or an unknown one.
         """
         if not self.unit:
             return self.value
@@ -56,7 +76,22 @@ class Length:
 
 
 def parse_length(text: str) -> Length:
-    """`text` as a number with or without a unit of METRES; BoundError where it is none."""
+    """Read a length.
+
+    Parameters
+    ----------
+    text : str
+        A number, with or without a unit: "2e-3", "1mm", "0.5 cm".
+
+    Returns
+    -------
+    Length
+
+    Raises
+    ------
+    BoundError
+        Where it is none.
+    """
     match = _QUANTITY.fullmatch(text)
     if not match or match[2] not in ("", *METRES) or float(match[1]) == float("inf"):
         raise BoundError(
@@ -66,8 +101,22 @@ def parse_length(text: str) -> Length:
 
 
 def parse_size(text: str) -> int:
-    """`text` as whole bytes >= 1: a number, or one followed by a unit of BYTES; BoundError where it is
-    none.
+    """Read a size in bytes.
+
+    Parameters
+    ----------
+    text : str
+        A number, with or without a unit: "50000", "50kB", "1.5MiB".
+
+    Returns
+    -------
+    int
+        Bytes, at least 1.
+
+    Raises
+    ------
+    BoundError
+        Where it is none.
     """
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0

@@ -33,10 +33,28 @@ _POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' da
 
 
 def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip: str | None = None) -> int:
-    """Writes one page that plays the file at `path` (or URL) without any other file or server; returns its bytes.
+    """Writes one page that plays an .ath file without any other file or server.
 
-    clip: the name of the one to begin with (default: the first). Raises AthError where `path` is no .ath file or has no
-    such clip, OSError.
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    page : str or path-like
+        The HTML file to write; it appears when it is complete.
+    clip : str, optional
+        The name of the clip to begin with; by default the first.
+
+    Returns
+    -------
+    int
+        Size of the page, bytes.
+
+    Raises
+    ------
+    AthError
+        Where `path` is no .ath file, or has no such clip.
+    OSError
+        Where a file cannot be read or written.
     """
     data = _read(path)
     with open_ath(io.BytesIO(data), clip=clip):
@@ -95,8 +113,26 @@ def file_name(path: str | os.PathLike[str]) -> str:
 
 def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print,
           clip: str | None = None) -> None:
-    """Serves the viewer with the file at `path` (or URL) on 127.0.0.1 until it is interrupted; `ready` is called with
-    the page's address. Port 0: a free one. clip: as in export_page. Raises MissingExtra, AthError, OSError."""
+    """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The .ath file, or its URL.
+    port : int
+        0: a free one.
+    ready : callable
+        Called with the page's address when it can be opened.
+    clip : str, optional
+        The name of the clip to begin with; by default the first.
+
+    Raises
+    ------
+    MissingExtra
+        Where aiohttp is not installed.
+    AthError, OSError
+        As `export_page`.
+    """
     _check(path, clip)
     import asyncio
 

@@ -1,6 +1,6 @@
 """The command `python -m bench`: arguments, printing, JSON.
 
-Exit code 1 where a promise of a file was found broken. What is measured, and how, is known to the verbs' own
+Exit code 1 where a file did not keep what it promises. What is measured, and how, is known to the verbs' own
 modules.
 """
 
@@ -15,13 +15,13 @@ from bench import (
     batch,
     data,
     decode,
-    drill,
+    fault_injection,
     forest,
     hierarchy,
-    joined,
     large,
     levels,
     memory,
+    motions,
     paper,
     picture,
     quick,
@@ -38,7 +38,8 @@ from bench import (
 VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
          "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
          "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large, "forest": forest, "remote": remote, "drill": drill, "joined": joined}
+         "large": large, "forest": forest, "remote": remote, "fault-injection": fault_injection,
+         "motions": motions}
 
 
 def main(argv: Sequence[str]) -> int:
@@ -52,14 +53,14 @@ def main(argv: Sequence[str]) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    whole = argparse.ArgumentParser(prog="python -m bench", description="Measures athcodec on motion clips.")
-    verbs = whole.add_subparsers(dest="verb", required=True, metavar="VERB")
+    top = argparse.ArgumentParser(prog="python -m bench", description="Measures athcodec on motion clips.")
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, module in VERBS.items():
         first_line = module.__doc__.splitlines()[0]
         verb = verbs.add_parser(name, help=first_line, description=first_line)
         module.add_arguments(verb)
         verb.add_argument("--json", type=Path, metavar="FILE", help="write the unrounded figures to FILE too")
-    return whole
+    return top
 
 
 if __name__ == "__main__":

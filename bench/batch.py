@@ -1,9 +1,9 @@
-"""Many small clips with one worker and with several: how much time further workers save.
+"""Many small clips encoded by one worker and by several: the time that further workers save.
 
-Every round encodes the same clips into an empty directory with each number of workers in turn, so that all see the
-same machine, and once in a plain loop of one process for what the workers themselves cost. The clips are windows of
-one clip, each from another frame on. Seconds are wall-clock time; those from the first clip to the last leave out the
-start of the workers. Every file is compared with that of the plain loop.
+Every round encodes the same clips into an empty directory with each number of workers in turn, so that conditions are
+the same for all, and once in a loop in one process, which shows the overhead of the workers. The clips are windows of
+one clip that start at different frames. Seconds are wall-clock time; those from the first clip to the last exclude the
+start of the workers. Every file is compared with the loop's.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ import numpy as np
 import athcodec
 from athcodec import batch
 from athcodec.batch.show import Show
-from athcodec.encoding import EFFORTS
-from bench.clips import add_rel_error
+from bench.clips import add_effort, add_rel_error, add_source
 from bench.tables import table
 
 COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
@@ -30,14 +29,14 @@ COUNT, FRAMES, WORKERS, TARGET = 200, 40, (1, 2), 1.7
 NOTE = """
 Each clip: {frames} frames of {vertices:,} vertices, HDF5; files in the page cache. 'all s': the whole run, with start
 and end of the workers; 'clips s': from the first clip to the last. Medians of {rounds} rounds. Loop: athcodec.encode in
-one process with one thread, nothing else. Load: of the machine before each run, median; with more running processes
-than cores the ratio says little.
+one process with one thread. Load: load average of the machine before each run, median; with more running processes
+than cores the ratio means little.
 """
-RATIO_NOTE = "Seconds from the first clip to the last, with one worker over with several, of the same round; median."
+RATIO_NOTE = "Seconds from the first clip to the last with one worker over those with several, by round; median."
 
 
 class _Clock(Show):
-    """When a run began with its clips, and when the last was there."""
+    """Times at which a run began its first clip and finished its last."""
 
     def begin(self, items, kept) -> None:
         self.first = self.last = 0.0
@@ -50,16 +49,20 @@ class _Clock(Show):
         self.last = time.perf_counter()
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="how many (default %(default)s)")
-    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of each (default %(default)s)")
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what they are windows of (default: the sample)")
-    parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
-                        help="numbers of workers; the first is what others are compared with (default 1 2)")
-    parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=EFFORTS, default="default", help="(default %(default)s)")
+def add_windows(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the clips to encode, and how."""
+    parser.add_argument("--clips", type=int, default=COUNT, metavar="N", help="number of clips (default %(default)s)")
+    parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="frames per clip (default %(default)s)")
+    add_source(parser)
+    add_effort(parser)
     add_rel_error(parser)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_windows(parser)
+    parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
+                        help="numbers of workers; others are compared with the first (default 1 2)")
+    parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -76,22 +79,23 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 broken += _differences(Path(folder, f"loop_{number}"), out)
         files = [path.stat().st_size for path in Path(folder, "loop_0").iterdir()]
     rows = [{"workers": name, "clips": args.clips, "bytes": sum(files)}
-            | {what: median(each[what] for each in rounds) for what in rounds[0]}
-            | {"clips/s": args.clips / median(each["clips s"] for each in rounds)} for name, rounds in runs.items()]
+            | {column: median(figures[column] for figures in rounds) for column in rounds[0]}
+            | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)}
+            for name, rounds in runs.items()]
     note = NOTE.format(frames=args.frames, vertices=vertices, rounds=args.rounds)
     return {"tables": [table(f"Many clips, bound {args.rel_error:g}", rows, note),
-                       table("One worker over several", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}
+                       table("Speed-up by further workers", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}
 
 
 def make_clips(args: argparse.Namespace, folder: Path) -> int:
-    """Windows of a clip as files; how many vertices they have."""
+    """Writes windows of a clip as files; returns their number of vertices."""
     folder.mkdir()
     with athcodec.read_hdf5(args.of) as clip:
         frames = min(args.frames, clip.frame_count)
         for number, start in enumerate(np.linspace(0, clip.frame_count - frames, args.clips).astype(int)):
             window = athcodec.MotionClip(
                 clip.block(start, start + frames), clip.time[:frames], clip.vertex_branch, clip.branch_parent,
-                clip.rest.astype(clip.rest_dtype), stem_index=clip.stem_index, metadata=clip.metadata)
+                clip.source_rest, stem_index=clip.stem_index, metadata=clip.metadata)
             athcodec.write_hdf5(window, folder / f"clip_{number:04}.h5")
         return clip.vertex_count
 
@@ -116,12 +120,12 @@ def _run(source: Path, out: Path, settings: dict[str, Any], workers: int) -> dic
 
 
 def _load() -> dict[str, float]:
-    """Of the machine, where the system tells it."""
+    """The machine's load average, where the system reports it."""
     return {"load": os.getloadavg()[0]} if hasattr(os, "getloadavg") else {}
 
 
 def _differences(loop: Path, out: Path) -> list[str]:
-    return [f"{path.name}: another file than athcodec.encode writes" for path in sorted(loop.iterdir())
+    return [f"{path.name}: differs from the file of athcodec.encode" for path in sorted(loop.iterdir())
             if path.read_bytes() != (out / path.name).read_bytes()]
 
 

@@ -1,4 +1,4 @@
-"""Chromium for measurements and tests of the viewer: Debian's, driven by Playwright, drawing in software."""
+"""Chromium for measurements and tests of the viewer: Debian's, driven by Playwright, with software rendering."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ INSTALL = "apt-get install chromium && pip install playwright"
 
 
 class MissingBrowser(Exception):
-    """One line for the user."""
+    """The message is one line for the user."""
 
 
 @contextmanager

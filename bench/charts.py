@@ -1,6 +1,6 @@
-"""Pictures of what verbs with tables measure, one per result, as PNG, in the manner of plots.py.
+"""Charts of the verbs' tables, one PNG per result, in the style of plots.py.
 
-Each function of CHARTS takes axes and the rows of the result's first table; a verb that has none here has no picture.
+Each function of CHARTS draws the rows of a result's first table; a verb without one has no picture.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Rows = list[dict[str, Any]]
 
 
 def draw(verb: str, name: str, result: dict[str, Any], folder: Path) -> list[Path]:
-    """Writes the picture of a result that is called `name`; no file where its verb has none. Raises NoPlots."""
+    """Writes NAME.png, if there is a chart for the verb; returns the files written. Raises NoPlots."""
     if verb not in CHARTS:
         return []
     figure, axes = pyplot(INCHES)()
@@ -30,10 +30,10 @@ def draw(verb: str, name: str, result: dict[str, Any], folder: Path) -> list[Pat
 
 
 def _scale(axes, rows: Rows) -> None:
-    for (series, own), look in zip(_grouped(rows, "series"), _looks()):
+    for (series, own), style in zip(_grouped(rows, "series"), _styles()):
         sizes = [row["vertices"] * row["frames"] for row in own]
-        axes.loglog(sizes, [row["encode ns"] for row in own], label=f"encode: {series}", **look)
-        axes.loglog(sizes, [row["decode, C ns"] for row in own], linestyle="--", **look)
+        axes.loglog(sizes, [row["encode ns"] for row in own], label=f"encode: {series}", **style)
+        axes.loglog(sizes, [row["decode, C ns"] for row in own], linestyle="--", **style)
     _label(axes, "Time by size (dashed: decoding in C)", "vertices x frames", "ns per vertex and frame")
 
 
@@ -51,12 +51,12 @@ def _large(axes, rows: Rows) -> None:
 
 
 def _forest(axes, rows: Rows) -> None:
-    for ((clips, phases), own), look in zip(_grouped(rows, "clips", "phases"), _looks()):
+    for ((clips, phases), own), style in zip(_grouped(rows, "clips", "phases"), _styles()):
         instances = [row["instances"] for row in own]
         name = f"{clips} clip{'s' * (clips > 1)}, {phases} phases"
-        axes.loglog(instances, [row["ms"] for row in own], label=name, **look)
-        axes.loglog(instances, [row["paper ms"] for row in own], **look | {"marker": "", "linestyle": ":"})
-    _label(axes, "A forest on one thread (dotted: on paper)", "instances", "ms a picture")
+        axes.loglog(instances, [row["ms"] for row in own], label=name, **style)
+        axes.loglog(instances, [row["predicted ms"] for row in own], **style | {"marker": "", "linestyle": ":"})
+    _label(axes, "A forest on one thread (dotted: predicted)", "instances", "ms a picture")
 
 
 def _batch(axes, rows: Rows) -> None:
@@ -66,7 +66,8 @@ def _batch(axes, rows: Rows) -> None:
 
 
 def _remote(axes, rows: Rows) -> None:
-    own = [row for row in rows if row["plants"] == max(each["plants"] for each in rows)]
+    most = max(row["plants"] for row in rows)
+    own = [row for row in rows if row["plants"] == most]
     places = range(len(own))
     for shift, column, colour in ((-0.2, "needed", COLOURS[1]), (0.2, "bytes", COLOURS[0])):
         axes.barh([place + shift for place in places], [row[column] for row in own], 0.4, color=colour,
@@ -83,7 +84,7 @@ CHARTS = {"scale": _scale, "large": _large, "forest": _forest, "batch": _batch, 
 
 
 def _grouped(rows: Rows, *names: str) -> Iterator[tuple[Any, Rows]]:
-    """Rows by their value in one column, or their values in several, in the order of these."""
+    """Rows grouped and ordered by their value in one column, or their values in several."""
     def key(row: dict[str, Any]) -> Any:
         values = tuple(row[name] for name in names)
         return values if len(names) > 1 else values[0]
@@ -93,7 +94,7 @@ def _grouped(rows: Rows, *names: str) -> Iterator[tuple[Any, Rows]]:
         yield value, list(own)
 
 
-def _looks() -> Iterator[dict[str, Any]]:
+def _styles() -> Iterator[dict[str, Any]]:
     for number in range(len(MARKERS)):
         yield {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number], "linewidth": 1.5, "markersize": 5}
 

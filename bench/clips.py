@@ -1,5 +1,6 @@
-"""What the verbs share: clips from the command line, a clip encoded into a temporary file, decoded errors, and clips
-made larger and longer."""
+"""Shared by the verbs: clips from the command line, a clip encoded into a temporary file, errors of decoded positions,
+and clips with more plants and frames.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
+from athcodec.encoding import EFFORTS
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
 
@@ -22,7 +24,7 @@ FRAMES_AHEAD = 7
 
 @dataclass(frozen=True)
 class Encoded:
-    """A clip, what encoding it said, and the opened result."""
+    """A clip, the summary of its encoding, and the opened file."""
 
     clip: athcodec.MotionClip
     summary: athcodec.Summary
@@ -39,9 +41,19 @@ def add_rel_error(parser: argparse.ArgumentParser) -> None:
                         help="error bound over the bounding box's diagonal (default %(default)s)")
 
 
+def add_source(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
+                        help="the clip that those measured are made from (default: the sample)")
+
+
+def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
+    parser.add_argument("--effort", choices=EFFORTS, default=default,
+                        help="the encoder's effort (default %(default)s)")
+
+
 @contextmanager
 def encoded(path: Path, rel_error: float, effort: str = "default") -> Iterator[Encoded]:
-    """The clip at `path`, encoded without attributes into a file that goes away with the context."""
+    """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
         file = Path(folder) / "clip.ath"
         summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", effort=effort)
@@ -49,42 +61,43 @@ def encoded(path: Path, rel_error: float, effort: str = "default") -> Iterator[E
             yield Encoded(clip, summary, decoder)
 
 
-def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None) -> ErrorMeter:
+def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None,
+            frames: slice | None = None) -> ErrorMeter:
     """Errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
     meter = ErrorMeter(clip.rest)
-    for start, frames in decoder.blocks(level):
-        meter.add(clip.block(start, start + len(frames)), frames)
+    for start, block in decoder.blocks(level, frames=frames):
+        meter.add(clip.block(start, start + len(block)), block)
     return meter
 
 
 @contextmanager
-def stand_of(path: Path) -> Iterator[Stand]:
+def replicated_plants(path: Path) -> Iterator[ReplicatedPlants]:
     with athcodec.read_hdf5(path) as clip:
-        yield Stand(clip, path.stem)
+        yield ReplicatedPlants(clip, path.stem)
 
 
-class Stand:
-    """Copies of one plant, all in one place, and its motion for as many frames as wanted."""
+class ReplicatedPlants:
+    """Copies of one plant at the same position, with its motion extended to any number of frames."""
 
     def __init__(self, clip: athcodec.MotionClip, name: str) -> None:
         self._clip, self.name = clip, name
         self._positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
 
     def write(self, path: Path, plants: int, frames: int) -> None:
-        """An HDF5 clip."""
+        """Writes an HDF5 clip."""
         source = self._clip
-        parent, moved = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
+        parent, offset = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
         index = None if source.stem_index is None else np.tile(source.stem_index, plants)
         with Hdf5Writer(path, time=np.arange(frames) / source.fps,
-                        vertex_branch=(source.vertex_branch + moved).ravel(),
-                        branch_parent=np.where(parent < 0, -1, parent + moved).ravel(),
+                        vertex_branch=(source.vertex_branch + offset).ravel(),
+                        branch_parent=np.where(parent < 0, -1, parent + offset).ravel(),
                         rest=np.tile(source.rest.astype(np.float32), (plants, 1)), stem_index=index,
                         metadata=source.metadata) as writer:
             for frame in range(frames):
-                writer.add(self._moved(frame, plants).reshape(1, -1, 3))
+                writer.add(self._frame(frame, plants).reshape(1, -1, 3))
 
-    def _moved(self, frame: int, plants: int) -> np.ndarray:
-        """(plants, N, 3): forwards to the last frame and backwards again, each plant further on."""
+    def _frame(self, frame: int, plants: int) -> np.ndarray:
+        """(plants, N, 3): played forwards and backwards in turn, each plant some frames ahead of the one before."""
         last = self._clip.frame_count - 1
         at = (frame + FRAMES_AHEAD * np.arange(plants)) % max(1, 2 * last)
         return self._positions[np.where(at > last, 2 * last - at, at)]

@@ -1,8 +1,8 @@
-"""What points of rate and distortion say of athcodec beside the others: mean savings, ratios, targets.
+"""Comparison of rate-distortion points: mean savings and size ratios of athcodec against others, beside targets.
 
-Works on the points that rd.py measures and measures nothing. A bound's ratio is that of the smallest files
-that each codec makes within that same bound. At equal RMS the points of a codec, which were tuned for the
-bound, make a curve, on which the size is interpolated (curves.py).
+The points come from rd.py. The ratio at a bound is that of the smallest files that each codec makes within this bound.
+For ratios at equal RMS, the points of a codec, which were tuned for the bound, form a curve on which the size is
+interpolated (curves.py).
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from math import exp, log
 from typing import Any
 
+from bench.codec_registry import OURS
 from bench.curves import Curve, mean_saving
-from bench.opponents import OURS
 
 Point = dict[str, Any]
 
@@ -22,7 +22,7 @@ PCA_NAMES = ("pca", "coddyac")
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
-    """Those that ended with bytes and errors within their bound."""
+    """Points with a file whose error is within their bound."""
     return [point for point in points if point["status"] == "ok"]
 
 
@@ -45,7 +45,7 @@ def our_names(points: Iterable[Point]) -> list[str]:
 
 
 def savings(points: list[Point], ours: str) -> list[dict[str, Any]]:
-    """One row for every other codec of one clip: mean saving over the errors that both curves cover."""
+    """A row for every other codec on one clip: mean saving over the errors that both curves cover."""
     rows = []
     for codec in _names(points, lambda point: point["codec"] != ours and point["bound"] > 0):
         row: dict[str, Any] = {"against": codec}
@@ -58,7 +58,7 @@ def savings(points: list[Point], ours: str) -> list[dict[str, Any]]:
 
 
 def ratios(points: list[Point], ours: str) -> list[dict[str, Any]]:
-    """Rows of one clip: the smallest of each kind over ours, at the same error, beside the target."""
+    """Rows for one clip: the smallest size of each kind of codec over ours, at the same error, beside the target."""
     rows = []
     for kind, targets in BOUND_TARGETS.items():
         for bound, target in targets.items():
@@ -84,7 +84,7 @@ def _ratio_row(against: str, error: str, size: float | None, others: dict[str, f
 
 
 def over_clips(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Ratios of all clips put together: the least and the geometric mean of each kind and error."""
+    """Ratios over all clips: the least and the geometric mean for each kind and error."""
     groups: dict[tuple, list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row["codec"], row["against"], row["at"], row["target"]), []).append(row)

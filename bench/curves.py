@@ -24,14 +24,14 @@ class Saving(NamedTuple):
 
 @dataclass(frozen=True)
 class Curve:
-    """Sizes by error, ascending; of several points only those that no other beats in both."""
+    """Sizes by error, ascending; only points that no other point beats in both."""
 
     errors: np.ndarray
     sizes: np.ndarray
 
     @classmethod
     def of(cls, errors, sizes) -> Curve:
-        """Points without an error or a size above 0 have no logarithm and are left out."""
+        """From points in any order; those with an error or a size of 0 have no logarithm and are left out."""
         kept: list[tuple[float, float]] = []
         for error, size in sorted(zip(errors, sizes, strict=True)):
             if error > 0 and size > 0 and (not kept or size < kept[-1][1]):
@@ -55,7 +55,7 @@ class Curve:
 
 
 def mean_saving(ours: Curve, theirs: Curve) -> Saving | None:
-    """What ours saves against theirs; None where the curves have no range of errors in common."""
+    """The saving of `ours` against `theirs`; None if the curves have no range of errors in common."""
     if len(ours) < 2 or len(theirs) < 2:
         return None
     low, high = max(ours.errors[0], theirs.errors[0]), min(ours.errors[-1], theirs.errors[-1])

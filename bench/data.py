@@ -2,8 +2,8 @@
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
 vertices; render meshes with leaves; and any HDF5 clip by its path. All are seeded and differ between machines
-by rounding only. A file says in its attribute "recipe" what it was made from, and is made again where that
-has changed.
+by rounding only. The attribute "recipe" of a file describes how it was made; when the recipe changes, the file is
+made again.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ RECIPE_VERSION = 1  # goes up when the code below or in bench/trees gives other 
 SAMPLE = "sample"
 
 NOTE = """
-Seconds: to make the clip just now, without what it is made from; "-" where it was there. Tips: RMS distance
-of the branches' ends from their mean places, in per cent of the plant's height. Orders: of the branches,
+Seconds: to make the clip, without its source clip; "-" where the file existed. Tips: RMS distance of the
+branches' ends from their mean positions, in per cent of the plant's height. Orders: of the branches,
 trunk 0.
 """
 
@@ -72,7 +72,7 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Refined:
-    """A simulated clip with `factor` vertices per element, and twigs that ride on it."""
+    """A simulated clip with `factor` vertices per element, and twigs attached to it."""
 
     source: str
     frames: int
@@ -125,14 +125,14 @@ SUITES = {"quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"), "full": (SAMPLE, *RE
 
 
 def clips(suite: str, folder: Path | None = None) -> list[tuple[str, Path, str]]:
-    """(name, path, description) of every clip of "quick" or "full", made where it is not there yet."""
+    """(name, path, description) of every clip of "quick" or "full"; missing files are made."""
     return [(name, path_of(name, folder), describe(name)) for name in SUITES[suite]]
 
 
 def path_of(name: str, folder: Path | None = None) -> Path:
-    """The file of a clip by name, made where it is not there yet, or of any HDF5 clip by its path.
+    """The file of a clip by name, made if it is missing, or of any HDF5 clip by its path.
 
-    Raises KeyError for a name that is neither, MissingEngine where MuJoCo is needed and not installed.
+    Raises KeyError for a name that is neither, MissingEngine if MuJoCo is needed and not installed.
     """
     return _found_or_made(name, folder or default_folder())[0]
 
@@ -148,7 +148,7 @@ def default_folder() -> Path:
 
 
 def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
-    """The file, and how long it took to make; None where it was there."""
+    """The file, and the seconds it took to make; None if it existed."""
     if name == SAMPLE:
         return athcodec.sample_path(), None
     if name not in RECIPES:
@@ -179,7 +179,7 @@ def _make(name: str, source_path: Path | None, path: Path) -> float:
 
 
 def recipe_text(name: str) -> str:
-    """All that the clip is made from, its sources' recipes included."""
+    """How the clip is made, as JSON, including the recipes of its sources."""
     recipe = RECIPES[name]
     words = {"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe)
     if recipe.source:
@@ -188,7 +188,7 @@ def recipe_text(name: str) -> str:
 
 
 def _recipe_in(path: Path) -> str | None:
-    """The recipe that a file was made by; None where there is no such file."""
+    """The recipe in a file; None if there is no such file."""
     if not path.is_file():
         return None
     try:
@@ -199,7 +199,7 @@ def _recipe_in(path: Path) -> str | None:
 
 
 def tip_motion(clip: athcodec.MotionClip) -> float:
-    """RMS distance of the stems' last vertices from their mean places, over the plant's height."""
+    """RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
     order = np.arange(clip.vertex_count) if clip.stem_index is None else clip.stem_index
     last = np.lexsort((order, clip.vertex_branch))
     ends = last[np.flatnonzero(np.diff(clip.vertex_branch[last], append=clip.branch_count))]

@@ -1,17 +1,15 @@
-"""Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; beside SZ3, HDF5.
+"""Time and memory of the decoder in C: whole files, levels, playing, seeking, many plants; compared with SZ3 and HDF5.
 
-One thread. The decoder is timed by decode.c, compiled here with the core's own sources and flags: no Python
-is in its loops. Whole decoding takes turns with SZ3 (pysz, where it is installed) and h5py; all see the same
-machine. The decoder's frames are compared with those of athcodec.open by their checksum.
+One thread. The decoder is timed by decode.c, compiled here with the core's own sources and flags, so that no Python is
+in its loops. Runs of whole decoding alternate with SZ3 (pysz, where it is installed) and h5py, so that conditions are
+the same for all. The decoder's frames are compared with those of athcodec.open by their checksum.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
-import shutil
 import subprocess
 import tempfile
 import time
@@ -30,6 +28,8 @@ import athcodec
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
 from bench.clips import add_rel_error
+from bench.codecs.coder import CORE, compile_c
+from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
 
 try:
@@ -40,27 +40,26 @@ except ImportError:
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
 TABLES = ("target", "whole", "levels", "memory", "instances")
 GZIP_CHUNK = 1 << 20
-SZ3_LAYOUTS = {"T,N,3": (0, 1, 2), "N,T,3": (1, 0, 2), "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0),
-               "T,3N": (0, 1, 2), "3N,T": (1, 2, 0)}
+SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")
 SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 
 TARGET_NOTE = """
 Targets: for tree_8k at a bound of 1e-4; printed for every clip. Whole decoding: every segment prepared at the
 deepest level, entropy decoding included, and every frame written as float32 in the source's order; the file
-is open. Playing with decoding: a segment's preparation spread over
-its frames, and showing each between two frames. Prepared: showing alone. Vertices: ath_positions, all of
+is open. Playing with decoding: a segment's preparation divided by its frames, and the evaluation of a pose
+between two frames. Prepared: the evaluation alone. Vertices: ath_positions, all of
 them, in the file's order; matrices: ath_matrices and ath_exact, what a renderer needs. Bytes of level 1:
-prelude and what ath_ranges names. Seek: a random frame, its segment prepared from nothing and the frame
-written; the target is that this costs one segment's preparation, whose mean is given. Memory over positions: all
-that playing takes (table Memory) over one segment's float32 positions.
+prelude and what ath_ranges names. Seek: a random frame, its segment prepared and the frame
+written; the target is the mean cost of preparing one segment. Memory over positions: all memory
+for playing (table Memory) over one segment's float32 positions.
 """
 
 WHOLE_NOTE = """
-All in turns, {rounds} rounds; ratio: this one's median over athcodec's. Each writes into memory that it has
-written before. The last athcodec row opens the file and builds its bases too, as the others do. SZ3 bounds
-values, not distances: it gets bound/sqrt(3), and a distance reaches the bound only where all three axes do.
+Readers alternate, {rounds} rounds; ratio: the reader's median over athcodec's. Each writes into memory that it has
+written before. The second athcodec row includes opening the file and building its bases, as the others do. SZ3 bounds
+values, not distances: its bound is bound/sqrt(3), and a distance reaches the bound only where all three axes do.
 It compresses positions or displacements from the rest pose (then without the rest pose, and without adding
-it again), in {layouts} layouts with {algorithms} algorithms: the set-up with the smallest file, and the
+it again), in {layouts} layouts with {algorithms} algorithms: the configuration with the smallest file, and the
 fastest one. HDF5: float32 positions, gzip 4 with shuffle, chunks of whole frames, exact. Where an .ath file
 was given, these two hold its decoded frames.
 """
@@ -72,15 +71,15 @@ preparation. CRC-32C: of all frames, float32, source order. Bytes with the prelu
 """
 
 MEMORY_NOTE = """
-Bytes. File: as fed, whole; opened: ath_open; bases: ath_build; work: one preparation; segments: prepared
+Bytes. File: all of it in memory; opened: ath_open; bases: ath_build; work: one preparation; segments: prepared
 ones. Nothing else is allocated. Over positions: their sum over the float32 positions of the longest
 segment.
 """
 
 INSTANCES_NOTE = """
-Instances of the clip, each at its own place of the loop, for one second at 30 pictures a second: matrices
-and exact vertices of each written, one instance behind the other, into 64 MiB in turn. Segments are
-prepared before and shared. Even mix: the levels by turns.
+Instances of the clip, each at its own time, for one second at 30 pictures a second: matrices
+and exact vertices of each are written one after the other into a buffer of 64 MiB. Segments are
+prepared before and shared. Even mix: levels in rotation.
 """
 
 
@@ -121,11 +120,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     ], "broken": broken}
 
 
-# ---- what is measured ----
+# ---- clips and the program ----
 
 
 class Case:
-    """A clip's float32 positions and its file, with the program that times the decoder on it."""
+    """A clip's float32 positions and its .ath file, with the program that times the decoder on it."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float, program: Path) -> None:
         self.path, self._program = path, program
@@ -161,30 +160,21 @@ class Case:
 
 
 def compile_program(folder: Path, name: str = "decode") -> Path:
-    """The C program of that name here with the decoder's sources, as CMakeLists.txt names and compiles them."""
-    here = Path(__file__).resolve().parent
-    core = here.parent / "athcodec" / "core"
-    cmake = (core / "CMakeLists.txt").read_text()
-    sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)
-    compiler = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
+    """Compiles NAME.c of this folder with the decoder's sources and flags of CMakeLists.txt."""
+    sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
-    if compiler is None:
-        raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
-    flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
     program = folder / name
-    options = ["-std=c11", "-O3", *flags, f"-I{core}"]
-    files = [here / f"{name}.c", *(core / name for name in sources[1].split())]
-    subprocess.run([*compiler.split(), *options, "-o", program, *files, "-lm"], check=True)
+    compile_c(program, [Path(__file__).with_name(f"{name}.c"), *(CORE / source for source in sources[1].split())])
     return program
 
 
-# ---- whole decoding beside others ----
+# ---- whole decoding, compared with others ----
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Another way to the clip's frames: `read` returns its milliseconds."""
+    """Another reader of the clip's frames; `read` returns the milliseconds of one run."""
 
     name: str
     bytes: int
@@ -195,7 +185,7 @@ class _Reader:
 def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     others = [*_sz3_readers(case), _hdf5_reader(case, folder)]
     decode, opening, read = [], [], {other.name: [] for other in others}
-    for number in range(rounds + 1):  # the first one does not count
+    for number in range(rounds + 1):  # the first round is a warm-up
         ours = case.program("once")
         theirs = {other.name: other.read() for other in others}
         if number:
@@ -241,7 +231,7 @@ def _hdf5_reader(case: Case, folder: Path) -> _Reader:
 
 
 def _sz3_readers(case: Case) -> list[_Reader]:
-    """The set-up with the smallest file, and the one that is decoded fastest."""
+    """The configuration with the smallest file, and the one that decodes fastest."""
     if pysz is None:
         return []
     setups = [_Sz3(case, *setup) for setup in product((False, True), SZ3_LAYOUTS, SZ3_ALGORITHMS)]
@@ -251,16 +241,13 @@ def _sz3_readers(case: Case) -> list[_Reader]:
 
 
 class _Sz3:
-    """The clip compressed by SZ3 in one set-up."""
+    """The clip compressed by SZ3 in one configuration."""
 
     def __init__(self, case: Case, displaced: bool, layout: str, algorithm: str) -> None:
         self.name = f"{'displacements' if displaced else 'positions'} {layout} {algorithm}"
         self._rest = case.rest if displaced else np.float32(0)
-        self._axes = SZ3_LAYOUTS[layout]
-        values = np.ascontiguousarray((case.positions - self._rest).transpose(self._axes))
-        self._unfolded = values.shape
-        if "3N" in layout:
-            values = values.reshape((len(values), -1) if layout == "T,3N" else (-1, values.shape[-1]))
+        self._layout = layout
+        [values] = arrays_of(case.positions - self._rest, layout)
         self._shape = values.shape
         config = pysz.szConfig()
         config.errorBoundMode = pysz.szErrorBoundMode.ABS
@@ -278,8 +265,8 @@ class _Sz3:
         return 1e3 * (time.perf_counter() - start)
 
     def _max_error(self, case: Case) -> float:
-        values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0].reshape(self._unfolded)
-        return case.error_of(values.transpose(np.argsort(self._axes)) + self._rest)
+        values = pysz.sz.decompress(self.compressed, np.float32, self._shape)[0]
+        return case.error_of(from_arrays([values], self._layout, case.positions.shape) + self._rest)
 
 
 # ---- tables ----

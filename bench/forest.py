@@ -1,18 +1,18 @@
-"""What a forest costs: bytes a second and milliseconds a picture, from a formula and by playing it.
+"""The cost of a forest: bytes a second and milliseconds a picture, predicted by a formula and measured by playing it.
 
 The forest. A camera looks into a wedge of 90 degrees, about what a vertical field of view of 60 degrees shows on a
-screen of 16:9. Plants stand evenly in it, one on each square as wide as the plant, the first as far away as that. Each
-shows the level that `ath_depth_for` gives for its distance: at most 1 pixel off on 1,080 lines. Plant i, by distance,
-plays clip i modulo the clips.
+screen of 16:9. Plants stand evenly in it, one in each square as wide as the plant; the nearest is as far away as that.
+Each shows the level that `ath_level_for` gives for its distance: an error of at most 1 pixel on 1,080 lines. Plant i,
+by distance, plays clip i modulo the clips.
 
-The player is that of an engine. Clips loop, and are streamed: of each clip and level in use the segment that plays is
-prepared, the one before, and, a few steps a picture, the one behind; nothing else is kept, so that memory does not
-depend on the length of a clip (clips of up to three segments stay). Plants of a clip lag behind it by one of P phases,
+The player works like an engine's. Clips loop and are streamed: of each clip and level in use the segment that plays is
+prepared, the one before, and, a few steps a picture, the next one; nothing else is kept, so that memory does not depend
+on the length of a clip (clips of up to three segments stay in memory). Plants of a clip are delayed by one of P phases,
 spread over a segment's length. Plants of the same clip, level and phase share a pose (node matrices and exact vertices,
-what a graphics processor needs), made once a picture, clip by clip; what a plant costs by itself is the choice of its
+which a graphics processor needs), evaluated once a picture, clip by clip; a plant itself costs only the choice of its
 level.
 
-On paper, with what one preparation, pose and choice of level cost, poses made of as many clips in turn:
+The prediction, from the cost of one preparation, one pose and one choice of level:
 
     bytes a second = sum over clips of bytes / seconds of the clip, where bytes are those of
                          stems up to the deepest level in use, maps of the levels in use, corrections of the last
@@ -20,13 +20,13 @@ On paper, with what one preparation, pose and choice of level cost, poses made o
                    + sum over clips and levels in use of
                          phases in use * pose + preparing all segments / (seconds of the clip * pictures a second)
 
-Bytes are of streaming: who keeps the files in memory reads each once. Prelude and shapes are read once, at the start.
-Maps of coarser levels, which subtrees that move as one need at finer ones too, are not on paper.
+Bytes are those of streaming; a player that keeps the files in memory reads each once. Prelude and learned shapes are
+read once, at the start. The prediction leaves out maps of coarser levels, which finer levels need where a subtree moves
+as one.
 
-The measured forest is played by forest.c, one thread, files in memory, for as long as a clip; milliseconds are of
-processor time, bytes what its decoders were fed. Clips are made of one clip, each its own way: turned, mirrored, its
-sway larger or smaller, from another frame on; it is played forwards and backwards, slowing down before it turns, so
-that it loops.
+The measured forest is played by forest.c, one thread, files in memory, for the length of a clip; milliseconds are
+processor time, bytes are those fed to its decoders. Its clips are variants of one clip: turned, mirrored, with a larger
+or smaller sway and another start; they play forwards and backwards, slowing down before they turn, so that they loop.
 """
 
 from __future__ import annotations
@@ -48,8 +48,7 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
-from athcodec.encoding import EFFORTS
-from bench.clips import add_rel_error
+from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program
 from bench.tables import table
 
@@ -57,13 +56,13 @@ INSTANCES, CLIPS, PHASES = (1, 100, 10_000), (1, 10, 100), (16, 0)
 FRAMES, RATE, ROUNDS = 480, 60, 3
 FOV, SCREEN, WEDGE = radians(60), 1080, radians(90)
 GOLDEN = 0.6180339887498949
-SLOTS = 3  # segments that forest.c has prepared of a clip and level
+SLOTS = 3  # segments that forest.c keeps prepared for a clip and level
 
 NOTE = """
 Each clip: {frames} frames of {vertices:,} vertices, {seconds:g} s in {segments} segments, made of {source}, bound
 {bound:g}; {rate} pictures a second, one thread, processor time, means over {seconds:g} s; medians of {rounds} rounds.
-Phases: that instances of a clip may have, "own": each one its own. Levels: instances at level 0, 1, ... Poses: that are
-made in each picture. Paper: by the formula, from what one of each costs (below); measured: played. p99: of the
+Phases: of the instances of a clip, "own": one each. Levels: instances at level 0, 1, ... Poses: evaluated for each
+picture. Predicted: by the formula, from unit costs (below); others: measured. p99: of the
 pictures, the 99th percentile. MB: files opened, bases, prepared segments, one work memory; not the compressed bytes,
 nor the poses.
 """
@@ -71,22 +70,22 @@ FORMULA = """
 kB/s = sum over clips of (stems up to the deepest level in use, maps of the levels in use, corrections of the last) /
 seconds of the clip. ms a picture = instances * choice + sum over clips and levels in use of (phases in use * pose +
 preparing all segments / (seconds of the clip * pictures a second)). The wedge has {wedge:.0f} degrees with a plant on
-each {side:.3g} x {side:.3g} of ground; level: ath_depth_for, 1 pixel, field of view 60 degrees, 1,080 lines.
-bench/forest.py says why.
+each {side:.3g} x {side:.3g} of ground; level: ath_level_for, 1 pixel, field of view 60 degrees, 1,080 lines.
+Explained in bench/forest.py.
 """
 PARTS_NOTE = """
-Paper and measured, ms a picture: choosing levels, preparing segments, making poses. Late: preparations that had to be
-finished at once. Start: all that is prepared before the first picture.
+Predicted and measured ms a picture: choosing levels, preparing segments, evaluating poses. Late: preparations that had
+to be finished immediately. Start: everything prepared before the first picture.
 """
 UNITS_NOTE = """
-Means over clips. Prepare: all segments of a clip; pose: one between two frames, of the clips in turn: of many they come
-from memory, of few from the processor's caches; bytes: of motion, to play this level.
+Means over clips. Prepare: all segments of a clip; pose: one between two frames, of the clips in turn: data of many
+clips come from memory, of few from the processor's caches; bytes: of motion, to play this level.
 """
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A clip of the forest: its file, which it has to itself, and what parts of its work cost."""
+    """A clip of the forest: its file, and the unit costs of playing it."""
 
     path: Path
     choice_us: float
@@ -111,7 +110,7 @@ class Unit:
         return self.facts["segments"] <= SLOTS
 
     def bytes(self, levels: set[int]) -> int:
-        """Of motion that a player of these levels reads in a round."""
+        """Bytes of motion that a player of these levels reads per loop."""
         wanted = {ct.STEMS: range(max(levels) + 1), ct.AFFINES: levels, ct.CORRECTIONS: levels}
         return sum(length for kind, level, length in self.facts["chunks"] if level in wanted.get(kind, ()))
 
@@ -124,15 +123,14 @@ class Unit:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what the clips are made of (default: the sample)")
+    add_source(parser)
     parser.add_argument("--instances", type=int, nargs="+", default=list(INSTANCES), metavar="N")
     parser.add_argument("--clips", type=int, nargs="+", default=list(CLIPS), metavar="N", help="unique ones")
     parser.add_argument("--phases", type=int, nargs="+", default=list(PHASES), metavar="N",
-                        help="that instances of a clip may have; 0: each its own")
+                        help="phases of the instances of a clip; 0: one each")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=EFFORTS, default="fast", help="(default %(default)s)")
+    add_effort(parser, "fast")
     add_rel_error(parser)
 
 
@@ -146,24 +144,24 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         side = _side(files[0])
         for scene in _scenes(args, units, side):
             played = scene.play(program, folder, args.rounds)
-            paper = scene.on_paper()
-            rows.append(scene.row(paper, played))
-            parts.append(scene.parts(paper, played))
+            predicted = scene.predict()
+            rows.append(scene.row(predicted, played))
+            parts.append(scene.parts(predicted, played))
             broken += scene.differences(played)
-        unit_rows = [row for each in units.values() for row in _unit_rows(each)]
+        unit_rows = [row for clips in units.values() for row in _unit_rows(clips)]
         facts = units[args.clips[0]][0].facts
     note = NOTE.format(**facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE,
                        rounds=args.rounds)
     return {"tables": [table("Forests", rows, note, FORMULA.format(side=side, wedge=np.degrees(WEDGE))),
-                       table("Where the milliseconds go", parts, PARTS_NOTE),
-                       table("What one of each costs", unit_rows, UNITS_NOTE)], "broken": broken}
+                       table("Time by stage", parts, PARTS_NOTE),
+                       table("Unit costs", unit_rows, UNITS_NOTE)], "broken": broken}
 
 
 # ---- clips ----
 
 
 def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
-    """As many different ones as the largest forest has."""
+    """Files of as many different clips as the largest forest has."""
     files = [folder / f"clip_{number}.ath" for number in range(max(args.clips))]
     with athcodec.read_hdf5(args.of) as clip:
         for number, file in enumerate(files):
@@ -173,7 +171,7 @@ def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
 
 
 def _variant(clip: athcodec.MotionClip, number: int, frames: int) -> athcodec.MotionClip:
-    """The plant turned about its height, every other one mirrored, with a sway and a start of its own."""
+    """The plant turned about the y axis, every other one mirrored, with its own sway and start."""
     source = clip.block(0, clip.frame_count).astype(np.float64)
     turns = max(1, round(frames / (2 * clip.frame_count)))
     swing = np.cos(2 * pi * (turns * np.arange(frames) / frames + GOLDEN * number))
@@ -189,21 +187,21 @@ def _variant(clip: athcodec.MotionClip, number: int, frames: int) -> athcodec.Mo
 
 
 def _turn(angle: float) -> np.ndarray:
-    """About the y axis, (3, 3)."""
+    """Rotation matrix about the y axis, (3, 3)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
 def _side(file: Path) -> float:
-    """The longest of the rest pose's box."""
+    """The longest side of the rest pose's bounding box."""
     with athcodec.open(file) as decoder:
         return float(np.ptp(decoder.rest, axis=0).max())
 
 
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
     measured = _output(program, "units", rounds, *files)
-    return [Unit(file, measured["choice_us"], each["prepare_ms"], measured["pose_us"])
-            for file, each in zip(files, measured["clips"], strict=True)]
+    return [Unit(file, measured["choice_us"], clip["prepare_ms"], measured["pose_us"])
+            for file, clip in zip(files, measured["clips"], strict=True)]
 
 
 def _output(program: Path, *words: object) -> Any:
@@ -252,11 +250,11 @@ class Scene:
 
     @cached_property
     def poses(self) -> Counter:
-        """How many different ones each (clip, level) has."""
+        """Number of different poses of each (clip, level)."""
         shown = {(self.clip_of(i), level, self.phase_of(i)) for i, level in enumerate(self.levels)}
         return Counter((clip, level) for clip, level, _ in shown)
 
-    def on_paper(self) -> dict[str, float]:
+    def predict(self) -> dict[str, float]:
         used: dict[int, set[int]] = {}
         for clip, level in self.poses:
             used.setdefault(clip, set()).add(level)
@@ -267,35 +265,35 @@ class Scene:
                 "pose_ms": sum(count * units[clip].pose_us[level] for (clip, level), count in poses) / 1e3}
 
     def play(self, program: Path, folder: Path, rounds: int) -> dict[str, Any]:
-        """What forest.c says, medians of its times."""
+        """Results of forest.c, with medians of its times."""
         file = folder / "scene.txt"
         file.write_text("\n".join([
             f"{self.phase_count} {len(self.units)}", *(str(unit.path) for unit in self.units),
             f"{len(self.distances)}", *(f"{self.clip_of(i)} {distance!r} {self.phase_of(i)}"
                                         for i, distance in enumerate(self.distances.tolist()))]))
         runs = [_output(program, "play", file, max(unit.seconds for unit in self.units), RATE) for _ in range(rounds)]
-        return runs[0] | {name: median(each[name] for each in runs) for name in runs[0] if name.endswith("_ms")}
+        return runs[0] | {name: median(figures[name] for figures in runs) for name in runs[0] if name.endswith("_ms")}
 
-    def row(self, paper: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
-        on_paper, measured = _ms(paper), _ms(played)
+    def row(self, predicted: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
+        expected, measured = _ms(predicted), _ms(played)
         return self._name() | {
-            "levels": played["levels"], "poses": played["poses"], "paper kB/s": paper["bytes_per_s"] / 1e3,
-            "kB/s": played["bytes_per_s"] / 1e3, "paper ms": on_paper, "ms": measured, "p99 ms": played["p99_ms"],
-            "ms/paper": measured / on_paper, "us/instance": 1e3 * measured / len(self.distances),
+            "levels": played["levels"], "poses": played["poses"], "predicted kB/s": predicted["bytes_per_s"] / 1e3,
+            "kB/s": played["bytes_per_s"] / 1e3, "predicted ms": expected, "ms": measured, "p99 ms": played["p99_ms"],
+            "ms/predicted": measured / expected, "us/instance": 1e3 * measured / len(self.distances),
             "MB": played["memory"] / 1e6}
 
-    def parts(self, paper: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
+    def parts(self, predicted: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
         once = sum(unit.facts["prelude"] for unit in self.units) + played["start_bytes"]
         columns = {}
         for part in ("choose", "prepare", "pose"):
-            columns |= {f"paper {part}": paper[f"{part}_ms"], part: played[f"{part}_ms"]}
+            columns |= {f"predicted {part}": predicted[f"{part}_ms"], part: played[f"{part}_ms"]}
         return self._name() | columns | {"late": played["late"], "start ms": played["start_ms"], "start kB": once / 1e3}
 
     def _name(self) -> dict[str, Any]:
         return {"instances": len(self.distances), "clips": len(self.units), "phases": self.phases or "own"}
 
     def differences(self, played: dict[str, Any]) -> list[str]:
-        """Where the played forest is another than that on paper."""
+        """Where the played forest differs from the predicted one."""
         name = ", ".join(f"{value} {what}" for what, value in self._name().items())
         levels = np.bincount(self.levels).tolist()
         lines = [f"{name}: levels: got {played['levels']}; expected {levels}"] if played["levels"] != levels else []
@@ -311,7 +309,7 @@ def _ms(figures: dict[str, float]) -> float:
 
 
 def _scenes(args: argparse.Namespace, units: dict[int, list[Unit]], side: float) -> Iterator[Scene]:
-    """Every number of instances with every number of clips that it can have."""
+    """Every number of instances with every number of clips up to it."""
     for instances in args.instances:
         for clips in args.clips:
             if clips > instances:
@@ -321,6 +319,6 @@ def _scenes(args: argparse.Namespace, units: dict[int, list[Unit]], side: float)
 
 
 def _distances(count: int, side: float) -> np.ndarray:
-    """From the camera, ascending: plants spread evenly over the wedge behind the nearest place, `side` away."""
+    """Distances from the camera, ascending: plants spread evenly over the wedge, the nearest `side` away."""
     area = (np.arange(count) + 0.5) * side**2
     return np.sqrt(side**2 + 2 * area / WEDGE)

@@ -1,7 +1,7 @@
-"""What it costs to find a clip's branches: the file with those that were found against the one with the true ones.
+"""The cost of detected branches: the file with detected branches compared with the one with the true ones.
 
-The clips are measured as they are and without their branches, edges and names; of a render mesh that leaves faces and
-motion. The true branches are those that the clip was made from.
+Clips are measured as they are and without their branches, edges and names; of a render mesh, faces and motion remain.
+The true branches are those that the clip was made from.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from bench.data import path_of
 from bench.tables import table
 
 NOTE = """
-Bytes: whole files without static arrays, with the true branches and with those found; more: how much larger that is, in
-per cent. Right: of the branches found, per cent that are true ones on their true parents. Seconds: to find them.
+Bytes: whole files without static arrays, with the true branches and with those found; more: increase in per cent.
+Right: per cent of branches found that are true ones on their true parents. Seconds: to find them.
 """
 
 
@@ -46,15 +46,15 @@ def measure(path: Path, rel_error: float) -> dict[str, Any]:
         began = time.perf_counter()
         found = athcodec.find_branches(bare)
         seconds = time.perf_counter() - began
-        true, ours = (athcodec.encode(each, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
-                      for each in (clip, discovery.with_branches(bare, found)))
+        true, ours = (athcodec.encode(variant, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
+                      for variant in (clip, discovery.with_branches(bare, found)))
         return {"clip": path.stem, "vertices": clip.vertex_count, "branches": clip.branch_count,
                 "found": len(found.branch_parent), "by": found.method, "right": right_percent(found, clip),
                 "seconds": seconds, "true bytes": true, "found bytes": ours, "more": 100 * (ours / true - 1)}
 
 
 def right_percent(found: discovery.Found, clip: athcodec.MotionClip) -> float:
-    """Of the branches found, those that hang on the branch that their first vertex's true one hangs on."""
-    whose = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
-    parent = np.where(found.branch_parent < 0, -1, whose[found.branch_parent])
-    return 100 * float((parent == clip.branch_parent[whose]).mean())
+    """Per cent of the branches found whose parent is that of their first vertex's true branch."""
+    true_branch = clip.vertex_branch[np.unique(found.vertex_branch, return_index=True)[1]]
+    parent = np.where(found.branch_parent < 0, -1, true_branch[found.branch_parent])
+    return 100 * float((parent == clip.branch_parent[true_branch]).mean())

@@ -1,9 +1,9 @@
-"""Large meshes and long clips: seconds and memory of encoding against frames and threads, each in a process of its own.
+"""Large meshes and long clips: seconds and memory of encoding by frames and threads, each run in its own process.
 
-Straight stems on stems, each bending to and fro about an axis of its own with two frequencies. The clip lies in an HDF5
-file, written before and read like anybody's, so that seconds, which count from opening it to the .ath file, are the
-encoder's. With --made the frames are made while they are read and never stored: for memory, not for seconds, of which
-making them is then a large part that no thread shares.
+The plant consists of straight stems on stems; each bends about its own axis with two frequencies. The clip is written
+to an HDF5 file first; seconds are those from opening it to the finished .ath file. With --made frames are generated
+while they are read and never stored: this is for measuring memory, since generating them takes much of the time, in one
+thread.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 from bench.tables import table
 
 STEM = 100  # vertices
@@ -31,7 +31,7 @@ FPS = 30.0
 
 NOTE = """
 Peak: the largest resident memory of the process, imports included (60 MB). Linear: seconds per frame over those of the
-shortest clip of as many vertices and threads. Speed-up: against one thread, of the same clip.
+shortest clip with the same vertices and threads. Speed-up: over one thread, for the same clip.
 """
 
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, nargs="+", default=[0], help="threads; 0: as encode decides")
     parser.add_argument("--effort", default="default")
     parser.add_argument("--rel-error", type=float, default=1e-3)
-    parser.add_argument("--made", action="store_true", help="make the frames while they are read")
+    parser.add_argument("--made", action="store_true", help="generate frames while they are read")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 rows.append(json.loads(_process("encode", args.vertices, frames, "" if args.made else path, jobs,
                                                 args.effort, args.rel_error)))
     for row in rows:
-        first = next(each for each in rows if each["threads"] == row["threads"])
-        single = [each for each in rows if each["threads"] == 1 and each["frames"] == row["frames"]]
+        first = next(other for other in rows if other["threads"] == row["threads"])
+        single = [other for other in rows if other["threads"] == 1 and other["frames"] == row["frames"]]
         row["linear"] = row["seconds"] / row["frames"] / (first["seconds"] / first["frames"])
         row["speed-up"] = single[0]["seconds"] / row["seconds"] if single else None
     title = f"Large clips, bound {args.rel_error:g}, effort {args.effort}"
@@ -70,7 +70,7 @@ def _process(*words: object) -> str:
 
 
 def made(vertices: int, frames: int, seed: int = 0) -> MotionClip:
-    """Stems of STEM vertices, each further one on an earlier one, half as long a depth further out."""
+    """Stems of STEM vertices; each but the first stands on an earlier one and is half as long as that."""
     rng, count = np.random.default_rng(seed), vertices // STEM
     parent = (np.arange(count) - 1) // CHILDREN
     parent[0] = -1
@@ -91,7 +91,7 @@ def made(vertices: int, frames: int, seed: int = 0) -> MotionClip:
     across = np.cross(heading, rng.normal(size=(count, 3)))
     across *= (0.05 * length / np.linalg.norm(across, axis=1))[:, None]
     hertz, phase = rng.uniform(0.3, 1.0, count) * 2 ** (depth / 2), rng.uniform(0, 2 * np.pi, count)
-    stems_of = [np.flatnonzero(depth == each) for each in range(depth.max() + 1)]
+    stems_of = [np.flatnonzero(depth == order) for order in range(depth.max() + 1)]
 
     def read(start: int, stop: int) -> np.ndarray:
         out = np.empty((stop - start, count * STEM, 3), np.float32)
@@ -109,7 +109,7 @@ def made(vertices: int, frames: int, seed: int = 0) -> MotionClip:
 
 
 def encode(vertices: int, frames: int, path: str, jobs: int, effort: str, rel_error: float) -> None:
-    """Encodes one clip, that of a file unless its name is empty, and prints its row as JSON."""
+    """Encodes the clip of a file, or a generated one if `path` is empty, and prints its row as JSON."""
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         clip = athcodec.read(path) if path else made(vertices, frames)

@@ -1,8 +1,8 @@
-"""Levels of detail: bytes, errors and gaps at the joints, beside the paper's own approximation A^d.
+"""Levels of detail: bytes, errors and gaps at the joints, compared with the paper's approximation A^d.
 
 Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is athcodec.ath:
-one independent least-squares affine map per piece and frame, as exact matrices, never quantised. Ours is what
-the decoder gives for the bytes of that level.
+one independent least-squares affine map per piece and frame, as exact matrices, never quantised. Ours is the
+decoder's output for the bytes of that level.
 """
 
 from __future__ import annotations
@@ -96,13 +96,13 @@ def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dic
 
 
 def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
-    """What the file says of this level's error, and promises of its last, that decoding does not bear out."""
+    """A line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
     is_last = stored.level == decoder.level_count - 1
-    promised = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
-    if ours.max_error <= promised:
+    allowed = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
+    if ours.max_error <= allowed:
         return []
     return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; "
-            f"expected at most {promised:.9g}"]
+            f"expected at most {allowed:.9g}"]
 
 
 # ---- gaps ----
@@ -123,7 +123,7 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
 
 
 class _Joints:
-    """The attach points between two pieces of a level, by the branches that hang there, in file order."""
+    """The attach points between two pieces of a level, by the branch attached there, in file order."""
 
     def __init__(self, decoder: athcodec.Decoder, level: int) -> None:
         self.decoder, self.level = decoder, level
@@ -140,7 +140,7 @@ class _Joints:
 
     @property
     def loose(self) -> int:
-        """How many of the measured ones carry a translation of their own."""
+        """Number of measured joints with a translation of their own."""
         return int((self.decoder.file.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:

@@ -1,9 +1,8 @@
 """Peak memory of encoding a clip, and the same clip repeated in time.
 
-It must not grow with the number of frames. All encodings have segments as long as those of the single clip,
-so that the number of frames alone differs. Every encoding, and every writing of a longer clip, is a process
-of its own (peak.py), because a process inherits the peak of the one that starts it: this one stays as small
-as its imports.
+It must not grow with the number of frames. All encodings have segments as long as those of the single clip, so that
+only the number of frames differs. Every encoding, and every writing of a longer clip, has its own process
+(memory_worker.py); a process inherits the peak of its parent, so this one allocates little beyond its imports.
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ ROOT = Path(__file__).resolve().parent.parent
 REPEATS = (4, 8)
 
 NOTE = """
-Times: how often the clip is repeated in time, in a gzip-compressed HDF5 file; all in segments of one length.
-Positions: the clip's own raw size. Peak: largest resident memory of the whole process; imports: the same
-before anything is read. A few segments are in work at once: clips with fewer need less.
-HDF5's chunk cache, at most 64 MiB, is part of it: it fills as a clip gets longer.
+Times: repetitions of the clip in a gzip-compressed HDF5 file; all in segments of the same length.
+Positions: raw size of the clip. Peak: largest resident memory of the process; imports: the same
+before anything is read. A few segments are processed at once: clips with fewer need less.
+HDF5's chunk cache, at most 64 MiB, is included: it fills as a clip gets longer.
 """
 
 
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument("--repeats", type=int, nargs="+", default=list(REPEATS), metavar="N",
-                        help="how many times over the clip is encoded too (default 4 8)")
+                        help="numbers of repetitions of the clip (default 4 8)")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -61,7 +60,7 @@ def _segment_frames(path: Path) -> int:
 
 
 def _process(*words: str) -> dict[str, int]:
-    command = [sys.executable, "-m", "bench.peak", *words]
+    command = [sys.executable, "-m", "bench.memory_worker", *words]
     done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
     return json.loads(done.stdout)
 

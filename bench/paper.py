@@ -1,9 +1,9 @@
-"""The paper's table 1 again, with one of our clips: nodes, memory, loading and synthesis times, ratio.
+"""Table 1 of the paper for one of our clips: nodes, memory, loading and synthesis times, ratio.
 
 Song, Yang and Peng, "Hierarchical approximation of plant motion", Journal of Image and Graphics 16(8), 2011,
-section 5. Our parameters are eta and lambda in proportion to the clip's frames and vertices, epsilon in the
-paper's proportion to xi, and the xi that gives the number of nodes nearest to the paper's. The file keeps its
-bound whatever the nodes are: they decide what its levels show. Times are those of the C decoder (decode.py).
+section 5. Our parameters: eta and lambda in proportion to the clip's frames and vertices, epsilon in the paper's
+proportion to xi, and the xi that gives the number of nodes nearest to the paper's. The file keeps its bound for any
+nodes: they only determine its levels. Times are those of the C decoder (decode.py).
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def thresholds_for(clip: athcodec.MotionClip, nodes: int) -> Thresholds:
-    """Parameters whose ATH has nearly so many nodes; fewer where the clip has fewer branches."""
+    """Parameters whose ATH has about so many nodes, or fewer if the clip has fewer branches."""
     hierarchy = hierarchy_of(clip)
     eta = round(PAPER["eta"] * clip.frame_count / PAPER["frames"])
     lam = max(1, round(PAPER["lambda"] * clip.vertex_count / PAPER["vertices"]))

@@ -1,7 +1,7 @@
 """A picture of the levels: one frame of a clip as decoded at each level, over the original, as SVG.
 
-Every branch is drawn as a line along its vertices, from its attach point to its tip, seen from the front. Colour tells
-how far a branch is off: black within the file's bound, red from the tenth of the largest error up.
+Every branch is drawn as a line along its vertices, from its attach point to its tip, in front view. Colour shows the
+largest error of a branch: from black at zero to red at a tenth of the largest error of all, and above.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Rate against the largest error, rate against the RMS error, and the growing prefix of one file. Both axes are
 logarithmic. Colours are those of Okabe and Ito ("Color universal design", 2008), which colour-blind people
-can tell apart, without the yellow, which is faint on white; every curve has a marker of its own too, so that
-a picture works in grey.
+can tell apart, without the yellow, which is faint on white; every curve has its own marker too, so that the
+pictures are readable in grey.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
+from bench.codec_registry import OURS
 from bench.compare import Point, is_pca, measured
-from bench.opponents import OURS
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7A7A7A")
 MARKERS = "svDP<>pXh8*d^"
@@ -41,7 +41,7 @@ def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path,
 
 
 def pyplot(inches: tuple[float, float]):
-    """A function that makes a figure of a size and its axes, without a screen. Raises NoPlots."""
+    """A function that makes a figure of this size and its axes, without a display. Raises NoPlots."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -62,24 +62,24 @@ def file_name(clip: str, what: str) -> str:
 
 def _rate_picture(figure_of, points: list[Point], error: str, clip: str):
     figure, axes = figure_of()
-    looks = zip(cycle(COLOURS[1:]), cycle(MARKERS))
+    styles = zip(cycle(COLOURS[1:]), cycle(MARKERS))
     for codec in dict.fromkeys(point["codec"] for point in points):
         own = sorted((point for point in points if point["codec"] == codec), key=lambda point: point["bits"])
         own = [point for point in own if point[error] > 0]
-        if not own:  # without any loss there is no place on a logarithmic axis
+        if not own:  # lossless points have no place on a logarithmic axis
             continue
-        look = _look(own[0], looks)
-        axes.plot([point["bits"] for point in own], [point[error] for point in own], label=codec, **look)
+        line = _style_of(own[0], styles)
+        axes.plot([point["bits"] for point in own], [point[error] for point in own], label=codec, **line)
     name = "rate against largest error" if error == "max" else "rate against RMS error"
     _label(axes, f"{clip}: {name}", "bits per vertex and frame", ERRORS[error])
     figure.legend(fontsize=8, loc="outside right upper")
     return figure
 
 
-def _look(point: Point, looks) -> dict[str, Any]:
+def _style_of(point: Point, styles) -> dict[str, Any]:
     if point["kind"] == OURS:
         return {"color": COLOURS[0], "marker": "o", "linewidth": 2.6, "zorder": 5}
-    colour, marker = next(looks)
+    colour, marker = next(styles)
     style = ":" if is_pca(point) else STYLES[point["kind"]]
     return {"color": colour, "marker": marker, "linestyle": style, "linewidth": 1.3, "markersize": 5}
 

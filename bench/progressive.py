@@ -1,12 +1,11 @@
-"""What a growing prefix of one .ath file shows, and what it costs that a file can be cut at all.
+"""The error of growing prefixes of one .ath file, and the cost in bytes of levels that can be truncated.
 
-The curve: after every level and segment of one file, the bytes so far and the error of what they show, where
-segments that have the next level already show it. Errors are measured on what athcodec decodes from just that
-many bytes; those that follow from the file's own table stand beside them. The yardstick are files of their
-own, each coded for a looser bound.
+The curve: after every level and segment of one file, the bytes so far and the error of the decoded positions; segments
+whose next level is complete use it. Errors are measured on what athcodec decodes from exactly that many bytes, beside
+those that the file's table states. They are compared with separate files, each coded for a looser bound.
 
-The cost: the same clip coded without intermediate levels, with the encoder's own stages: the same settings,
-every stem's modes together in one stream per segment, no maps of nodes, a table of one level.
+The cost: the same clip coded without intermediate levels by the encoder's own stages: the same settings, every stem's
+modes in one stream per segment, no maps of nodes, a table of one level.
 """
 
 from __future__ import annotations
@@ -27,27 +26,26 @@ from athcodec.encoding.streams import encode_learned_modes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
 from athcodec.segmentation import DEFAULT_SEGMENT
-from bench.clips import Encoded, encoded
+from bench.clips import Encoded, encoded, measure
 
 TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
 ROUNDING = 1e-6  # the error table holds float32
 
 CURVE_NOTE = """
-Bytes of the file from its start; segments: how many of them show this level, the others the one before. Max
-and RMS over the diagonal, decoded from a file that ends there; 'table' is what the file itself says of it.
-Single file: bytes of a file of its own, coded for a bound that leaves the same largest error, on the straight
-line (log-log) between files coded for looser bounds; prefix/single is what one file for all distances costs.
+Bytes: length of the prefix; segments: number at this level, the others are at the one before. Max and RMS over
+the diagonal, decoded from the prefix; 'table': as stated in the file. Single file: bytes of a separate file with
+the same largest error, interpolated (log-log) between files coded for looser bounds; prefix/single: the cost of one
+file for all distances.
 """
 
 COST_NOTE = """
-Bytes of whole files. AFFINES: maps of nodes, which only a file that is cut needs. Early split: a leaf of the
-ATH that is one short stem has its first modes in the stream of its node's level and the rest one level
-deeper; the clip was coded again with each stem's modes together, levels otherwise kept, and this is what
-that saves. One stream: what is saved by coding all levels, unsplit, in one stream per segment. All three at
-the file's steps, with the best of its rotation factors and time bases for all levels (split and unsplit: or
-those of the file), corrections counted; below 0: nothing is saved. Table: entries for chunks and errors of
-the levels before the last. Without: the file less AFFINES, table and the better of the other two; cost: what
-the file has above that.
+Bytes of whole files. AFFINES: maps of nodes, which only truncated files need. Early split: a leaf of the ATH
+that is one short stem has its first modes in the stream of its node's level and the rest one level deeper; this
+is the saving of coding each stem's modes together, with levels otherwise unchanged. One stream: the saving of coding
+all levels, unsplit, in one stream per segment. All three with the file's steps and the best of its rotation factors
+and time bases for all levels (split and unsplit: or those of the file), including corrections; below 0: no saving.
+Table: entries for chunks and errors of the levels before the last. Without: the file less AFFINES, table and the
+larger of the two savings; cost: the excess of the file over that.
 """
 
 
@@ -55,14 +53,14 @@ the file has above that.
 
 
 def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[str, Any]:
-    """{"steps": rows by growing prefix, "single": files of their own at looser bounds, "broken": lines}."""
+    """{"steps": rows by growing prefix, "single": separate files at looser bounds, "broken": lines}."""
     with encoded(clip_path, rel_error) as result:
         diagonal = _diagonal(result)
         steps = _steps(result, diagonal)
     single = []
     for bound in (*(bound for bound in looser if bound > rel_error), rel_error):
         with encoded(clip_path, bound) as result:
-            meter = _measured(result.clip, result.decoder, 0, result.clip.frame_count, None)
+            meter = measure(result.clip, result.decoder)
             single.append({"bound": bound, "bytes": result.summary.bytes, "max": meter.max_error / diagonal,
                            "rms": meter.rms_error / diagonal})
     broken = [f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
@@ -78,12 +76,12 @@ def _diagonal(result: Encoded) -> float:
 def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
     decoder, clip = result.decoder, result.clip
     whole = result.summary.path.read_bytes()
-    decoded: dict[int, ErrorMeter] = {}  # what each segment shows at best so far
+    decoded: dict[int, ErrorMeter] = {}  # by segment, at its deepest complete level
     level_of: dict[int, int] = {}
     rows = []
     for level, segment, end in _boundaries(decoder):
         with athcodec.open(io.BytesIO(whole[:end])) as cut:
-            decoded[segment] = _measured(clip, cut, *decoder.segments[segment], level)
+            decoded[segment] = measure(clip, cut, level, slice(*decoder.segments[segment]))
         level_of[segment] = level
         if len(level_of) == len(decoder.segments):
             done = sum(shown == level for shown in level_of.values())
@@ -105,14 +103,6 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
             before = ends.get((level, segment), before)
             found.append((level, segment, before))
     return found
-
-
-def _measured(clip: athcodec.MotionClip, decoder: athcodec.Decoder, start: int, stop: int,
-              level: int | None) -> ErrorMeter:
-    meter = ErrorMeter()
-    for first, frames in decoder.blocks(level, frames=slice(start, stop)):
-        meter.add(clip.block(first, first + len(frames)), frames)
-    return meter
 
 
 def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
@@ -140,25 +130,25 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
 
 
 def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
-    """One row: bytes of a file, what each thing that serves its levels takes, and bytes without them."""
+    """One row: bytes of a file, bytes of each part that serves its levels, and bytes without them."""
     with encoded(clip_path, rel_error) as result:
         chunks, sizes = result.decoder.file.chunks, result.summary.chunk_bytes
         levels, segments = result.decoder.level_count, len(result.decoder.segments)
     with athcodec.read_hdf5(clip_path) as clip:
-        return _cost(_Again(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
+        return _cost(_Recoding(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
 
 
-def _cost(again: _Again, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
+def _cost(recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
           bytes_: int) -> dict[str, Any]:
-    stored = again.streams(again.settings)
+    stored = recoding.streams(recoding.settings)
     in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
     if stored != in_file:
-        raise RuntimeError(f"{again.name}: got {stored} bytes of motion when coding "
+        raise RuntimeError(f"{recoding.name}: got {stored} bytes of motion when coding "
                            f"again; expected the {in_file} of the file")
-    uniform = again.of_one_level()
-    split = min(stored, *(again.streams(settings) for settings in uniform))
-    unsplit = min(again.streams(settings, split=False) for settings in (again.settings, *uniform))
-    merged = min(again.streams(settings, split=False, one_level=True) for settings in uniform)
+    uniform = recoding.of_one_level()
+    split = min(stored, *(recoding.streams(settings) for settings in uniform))
+    unsplit = min(recoding.streams(settings, split=False) for settings in (recoding.settings, *uniform))
+    merged = min(recoding.streams(settings, split=False, one_level=True) for settings in uniform)
     table = (TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
              + ERROR_ENTRY * (levels - 1) * segments)
     affines = sizes.get("AFFINES", 0)
@@ -169,12 +159,12 @@ def _cost(again: _Again, chunks: list[ct.Chunk], sizes: dict[str, int], levels: 
 
 
 def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
-    """Chunks that a file of one level would not have; the others stand at the last one."""
+    """Whether a file of one level would not have the chunk."""
     return chunk.kind == ct.AFFINES or (chunk.kind in (ct.STEMS, ct.SHAPES) and chunk.level < last)
 
 
-class _Again:
-    """The clip in the encoder's own stages, at the settings that the encoder finds."""
+class _Recoding:
+    """The clip coded by the encoder's own stages, at the settings that the encoder finds."""
 
     def __init__(self, clip: athcodec.MotionClip, rel_error: float) -> None:
         hierarchy = hierarchy_of(clip)
@@ -188,11 +178,11 @@ class _Again:
         self.settings = self._search.found()
 
     def of_one_level(self) -> list[Settings]:
-        """Settings that a single stream could have: what the levels have now, the same for all of them."""
+        """Settings for a single stream: those of each level in turn, applied to all levels."""
         levels = len(self.settings.rotation_step_factors)
         pairs = sorted(set(zip(self.settings.rotation_step_factors, self.settings.learned_bases, strict=True)))
-        return [replace(self.settings, rotation_step_factors=(rotation_step_factors,) * levels, learned_bases=(learned,) * levels)
-                for rotation_step_factors, learned in pairs]
+        return [replace(self.settings, rotation_step_factors=(factors,) * levels, learned_bases=(learned,) * levels)
+                for factors, learned in pairs]
 
     def streams(self, settings: Settings, split: bool = True, one_level: bool = False) -> int:
         """Bytes of all learned_modes, stems and corrections."""

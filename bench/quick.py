@@ -1,8 +1,7 @@
-"""Everything in small, in two minutes: codecs, the decoder, the paper's table, scaling, forests, URLs, the report.
+"""A short run of the main verbs, two minutes: codecs, decoder, the paper's table, scaling, forests, URLs, report.
 
-Each step is a command of its own, as it would be typed; its JSON and the report go to one folder. What takes
-long is left out: most codecs, most bounds, large clips. That nothing breaks is what it is for; figures to
-quote come from the full runs.
+Each step is a separate command; its JSON and the report go to one folder. What takes long is left out: most codecs,
+most bounds, large clips. It checks that everything works; figures to quote come from the full runs.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ CODECS = ("athcodec", "float16 or integers + zstd", "pcodec",
           "trajectory PCA + hierarchy (CoDDyAC), range coder")
 BOUNDS = (1e-3, 1e-4)
 
-NOTE = "Seconds of each step, start of Python included."
+NOTE = "Seconds of each step, including the start of Python."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,10 +1,10 @@
-"""Rate and distortion of athcodec beside baselines and programs: every codec, at every bound, on every clip.
+"""Rate and distortion of athcodec, baselines and programs: every codec, at every bound, on every clip.
 
 Each codec makes the smallest file it can within the bound; one process encodes, another decodes the bytes and
-measures (point.py). A codec that is missing, breaks the bound, crashes or takes too long is a row that says
-so. With --json the results are kept as they come: a run that was stopped goes on where it was, and what is
-there from the same clip, code and versions is not measured again. Then what follows from the points: mean
-savings and ratios (compare.py), the growing prefix of one file and what it costs (progressive.py).
+measures (rd_worker.py). A codec that is missing, exceeds the bound, crashes or takes too long gets a row
+that says so. With --json results are saved as they are measured: a run that was stopped resumes there, and a result of
+the same clip, code and versions is not measured again. The tables add mean
+savings and ratios (compare.py), and the error and cost of growing prefixes of one file (progressive.py).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from typing import Any
 import athcodec
 from bench import compare, data, progressive
 from bench.clips import REL_ERROR
+from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
 from bench.codecs import Codec
 from bench.curves import Curve
-from bench.opponents import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
 from bench.store import Store
 from bench.suite import SUITES, Case, cases, digest
 from bench.tables import cpu_model, environment, table
@@ -76,17 +76,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--codecs", nargs="+", metavar="NAME", default=[],
                         help="codecs to measure (default: all), or MODULE:NAME for one of your own")
     parser.add_argument("--lossless", action="store_true",
-                        help="measure the programs that can give every bit back too, once per clip")
+                        help="measure lossless modes of the programs too, once per clip")
     parser.add_argument("--timeout", type=float, default=TIMEOUT, metavar="SECONDS",
                         help="for one encoding or decoding (default %(default)s)")
-    parser.add_argument("--again", action="store_true", help="run again what failed or was too slow")
+    parser.add_argument("--again", action="store_true", help="repeat what failed or was too slow")
     parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    file, args.json = args.json, None  # written by the store; a listing is no result
     if args.list:
         return _listing(args)
-    store = Store(args.json, environment(args.argv), KEYS)
+    store = Store(file, environment(args.argv), KEYS)
     codecs, bounds = _codecs(args), tuple(args.bounds or BOUNDS[args.suite])
     clips = cases(args.clips, args.suite)
     for case in clips:
@@ -107,7 +108,6 @@ def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
 
 
 def _listing(args: argparse.Namespace) -> dict[str, Any]:
-    args.json = None  # a list is no result: what is in the file stays
     codecs = [{"codec": codec.name, "kind": codec.kind, "can run": codec.missing() or "yes"}
               for codec in all_codecs()]
     clips = [{"clip": name, "what": data.describe(name)} for name in data.SUITES[args.suite]]
@@ -115,7 +115,7 @@ def _listing(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _about(store: Store, case: Case) -> dict[str, Any]:
-    """What a clip is, with a digest of its content."""
+    """Facts about a clip, with a digest of its content."""
     if case.path is None:
         return store.add("clips", {"clip": case.name, "what": case.description})
     with athcodec.read_hdf5(case.path) as clip:
@@ -130,7 +130,7 @@ def _about(store: Store, case: Case) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Job:
-    """One codec at one bound on one clip; `name` is what finds the codec in another process."""
+    """One codec at one bound on one clip; `name` identifies the codec in another process."""
 
     case: Case
     name: str
@@ -157,12 +157,12 @@ def _point(job: _Job, store: Store, again: bool) -> None:
     if why and _was_measured(job, store):
         return
     result = {"status": MISSING, "why": why} if why else _measure(job)
-    _say(job, result)
+    _print_progress(job, result)
     store.add("points", job.identity | result | {"cpu": cpu_model(), "depends": job.depends})
 
 
 def _was_measured(job: _Job, store: Store) -> bool:
-    """Whether there is a result of this clip from when, or where, the codec could run."""
+    """Whether there is a result of this clip, from another machine or time at which the codec could run."""
     known = store.find("points", job.identity)
     return known is not None and known["status"] == OK and known["depends"]["clip"] == job.digest
 
@@ -185,16 +185,16 @@ def _measure(job: _Job) -> dict[str, Any]:
 
 
 class _Failed(Exception):
-    """A process of point.py ended without a result."""
+    """A process of rd_worker.py ended without a result."""
 
 
 def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
-    command = [sys.executable, "-m", "bench.point", *words]
+    command = [sys.executable, "-m", "bench.rd_worker", *words]
     with subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                           start_new_session=True) as process:
         try:
             out, errors = process.communicate(timeout=timeout)
-        except BaseException:  # a program that the codec has started must not go on either
+        except BaseException:  # ends programs that the codec has started too
             os.killpg(process.pid, signal.SIGKILL)
             raise
     if process.returncode < 0:
@@ -206,8 +206,7 @@ def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
     return json.loads(out.splitlines()[-1])
 
 
-def _say(job: _Job, result: dict[str, Any]) -> None:
-    """A line of progress."""
+def _print_progress(job: _Job, result: dict[str, Any]) -> None:
     end = f"{result['bytes']:,} bytes" if result["status"] == OK else f"{result['status']}: {result['why']}"
     print(f"{job.case.name}, {job.codec.name}, {job.bound:g}: {end}", file=sys.stderr, flush=True)
 
@@ -216,7 +215,7 @@ def _say(job: _Job, result: dict[str, Any]) -> None:
 
 
 def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str, store: Store) -> None:
-    """The progressive curve at the default bound, or the one nearest to it, and the cost of the levels."""
+    """The progressive curve at the bound nearest to the default, and the cost of the levels."""
     depends = {"clip": clip_digest, "looser": str(LOOSER[suite])} | fingerprint_of_athcodec()
     shown = min(bounds, key=lambda bound: (abs(bound / REL_ERROR - 1), bound))
     costs = [bound for bound in COST_BOUNDS[suite] if bound in bounds] or [shown]
@@ -233,7 +232,7 @@ def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str,
 
 def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None,
             ) -> dict[str, Any]:
-    """All results, and tables of those of these clips and bounds (None: all bounds)."""
+    """Tables of the results of these clips and bounds (None: all bounds)."""
     tables = [_clips_table([row for row in contents["clips"] if row["clip"] in clips])]
     points = [point for point in contents["points"]
               if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))]
@@ -251,11 +250,11 @@ def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds:
         tables += _level_tables(contents, clip)
     if len(clips) > 1:
         tables.append(table("Ratios over all clips", compare.over_clips(all_ratios), OVER_CLIPS_NOTE))
-    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))} | contents
+    return {"tables": tables, "broken": list(_broken(points, contents["curves"]))}
 
 
 def title(clip: str) -> str:
-    """Of the table of a clip's points."""
+    """Title of the table of a clip's points."""
     return f"Rate and distortion: {clip}"
 
 
@@ -275,9 +274,8 @@ def _row(point: dict[str, Any]) -> dict[str, Any]:
                 "bits": point["bits"]}
     if "max" in point:
         row |= {"max": point["max"], "RMS": point["rms"], "KG %": point["kg"], "motion": point["motion"]}
-    if point["status"] == OK:
-        return _ordered(row | {"settings": _words(point["settings"])})
-    return _ordered(row | {"settings": f"{point['status'].upper()}: {point['why']}".replace("|", "/")})
+    settings = point["settings"] if point["status"] == OK else f"{point['status'].upper()}: {point['why']}"
+    return _ordered(row | {"settings": settings.replace("|", "/")})
 
 
 COLUMNS = ("codec", "bound", "bytes", "bits", "max", "RMS", "KG %", "motion", "encode s", "runs", "decode s",
@@ -288,26 +286,17 @@ def _ordered(row: dict[str, Any]) -> dict[str, Any]:
     return {name: row.get(name) for name in COLUMNS}
 
 
-def _words(settings: Any) -> str:
-    """Settings on one line."""
-    if isinstance(settings, dict):
-        return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
-    if isinstance(settings, list):
-        return " ".join(map(_words, settings))
-    return f"{settings:.4g}" if isinstance(settings, float) else str(settings).replace("|", "/")
-
-
 def _processors(points: list[dict[str, Any]]) -> str:
     names = dict.fromkeys(point["cpu"] for point in points)
     return f"Processor: {'; '.join(names)}."
 
 
 def _absent(points: list[dict[str, Any]]) -> list[str]:
-    """Who could have been the best, and did not take part: not one point of theirs was measured."""
+    """A note on the codecs without any measured point."""
     present = {point["codec"] for point in compare.measured(points)}
     absent = {point["codec"]: point["status"] for point in points if point["codec"] not in present}
     names = ", ".join(f"{name} ({why})" for name, why in absent.items())
-    return [f"Not among them: {names}."] if absent else []
+    return [f"Not measured: {names}."] if absent else []
 
 
 def _level_tables(contents: dict[str, list[dict[str, Any]]], clip: str) -> Iterator[dict[str, Any]]:
@@ -330,7 +319,7 @@ def _step_row(row: dict[str, Any], single: float | None) -> dict[str, Any]:
 
 
 def _broken(points: list[dict[str, Any]], curves: list[dict[str, Any]]) -> Iterator[str]:
-    """Lines for what must not happen to code of this project; of a program the row alone says it."""
+    """Faults of athcodec and the baselines; those of programs are only rows."""
     for point in points:
         if point["status"] in (BROKEN, FAILED) and point["kind"] != "program":
             yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: "

@@ -1,8 +1,8 @@
 """Requests and bytes over HTTP: opening a long clip and showing one frame of it, a level of it, checking it.
 
-A real server with byte ranges on this machine, with and without a delay before each answer. Each row opens the file
-anew. Requests and bytes are what the reader counts, and have to be those that the server has answered. The clips are
-copies of one plant, all in one place, played forwards and backwards.
+A real server with byte ranges on this machine, with and without a delay before each response. Each row opens the file
+anew. Requests and bytes are counted by the reader, and must agree with the server's log. The clips are copies of one
+plant at the same position, played forwards and backwards.
 """
 
 from __future__ import annotations
@@ -19,45 +19,43 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.encoding import EFFORTS
 from athcodec.remote import READ_AHEAD
-from bench.clips import add_rel_error, stand_of
-from bench.line import Line
+from bench.clips import ReplicatedPlants, add_effort, add_rel_error, add_source, replicated_plants
 from bench.tables import table
+from bench.throttled_server import ThrottledServer
 
 PLANTS, FRAMES, FRAME, LATENCY, ROUNDS = (1, 20), 1000, 700, 0.05, 5
 TARGET = 4  # requests to open a file and show a frame of it coarsely
 NAME = "clip.ath"
 
 NOTE = """
-Each row: opening the file, and what it says; {frames:,} frames, bound {bound:g}. Needed: bytes that a reader of a local
-file touches, prelude included. Over HTTP {ahead:,} bytes come with the first request whatever they are, and each level
-of a segment is a request of its own unless it is near. Seconds: with answers at once, and {latency:g} ms after they
-were asked for; medians of {rounds}, files in memory, decoding included.
+Each row: opening the file, and the named step; {frames:,} frames, bound {bound:g}. Needed: bytes that a reader of a
+local file touches, prelude included. Over HTTP the first request always fetches {ahead:,} bytes, and each level of a
+segment is a separate request unless it is near. Seconds: without delay, and with a delay of {latency:g} ms before each
+response; medians of {rounds}, files in memory, decoding included.
 """
 
 Step = Callable[[athcodec.Decoder], Any]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="the plant (default: the sample)")
+    add_source(parser)
     parser.add_argument("--plants", type=int, nargs="+", default=list(PLANTS), metavar="N",
                         help="copies of it in a clip (default 1 20)")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--frame", type=int, default=FRAME, metavar="N", help="that is shown (default %(default)s)")
     parser.add_argument("--latency", type=float, default=LATENCY, metavar="SECONDS",
-                        help="before an answer (default %(default)s)")
+                        help="before a response (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
-    parser.add_argument("--effort", choices=EFFORTS, default="fast", help="(default %(default)s)")
+    add_effort(parser, "fast")
     add_rel_error(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, broken = [], []
-    with tempfile.TemporaryDirectory() as folder, stand_of(args.of) as stand:
+    with tempfile.TemporaryDirectory() as folder, replicated_plants(args.of) as replicated:
         for plants in args.plants:
-            file = _make(stand, Path(folder), plants, args)
+            file = _make(replicated, Path(folder), plants, args)
             for row, lines in _rows(file, args):
                 rows.append({"plants": plants} | row)
                 broken += lines
@@ -66,16 +64,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": [table("A clip behind a URL", rows, note)], "broken": broken}
 
 
-def _make(stand, folder: Path, plants: int, args: argparse.Namespace) -> Path:
+def _make(replicated: ReplicatedPlants, folder: Path, plants: int, args: argparse.Namespace) -> Path:
     source, file = folder / "clip.h5", folder / NAME
-    stand.write(source, plants, args.frames)
+    replicated.write(source, plants, args.frames)
     with athcodec.read_hdf5(source) as clip:
         athcodec.encode(clip, file, rel_error=args.rel_error, effort=args.effort, attributes="none")
     return file
 
 
 def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
-    """What is done with an opened file, and how many requests it may take."""
+    """What is done with an opened file, and the largest allowed number of requests."""
     return {"open": (lambda decoder: None, None),
             f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, level=1), TARGET),
             f"frame {frame} in full": (lambda decoder: decoder.positions(frame), None),
@@ -86,24 +84,24 @@ def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
 
 
 def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any], list[str]]]:
-    """A row, and what is wrong with it, for every step."""
+    """A row and its faults for every step."""
     data = file.read_bytes()
     for what, (step, allowed) in _steps(args.frame).items():
         row = {"what": what, "requests": 0, "allowed": allowed, "bytes": 0, "needed": _needed(file, step)}
         for name, latency in (("s", 0.0), (f"s at {1e3 * args.latency:g} ms", args.latency)):
-            with Line({NAME: data}, latency=latency) as server:
+            with ThrottledServer({NAME: data}, latency=latency) as server:
                 row[name], row["requests"], row["bytes"] = _measure(server, step, args.rounds)
                 answered = len(server.log) // args.rounds, server.sent(NAME) // args.rounds
         lines = []
         if (row["requests"], row["bytes"]) != answered:
             lines.append(f"{what}: the reader counts {row['requests']} requests, {row['bytes']} bytes; the server "
-                         f"answered {answered[0]} with {answered[1]}")
+                         f"{answered[0]} and {answered[1]}")
         if allowed is not None and row["requests"] > allowed:
             lines.append(f"{what}: got {row['requests']} requests; expected at most {allowed}")
         yield row | {"bytes/needed": row["bytes"] / row["needed"], "file": len(data)}, lines
 
 
-def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
+def _measure(server: ThrottledServer, step: Step, rounds: int) -> tuple[float, int, int]:
     """Seconds, the median of some rounds; requests and bytes of one."""
     seconds = []
     for _ in range(rounds):
@@ -115,8 +113,8 @@ def _measure(server: Line, step: Step, rounds: int) -> tuple[float, int, int]:
     return median(seconds), requests, size
 
 
-class _Plain(io.FileIO):
-    """A file that knows which of its bytes were read."""
+class _CountingFile(io.FileIO):
+    """A file that records which of its bytes were read."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(file)
@@ -129,6 +127,6 @@ class _Plain(io.FileIO):
 
 
 def _needed(file: Path, step: Step) -> int:
-    with _Plain(file) as source, athcodec.open(source) as decoder:
+    with _CountingFile(file) as source, athcodec.open(source) as decoder:
         step(decoder)
         return int(source.touched.sum())

@@ -1,24 +1,24 @@
-"""One page from all results: what the clips are, every table with the command that made it, pictures.
+"""One page from all results: the clips, every table with the command that made it, pictures.
 
-Reads the JSON files of a folder (of any verb) and writes report.md and, where matplotlib is installed, the
-pictures of plots.py and charts.py beside them. Measures nothing: a verb that has no file there has no section.
+Reads the JSON files of a folder (of any verb) and writes report.md and, where matplotlib is installed, the pictures of
+plots.py and charts.py beside them. Measures nothing: a verb without a file has no section.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
-from bench import charts, plots, rd
+from bench import charts, plots, rd, store
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
 TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
           "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
           "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "large": "Large clips",
-          "forest": "Forests", "batch": "Many clips", "drill": "What a batch survives", "remote": "Behind a URL"}
+          "forest": "Forests", "batch": "Many clips", "fault-injection": "A batch under fault injection",
+          "remote": "Behind a URL"}
 
 ORDER = {verb: place for place, verb in enumerate(TITLES)}
 
@@ -26,7 +26,7 @@ INTRODUCTION = """# What athcodec measures
 
 Written by `python -m bench report` from the JSON files beside it, which hold the unrounded figures. Every
 section names the command that made it, with versions and machine at its end. Errors are Euclidean distances,
-over the diagonal of the bounding box of all frames where nothing else is said; 1 kB is 1,000 bytes.
+over the diagonal of the bounding box of all frames unless stated otherwise; 1 kB is 1,000 bytes.
 """
 
 PICTURES = """In the pictures, thick: athcodec; full lines: baselines implemented here; dotted: those on
@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def write(folder: Path) -> dict[str, Any]:
-    """Writes report.md and pictures into the folder of the results; the verb's result says what."""
-    results = [(path.stem, json.loads(path.read_text())) for path in sorted(folder.glob("*.json"))]
+    """Writes report.md and pictures into the folder of the results; returns the list of files as a result."""
+    results = [(path.stem, store.read(path)) for path in sorted(folder.glob("*.json"))]
     results = sorted(((name, result) for name, result in results if "command" in result),
                      key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)))
     if not results:
@@ -65,7 +65,7 @@ def _verb(result: dict[str, Any]) -> str:
 
 
 def _pictures(name: str, result: dict[str, Any], folder: Path) -> tuple[dict[str, list[Path]], str]:
-    """Files by clip, or by no clip's name where they are about all of them; and why there are none."""
+    """Files by clip (under "" those about all clips), and the reason if there are none."""
     verb, prefix = _verb(result), "" if name == "rd" else f"{name}_"
     try:
         if verb != "rd":
@@ -79,14 +79,14 @@ def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: s
     verb = _verb(result)
     head = f"## {TITLES.get(verb, verb)}\n"
     if verb != "rd":
-        above = [f"{missing}\n"] if missing else _shown(pictures[""])
+        above = [f"{missing}\n"] if missing else _image_links(pictures[""])
         return "\n".join([head, *above, as_text(result), ""])
     contents, clips = {key: result[key] for key in rd.KEYS}, [row["clip"] for row in result["clips"]]
     commands = dict.fromkeys(row["command"] for rows in contents.values() for row in rows)
-    whole = result | rd.summary(contents, clips, None) | {"command": "`, `".join(commands)}
-    above = {rd.title(clip): "\n".join([*_shown(files), ""]) for clip, files in pictures.items()}
-    return f"{head}\n{missing or PICTURES}\n\n{as_text(whole, above)}\n"
+    content = result | rd.summary(contents, clips, None) | {"command": "`, `".join(commands)}
+    above = {rd.title(clip): "\n".join([*_image_links(files), ""]) for clip, files in pictures.items()}
+    return f"{head}\n{missing or PICTURES}\n\n{as_text(content, above)}\n"
 
 
-def _shown(files: list[Path]) -> list[str]:
+def _image_links(files: list[Path]) -> list[str]:
     return [f"![{file.stem}]({file.name})\n" for file in files]

@@ -1,11 +1,11 @@
 """Seconds per vertex and frame to encode and decode, over clips of more and more vertices or frames.
 
-They should not depend on the size: the target is a ratio of at most 1.5 between the dearest and the cheapest
-clip of a series. Two series are made from one clip: copies of the plant as one clip, each some frames ahead
-of the one before, so that no two move alike, all in one place, so that the bound stays the same; and a few of
-them played forwards and backwards for longer. That keeps alike what a vertex and a frame hold, which plants
-of different sizes do not; the suite `full` has series of such plants too, where they can be made. File to
-file and file to array, in one process, files in the page cache.
+They should not depend on the size: the target is a ratio of at most 1.5 between the slowest and the fastest clip of a
+series. Two series are made from one clip: copies of the plant as one clip, each some frames ahead of the one before, so
+that no two move alike, all at the same position, so that the bound stays the same; and a few of them played forwards
+and backwards for longer. So the content of a vertex and a frame stays the same, unlike in plants of different sizes;
+the suite `full` has series of those too, where they can be made. File to file and file to array, in one process, files
+in the page cache.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from statistics import median
 from typing import Any
 
 import athcodec
-from bench.clips import Stand, add_rel_error, stand_of
+from bench.clips import ReplicatedPlants, add_rel_error, add_source, replicated_plants
 from bench.decode import compile_program
 from bench.suite import cases
 from bench.tables import table
@@ -44,7 +44,7 @@ processes (decode.py); what opening takes is part of 'decode' and the more of it
 Plants: copies in the clip.
 """
 
-RATIO_NOTE = "The largest figure of a series over its smallest."
+RATIO_NOTE = "The largest figure of a series divided by its smallest."
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("clips", nargs="*", metavar="CLIP", default=[],
                         help="a series of your own: files CLIP.h5, or names of clips of this benchmark")
     parser.add_argument("--suite", choices=tuple(SIZES), default="quick",
-                        help="how far the series go that are made here (default %(default)s)")
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="what they are made of (default: the sample)")
+                        help="length of the generated series (default %(default)s)")
+    add_source(parser)
     for name, count in (("encodes", ENCODES), ("decodes", DECODES)):
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N",
-                            help="runs that medians are of (default %(default)s)")
+                            help="runs for each median (default %(default)s)")
     add_rel_error(parser)
 
 
@@ -137,25 +136,25 @@ def _ratios(rows: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _series(args: argparse.Namespace, folder: Path) -> Iterator[_Clip]:
-    """Given clips, or those made from one; a made clip is written when its turn comes."""
+    """Given clips, or those made from one, each written when it is needed."""
     if args.clips:
         yield from _clips("given", args.clips)
         return
-    stands, stand_frames, lengths, plants = SIZES[args.suite]
-    with stand_of(args.of) as stand:
-        for count in stands:
-            yield _made("copies", stand, folder, count, stand_frames)
+    copies, copy_frames, lengths, plants = SIZES[args.suite]
+    with replicated_plants(args.of) as replicated:
+        for count in copies:
+            yield _made("copies", replicated, folder, count, copy_frames)
         for frames in lengths:
-            yield _made("repeated frames", stand, folder, plants, frames)
+            yield _made("repeated frames", replicated, folder, plants, frames)
     if args.suite == "full":
         for series, names in REAL.items():
             yield from _clips(series, names)
 
 
-def _made(series: str, stand: Stand, folder: Path, plants: int, frames: int) -> _Clip:
+def _made(series: str, replicated: ReplicatedPlants, folder: Path, plants: int, frames: int) -> _Clip:
     path = folder / f"{plants}x{frames}.h5"
-    stand.write(path, plants, frames)
-    return _Clip(series, f"{stand.name} x {plants}", path, plants)
+    replicated.write(path, plants, frames)
+    return _Clip(series, f"{replicated.name} x {plants}", path, plants)
 
 
 def _clips(series: str, words: Iterable[str]) -> Iterator[_Clip]:

@@ -1,8 +1,7 @@
-"""File sizes per clip and error bound, after the bound was verified by decoding.
+"""File sizes per clip and error bound; the bound is verified by decoding.
 
-Files hold what the motion needs and nothing else: attributes, faces, edges and metadata other than unit and
-up axis are left out. Every file is decoded whole and measured against the source; its size counts only if the
-bound holds.
+Files hold only the motion: attributes, faces, edges and metadata other than unit and up axis are left out. Every file
+is decoded completely and compared with the source; its size counts only if the bound holds.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ the RMS distance from the rest pose.
 """
 
 CHUNKS_NOTE = """
-HEADER is header, chunk table and error table; AFFINES are the maps of inner nodes, their share is that of the
-whole file.
+HEADER is header, chunk table and error table; AFFINES are the maps of inner nodes; AFFINES %: their share of the
+file.
 """
 
 CHOICES_NOTE = """
@@ -64,7 +63,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _size_row(result: Encoded, meter: ErrorMeter, rel_error: float) -> dict[str, Any]:
     summary, clip = result.summary, result.clip
-    # the file's own promise, and what was asked for on the diagonal as measured here
+    # the bound in the file, and the one requested on the diagonal as measured here
     bound = min(summary.max_error_bound, rel_error * meter.diagonal)
     return {
         "bytes": summary.bytes, "ratio": summary.ratio,

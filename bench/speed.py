@@ -1,8 +1,8 @@
-"""Seconds to encode, decode, open, and show one frame coarsely, beside reading gzip-compressed HDF5.
+"""Seconds to encode, decode, open, and decode one frame at level 1, compared with reading gzip-compressed HDF5.
 
-Wall-clock time inside one process, after a warm-up, files in the page cache. Encoding and decoding go from
-file to file and from file to array. Decoding and HDF5 take turns, so that both see the same machine. Start-up
-of Python and imports are not counted.
+Wall-clock time inside one process, after a warm-up, files in the page cache. Encoding and decoding go from file to file
+and from file to array. Runs of decoding and HDF5 alternate, so that conditions are the same for both. Start-up of
+Python and imports are not counted.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ ENCODES, DECODES = 3, 7
 
 NOTE = """
 Encode: from an HDF5 file to a file, default effort, no attributes. Decode: opening and all positions as one
-float32 array. Info: opening and the facts about the file. Frame: opening and one frame at level 1; read:
-bytes it took of the file. HDF5: h5py reading the same positions, gzip and shuffle, into one array;
+float32 array. Info: opening and decoder.info(). Frame: opening and one frame at level 1; read:
+bytes of the file that this needs. HDF5: h5py reading the same positions, gzip and shuffle, into one array;
 decode/HDF5 above 1: slower than HDF5.
 """
 
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 class _Case:
-    """One clip and what is done with it; `file` is written by encoding, `gzip` before."""
+    """The steps that are timed, on one clip; `file` is written by encoding, `gzip` before."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float) -> None:
         self.path, self.rel_error = path, rel_error
@@ -102,7 +102,7 @@ class _Case:
 
 
 def _in_turns(steps: dict[str, Callable[[], None]], rounds: int) -> dict[str, list[float]]:
-    """Seconds of every run of every step, one step after the other, after a round that is not counted."""
+    """Seconds of every run of every step; steps alternate, after a warm-up round."""
     seconds: dict[str, list[float]] = {name: [] for name in steps}
     for round_number in range(rounds + 1):
         for name, step in steps.items():

@@ -1,7 +1,8 @@
-"""Results that are kept as they come: a JSON file that a long run adds to, and that the next run takes up.
+"""Results that are saved as they are measured: a JSON file that a long run extends, and that the next run resumes.
 
-A result is known by a few keys and carries what it depends on (versions, digests); it counts as measured as
-long as that is what it would depend on now.
+A result is identified by a few keys and carries what it depends on (versions, digests); it is up to date as long as
+these are the same. The file holds a table for each kind of result: its columns, and one line per row (null: no such
+value). Values of text, lists and objects repeat: a row has an index into the distinct values of such a column.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+Results = list[dict[str, Any]]
+
 
 class Store:
     """Lists of results by name, each result a dictionary; `file` None keeps them in memory alone."""
@@ -19,8 +22,8 @@ class Store:
     def __init__(self, file: Path | None, environment: dict[str, Any],
                  keys: dict[str, Sequence[str]]) -> None:
         self.file, self._environment, self._keys = file, environment, keys
-        there = json.loads(file.read_text()) if file is not None and file.exists() else {}
-        self._results = {name: {self._key(name, result): result for result in there.get(name, [])}
+        saved = read(file) if file is not None and file.exists() else {}
+        self._results = {name: {self._key(name, result): result for result in saved.get(name, [])}
                          for name in keys}
 
     def _key(self, name: str, result: dict[str, Any]) -> tuple:
@@ -28,19 +31,60 @@ class Store:
 
     def find(self, name: str, wanted: dict[str, Any],
              depends: dict[str, Any] | None = None) -> dict[str, Any] | None:
-        """The result with these keys, where it depends on the very same (None: on whatever)."""
+        """The result with these keys, if it depends on exactly `depends` (None: on anything)."""
         result = self._results[name].get(self._key(name, wanted))
         return result if result is not None and depends in (None, result["depends"]) else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
-        """Adds or replaces a result, made by this command, and writes the file, whole or not at all."""
+        """Adds or replaces a result of this command, and replaces the file in one step."""
         result = result | {"command": self._environment["command"]}
         self._results[name][self._key(name, result)] = result
         if self.file is not None:
             part = self.file.with_name(self.file.name + ".part")
-            part.write_text(json.dumps(self._environment | self.contents(), indent=1) + "\n")
+            part.write_text(_layout(self._environment | {
+                name: _table_of(results) for name, results in self.contents().items()}) + "\n")
             os.replace(part, self.file)
         return result
 
-    def contents(self) -> dict[str, list[dict[str, Any]]]:
+    def contents(self) -> dict[str, Results]:
         return {name: list(results.values()) for name, results in self._results.items()}
+
+
+def read(file: Path) -> dict[str, Any]:
+    """The JSON file of any verb; tables of a Store as lists of dictionaries."""
+    return {name: _results_of(value) if isinstance(value, dict) and "columns" in value else value
+            for name, value in json.loads(file.read_text()).items()}
+
+
+def _table_of(results: Results) -> dict[str, Any]:
+    columns = list(dict.fromkeys(column for result in results for column in result))
+    distinct: dict[str, dict[str, int]] = {
+        column: {} for column in columns
+        if any(isinstance(result.get(column), (str, list, dict)) for result in results)}
+
+    def cell(column: str, value: Any) -> Any:
+        if value is None or column not in distinct:
+            return value
+        return distinct[column].setdefault(json.dumps(value), len(distinct[column]))
+
+    rows = [[cell(column, result.get(column)) for column in columns] for result in results]
+    values = {column: [json.loads(text) for text in texts] for column, texts in distinct.items()}
+    return {"columns": columns, "distinct": values, "rows": rows}
+
+
+def _results_of(table: dict[str, Any]) -> Results:
+    distinct = table["distinct"]
+    return [{column: distinct[column][cell] if column in distinct else cell
+             for column, cell in zip(table["columns"], row, strict=True) if cell is not None} for row in table["rows"]]
+
+
+def _layout(value: Any, newline: str = "\n") -> str:
+    """JSON with a line for each value of an object and each item of a list."""
+    if isinstance(value, dict):
+        items = [f"{json.dumps(name)}: {_layout(item, newline + ' ')}" for name, item in value.items()]
+    elif isinstance(value, list):
+        items = [json.dumps(item, separators=(",", ":")) for item in value]
+    else:
+        return json.dumps(value)
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return opening + f"{newline} " + f",{newline} ".join(items) + newline + closing

@@ -24,7 +24,7 @@ class Case:
 
 
 def cases(words: Iterable[str], suite: str) -> list[Case]:
-    """The clips named, or those of the suite. Raises SystemExit for a name that there is not."""
+    """The clips named, or those of the suite. Raises SystemExit for an unknown name."""
     return [_case(word) for word in list(words) or data.SUITES[suite]]
 
 
@@ -41,7 +41,7 @@ def _case(word: str) -> Case:
 
 
 def digest(path: Path) -> str:
-    """Of positions, rest pose and branches: what a codec sees of a clip."""
+    """Digest of positions, rest pose and branches: the input of a codec."""
     total = hashlib.sha256()
     with athcodec.read_hdf5(path) as clip:
         for array in (clip.rest, clip.vertex_branch, clip.branch_parent):

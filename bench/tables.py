@@ -1,8 +1,7 @@
-"""Results as aligned Markdown tables, and what is said about the machine that they come from.
+"""Results as aligned Markdown tables, and the description of the machine.
 
-A verb's result is a dictionary that JSON can hold: "tables", each {"title", "rows", "notes"} with rows as
-dictionaries of unrounded figures by column, and "broken", one line for every promise that was not kept.
-Nothing is measured here.
+A verb's result is a dictionary that JSON can hold: "tables", each {"title", "rows", "notes"} with rows as dictionaries
+of unrounded figures by column, and "broken", one line for every bound or target that must hold and does not.
 """
 
 from __future__ import annotations
@@ -50,14 +49,14 @@ def write_json(result: dict[str, Any], file: Path) -> None:
 
 
 def as_text(result: dict[str, Any], above: Mapping[str, str] | None = None) -> str:
-    """What a verb prints: tables (with text `above` those of some titles), broken promises, machine.
+    """The output of a verb: tables (below the text `above`, by title), broken lines, machine.
 
-    Notes that several tables have in common stand below the first one.
+    Notes that several tables have in common are printed below the first one.
     """
-    parts, said = [], set()
+    parts, printed = [], set()
     for part in result["tables"]:
-        notes = [note for note in part["notes"] if note not in said]
-        said.update(notes)
+        notes = [note for note in part["notes"] if note not in printed]
+        printed.update(notes)
         parts.append((above or {}).get(part["title"], "") + _table_text(part | {"notes": notes}))
     parts += [f"BROKEN: {line}" for line in result["broken"]]
     parts.append("; ".join([_pairs(result["machine"]), _pairs(result["versions"])]))

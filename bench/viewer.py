@@ -1,8 +1,8 @@
-"""The viewer in Chromium: time to first motion on a slow line, long tasks, size of the bundles, forests.
+"""The viewer in Chromium: time to first motion on a slow connection, long tasks, size of the bundles, forests.
 
-The page is open and empty when a file is asked for, as it is when a viewer opens one file after the other, and as it
-is taken to be for the formats beside it. Those count as shown when their last byte is here: reading them comes on top.
-Drawing is in software: of frame times only the ratios tell anything about a graphics processor.
+The page is loaded and empty when a file is requested, as in a viewer that opens several files; the same is assumed for
+the other formats. These count as shown when their last byte has arrived; parsing is not included. Rendering is in
+software: only ratios of frame times are meaningful for a graphics processor.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ import numpy as np
 import athcodec
 from bench.browser import chromium
 from bench.clips import add_clips, add_rel_error
-from bench.line import WEB, Line
 from bench.tables import table
+from bench.throttled_server import WEB, ThrottledServer
 
 MEGABIT = 125_000
 SLOW = 10_000  # bytes a second
@@ -41,16 +41,16 @@ FETCH = """async (name) => {
   const size = (await answer.arrayBuffer()).byteLength;
   return { seconds: (performance.now() - start) / 1000, size };
 }"""
-MODES = """async ([name, mode, depths, frames]) => {
+MODES = """async ([name, mode, levels, frames]) => {
   const { ATHLoader } = await import("athcodec-three"), loader = new ATHLoader().setMode(mode);
   const ath = await loader.loadAsync(name), { stage } = athcodecViewer, gl = stage.renderer.getContext();
   const { motion } = ath, scene = stage.scene([ath.object]), pixel = new Uint8Array(4), found = [];
   while (!motion.complete) await new Promise((done) => setTimeout(done, 20));
-  for (let depth = 0; depth < depths; depth++) {
+  for (let level = 0; level < levels; level++) {
     const ms = [], worker = [];
     for (let i = 0; i < frames; i++) {
       const start = performance.now();
-      await motion.show(i / 30, depth);
+      await motion.show(i / 30, level);
       stage.renderer.render(scene, stage.camera);
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
       ms.push(performance.now() - start);
@@ -59,7 +59,7 @@ MODES = """async ([name, mode, depths, frames]) => {
     const median = (values) => values.sort((a, b) => a - b)[frames >> 1];
     const texture = motion.uniforms.athData.value, bytes = mode === "matrices" ? texture.image.data.byteLength
       : 12 * motion.info.vertexCount;
-    found.push({ depth, mode, ms: median(ms), worker: median(worker), bytes });
+    found.push({ level, mode, ms: median(ms), worker: median(worker), bytes });
   }
   ath.dispose();
   loader.dispose();
@@ -67,9 +67,9 @@ MODES = """async ([name, mode, depths, frames]) => {
 }"""
 
 NOTE_START = """
-Seconds from asking for the file until a picture has been drawn, until one has that differs from it (motion), and
-until all is here, medians. Bytes: that had come at first motion on a line so slow that they count. Raw and GLB: until
-their last byte is here.
+Seconds from the request of the file until a picture is drawn, until a different one is drawn (motion), and until the
+file is complete, medians. Bytes: received at first motion, on a slow connection. Raw and GLB: until their last byte has
+arrived.
 """
 NOTE_TASKS = """
 The longest task of the page's main thread in each round, while a file streams in until all of it is shown: by the
@@ -77,12 +77,12 @@ clock, as the long-task observer has it (0: none over 50 ms), and in processor t
 programs on the machine add nothing. Over 50 ms: tasks of all rounds, by the clock.
 """
 NOTE_FOREST = """
-Milliseconds from choosing depths until the picture is drawn, in software, the fastest of seven, by turns;
+Milliseconds from choosing levels until the picture is drawn, in software, the fastest of seven, alternating;
 vertices are those drawn.
 """
 NOTE_MODES = """
-Milliseconds from asking the worker for a frame until it is drawn, medians; bytes: that go to the graphics processor for
-it. Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
+Milliseconds from requesting a frame from the worker until it is drawn, medians; bytes: sent to the graphics processor.
+Matrices: by a texture, in the vertex shader (the default); positions: by a new position attribute.
 """
 
 
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             found = _starts(browser, files, args)
             starts += [{"clip": path.stem} | row for row in found["starts"]]
             tasks.append({"clip": path.stem} | found["tasks"])
-            broken += _promises(path.stem, found)
+            broken += _missed_targets(path.stem, found)
             forests += [{"clip": path.stem} | row for row in _forests(browser, files["tree.ath"], args.instances)]
             modes += [{"clip": path.stem} | row for row in _modes(browser, files["tree.ath"])]
     sizes = [{"file": name, "bytes": (WEB / name).stat().st_size} for name in (*OURS, "three.js", "OrbitControls.js")]
@@ -152,40 +152,40 @@ def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
 
 
-def _page(browser, line: Line, name: str | None = None):
+def _page(browser, server: ThrottledServer, name: str | None = None):
     page = browser.new_page(viewport={"width": 960, "height": 600})
-    page.goto(line.page(name))
+    page.goto(server.page(name))
     page.wait_for_function("() => globalThis.athcodecViewer")
     page.wait_for_timeout(1000)
     return page
 
 
 def _starts(browser, files: dict[str, bytes], args: argparse.Namespace) -> dict[str, Any]:
-    with Line(files, rate=args.line * MEGABIT) as line:
-        rounds = [_open(browser, line) for _ in range(args.rounds)]
-        page = _page(browser, line)
+    with ThrottledServer(files, rate=args.line * MEGABIT) as server:
+        rounds = [_open(browser, server) for _ in range(args.rounds)]
+        page = _page(browser, server)
         others = {name: page.evaluate(FETCH, name) for name in ("tree.raw", "tree.glb")}
         page.close()
-    with Line(files, rate=SLOW) as line:
-        first = _open(browser, line, until="athcodecViewer.counters.firstMotion")["motion"]["bytes"]
-    motion = [each["motion"]["ms"] / 1000 for each in rounds]
+    with ThrottledServer(files, rate=SLOW) as server:
+        first = _open(browser, server, until="athcodecViewer.counters.firstMotion")["motion"]["bytes"]
+    motion = [opening["motion"]["ms"] / 1000 for opening in rounds]
     ath = {"file": ".ath", "size": len(files["tree.ath"]),
-           "picture": statistics.median(each["picture"]["ms"] for each in rounds) / 1000,
+           "picture": statistics.median(opening["picture"]["ms"] for opening in rounds) / 1000,
            "motion": statistics.median(motion), "slowest": max(motion), "bytes": first,
            "share": first / len(files["tree.ath"]),
-           "all": statistics.median(each["all"] for each in rounds)}
+           "all": statistics.median(opening["all"] for opening in rounds)}
     rows = [ath] + [{"file": name, "size": found["size"], "motion": found["seconds"]} for name, found in others.items()]
     return {"starts": rows, "tasks": {
-        "rounds": args.rounds, "by the clock": [max(each["tasks"], default=0) for each in rounds],
-        "processor": [each["processor"] for each in rounds],
-        "over 50 ms": sum(ms > LONGEST_TASK for each in rounds for ms in each["tasks"])}}
+        "rounds": args.rounds, "by the clock": [max(opening["tasks"], default=0) for opening in rounds],
+        "processor": [opening["processor"] for opening in rounds],
+        "over 50 ms": sum(ms > LONGEST_TASK for opening in rounds for ms in opening["tasks"])}}
 
 
-ALL_HERE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
+COMPLETE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
 
 
-def _open(browser, line: Line, until: str = ALL_HERE) -> dict[str, Any]:
-    page = _page(browser, line)
+def _open(browser, server: ThrottledServer, until: str = COMPLETE) -> dict[str, Any]:
+    page = _page(browser, server)
     page.evaluate(OBSERVE)
     browser.start_tracing(page=page, categories=["toplevel"])
     page.evaluate("athcodecViewer.open('/tree.ath', 'tree.ath')")
@@ -201,14 +201,14 @@ def _open(browser, line: Line, until: str = ALL_HERE) -> dict[str, Any]:
 
 
 def _longest_task(events: list[dict[str, Any]]) -> float:
-    """Milliseconds of processor time of a renderer's main thread."""
+    """Milliseconds of processor time of the longest task of a renderer's main thread."""
     threads = {(event["pid"], event["tid"]) for event in events
                if event["name"] == "thread_name" and event["args"]["name"] == "CrRendererMain"}
     return max(event.get("tdur", 0) / 1000 for event in events
                if event.get("ph") == "X" and (event["pid"], event["tid"]) in threads)
 
 
-def _promises(clip: str, found: dict[str, Any]) -> list[str]:
+def _missed_targets(clip: str, found: dict[str, Any]) -> list[str]:
     ath, *others = found["starts"]
     broken = []
     if ath["motion"] > MOST_SECONDS:
@@ -226,21 +226,21 @@ def _promises(clip: str, found: dict[str, Any]) -> list[str]:
 
 def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
     rows = []
-    with Line({"tree.ath": data}) as line:
-        page = _page(browser, line, "tree.ath")
+    with ThrottledServer({"tree.ath": data}) as server:
+        page = _page(browser, server, "tree.ath")
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
         page.evaluate("athcodecViewer.forestOf(10)")
-        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.depthCount")
+        page.wait_for_function("() => athcodecViewer.state.forest.baked.length === athcodecViewer.motion.levelCount")
         for count in counts:
             page.evaluate(f"athcodecViewer.forestOf({count})")
             both: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
-            for _ in range(ROUNDS):  # by turns: what else the machine does meets both
-                for detail, found in both.items():
+            for _ in range(ROUNDS):  # alternating, so that other load on the machine affects both
+                for detail, timings in both.items():
                     page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
-                    found.append(page.evaluate("athcodecViewer.timeForest(1)"))
-            on, off = (min(found, key=lambda each: each["ms"]) for found in both.values())
-            rows.append({"instances": count, "in view": count - on["unseen"], "by depth": on["counts"],
+                    timings.append(page.evaluate("athcodecViewer.timeForest(1)"))
+            on, off = (min(timings, key=lambda timing: timing["ms"]) for timings in both.values())
+            rows.append({"instances": count, "in view": count - on["unseen"], "by level": on["counts"],
                          "detail on": on["ms"], "detail off": off["ms"], "off / on": off["ms"] / on["ms"],
                          "vertices on": on["vertices"], "vertices off": off["vertices"]})
         page.close()
@@ -248,12 +248,12 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
 
 
 def _modes(browser, data: bytes) -> list[dict[str, Any]]:
-    with Line({"tree.ath": data}) as line:
-        page = _page(browser, line, "tree.ath")
+    with ThrottledServer({"tree.ath": data}) as server:
+        page = _page(browser, server, "tree.ath")
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
-        depths = page.evaluate("athcodecViewer.motion.depthCount")
+        levels = page.evaluate("athcodecViewer.motion.levelCount")
         rows = [row for mode in ("matrices", "positions")
-                for row in page.evaluate(MODES, ["/tree.ath", mode, depths, 21])]
+                for row in page.evaluate(MODES, ["/tree.ath", mode, levels, 21])]
         page.close()
-    return sorted(rows, key=lambda row: row["depth"])
+    return sorted(rows, key=lambda row: row["level"])

@@ -1,1 +1,1 @@
-"""The format's own: the reference decoder, the vectors, and the program that holds decoders to them."""
+"""The format: the reference decoder, the test vectors, and the program that tests decoders against them."""

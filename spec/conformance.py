@@ -1,4 +1,4 @@
-"""Holds a decoder of .ath files to the vectors of spec/vectors.
+"""Tests a decoder of .ath files against the vectors of spec/vectors.
 
     python -m spec.conformance DECODER-COMMAND...          any program
     python -m spec.conformance --own c|wasm|reference      those of this repository
@@ -13,14 +13,13 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
                 order, binary64 where Is_Float64 is set, else binary32
     rest        the rest pose: vertices x 3 numbers of Rest_Type, little-endian, in source order
     time        the time of every frame, clip by clip, binary64, little-endian
-    clips       what CLIPS says of every clip, written anew from what the decoder knows of it: frames,
-                segments, flags, name, seams; of a file without CLIPS, what it would hold
+    clips       the entries of CLIPS, written from the decoder's values for every clip: frames, segments, flags,
+                name, seams; for a file without CLIPS, the entry that it would have
     static      Text of METADATA, then the elements of all arrays in file order, unshuffled, gaps included;
                 derived edges as if they were stored
 
-Where a level or a chunk has not arrived, asking for it is TRUNCATED. A decoder that leaves out static data or
-the strict mode, or has other limits than FORMAT.md, is tested with --without. The exit status is 0 where
-nothing was wrong.
+An item whose level or chunk has not arrived is TRUNCATED. A decoder without static data or strict mode, or with other
+limits than FORMAT.md, is tested with --without. The exit status is 0 if all results are as expected.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ added.
 
 
 class Refused(Exception):
-    """A decoder says that a file is not valid; the message is the error's name."""
+    """A decoder refuses a file; the message is the error's name."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class Vector:
         return self.name.startswith("valid/")
 
 
-# Answers jobs (vector, item) in their order: bytes, or what it refused the file for, or an OSError: a fault.
+# Answers jobs (vector, item) in their order: bytes, Refused, or an OSError for a fault of the decoder.
 Decoder = Callable[[list[tuple[Vector, str]]], Iterable[bytes | Exception]]
 
 
@@ -86,7 +85,7 @@ Decoder = Callable[[list[tuple[Vector, str]]], Iterable[bytes | Exception]]
 
 
 def vectors() -> list[Vector]:
-    """Those of expected.txt."""
+    """The vectors listed in expected.txt."""
     lines = (FOLDER / "expected.txt").read_text("utf-8").splitlines()
     return [parse_line(line) for line in lines if line and not line.startswith("#")]
 
@@ -94,12 +93,12 @@ def vectors() -> list[Vector]:
 def parse_line(line: str) -> Vector:
     facts, reason = line.split(" # ", 1)
     name, checksum, *results = facts.split()
-    return Vector(name, checksum, dict(each.split("=") for each in results), reason)
+    return Vector(name, checksum, dict(result.split("=") for result in results), reason)
 
 
 def format_line(name: str, data: bytes, results: dict[str, str], reason: str) -> str:
-    said = " ".join(f"{item}={result}" for item, result in results.items())
-    return f"{name} {crc32c(data):08x} {said} # {reason}"
+    listed = " ".join(f"{item}={result}" for item, result in results.items())
+    return f"{name} {crc32c(data):08x} {listed} # {reason}"
 
 
 def checksum_of(data: bytes, item: str, answer: bytes) -> str:
@@ -112,7 +111,7 @@ def checksum_of(data: bytes, item: str, answer: bytes) -> str:
 
 
 def with_quiet_nans(answer: bytes, kind: str) -> bytes:
-    """A NaN's sign and payload are not defined."""
+    """The answer with all NaNs replaced by the quiet one, since sign and payload are not defined."""
     if len(answer) % np.dtype(kind).itemsize:
         return answer
     numbers = np.frombuffer(answer, kind).copy()
@@ -124,23 +123,23 @@ def with_quiet_nans(answer: bytes, kind: str) -> bytes:
 
 
 def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
-    """One line for each item of which a decoder says something else than expected.txt."""
+    """A line for each item whose result differs from expected.txt."""
     left_out = set(without)
     jobs = [(vector, item) for vector in chosen for item, result in vector.results.items()
             if item not in left_out and not ("levels" in left_out and item.isdecimal())
             and not ("limits" in left_out and result == "LIMIT_EXCEEDED")]
     for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
-        expected, got = vector.results[item], said(vector.path.read_bytes(), item, answer)
+        expected, got = vector.results[item], result_of(vector.path.read_bytes(), item, answer)
         if got != expected:
             yield f"{vector.name}, {item}: got {got}; expected {expected}: {vector.reason}"
 
 
-def said(data: bytes, item: str, answer: bytes | Exception) -> str:
+def result_of(data: bytes, item: str, answer: bytes | Exception) -> str:
     return checksum_of(data, item, answer) if isinstance(answer, bytes) else str(answer)
 
 
 def items(data: bytes) -> list[str]:
-    """What can be asked of a file: more of one that opens."""
+    """The items of a file; if it cannot be opened, only those without an answer."""
     try:
         file = rd.AthFile(data)
     except rd.AthError:
@@ -160,7 +159,7 @@ def result(ask: Callable[[bytes, str], bytes], data: bytes, item: str) -> str:
 
 
 def command(words: list[str]) -> Decoder:
-    """A program, by the protocol above."""
+    """A program, called by the protocol above."""
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
             yield ask_command(words, vector.path, item)
@@ -181,7 +180,7 @@ def ask_command(words: list[str], path: Path, item: str) -> bytes | Exception:
 
 
 def one_by_one(ask: Callable[[bytes, str], bytes]) -> Decoder:
-    """A function that takes a file's bytes and an item, and raises Refused."""
+    """A function that takes a file's bytes and an item, and may raise Refused."""
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
             try:
@@ -204,7 +203,7 @@ def reference(data: bytes, item: str) -> bytes:
 
 
 def package(data: bytes, item: str) -> bytes:
-    """The C core through Python, and the package's own reading of static data."""
+    """The C core through Python, and the package's reader of static data."""
     import athcodec
     from athcodec.errors import FormatError, LevelUnavailable
 
@@ -295,13 +294,13 @@ console.log(JSON.stringify(answers));
 
 
 def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
-    """The decoder for web pages, in Node. It opens for streaming and hands static data over as stored."""
+    """The decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
     node = shutil.which("node")
     if node is None:
         raise OSError("node: got none on PATH; expected Node.js 18 or newer")
-    asked = {"module": DECODER_MODULE.as_uri(),
+    request = {"module": DECODER_MODULE.as_uri(),
              "jobs": [{"path": str(v.path), "item": item} for v, item in jobs]}
-    done = subprocess.run([node, "--input-type=module", "-e", NODE_SCRIPT], input=json.dumps(asked),
+    done = subprocess.run([node, "--input-type=module", "-e", NODE_SCRIPT], input=json.dumps(request),
                           capture_output=True,
                           text=True, timeout=SECONDS)
     if done.returncode != 0:
@@ -311,7 +310,7 @@ def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
 
 
 def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
-    """What it says of the bytes so far, for a file of which there will be no more."""
+    """The answer for a complete file: bytes that are missing are errors."""
     if "bytes" in answer:
         return base64.b64decode(answer["bytes"])
     if "fault" in answer:
@@ -337,13 +336,13 @@ OWN = {"c": Own(one_by_one(package)), "wasm": Own(web_assembly, ("strict", "stat
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m spec.conformance",
-        description="Holds a decoder of .ath files to the vectors of spec/vectors.",
-        epilog="How DECODER-COMMAND is called: see the beginning of spec/conformance.py.")
+        description="Tests a decoder of .ath files against the vectors of spec/vectors.",
+        epilog="spec/conformance.py describes how DECODER-COMMAND is called.")
     parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
-    parser.add_argument("--only", metavar="GLOB", default="*", help="files whose name in expected.txt fits")
+    parser.add_argument("--only", metavar="GLOB", default="*", help="vectors whose name matches")
     parser.add_argument("--without", metavar="ITEM", action="append", default=[],
-                        help="leave out what a decoder does not do: strict, open, levels, rest, time, clips, "
-                             "static, limits; again for more")
+                        help="leave out items that a decoder does not support: strict, open, levels, rest, time, "
+                             "clips, static, limits; may be repeated")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="DECODER-COMMAND")
     options = parser.parse_args(words)
     if bool(options.own) == bool(options.command):

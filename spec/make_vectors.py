@@ -1,11 +1,11 @@
-"""How the vectors were made: every file of spec/vectors, with what it is to show.
+"""The source of the vectors: every file of spec/vectors, with the rule that it tests.
 
-    python -m spec.make_vectors            adds what is not there yet, and its line in expected.txt
-    python -m spec.make_vectors --anew     makes all anew, for another format: while the major version is 0
+    python -m spec.make_vectors            adds missing vectors and their lines in expected.txt
+    python -m spec.make_vectors --all      makes all again, for a changed format: while the major version is 0
 
-All but the last few valid ones are scripts (scripted.py), which need nothing of athcodec and always give the
-same bytes. What a vector has to show is stated here beside it; expected.txt gets what the reference decoder
-says, once that agrees. A vector is never changed once it is there: a better one gets a name of its own.
+All but the last few valid ones are scripts (scripted.py), which do not need athcodec and always give the same bytes.
+The expected error of a vector is stated here; expected.txt gets the results of the reference decoder if they agree with
+it. A vector never changes once it exists: a better one gets another name.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ FLOAT_MAX, FLOAT_TINY = float(np.finfo(np.float32).max), float(np.finfo(np.float
 
 @dataclass(frozen=True)
 class Vector:
-    """A file, and what it is to show: nothing (it is valid), or an error of some item (conformance.py)."""
+    """A file, and its error of an item (conformance.py); none if it is valid."""
 
     name: str
     reason: str
@@ -88,7 +88,7 @@ def bytes_of(made: Plant | Draft | bytes | Callable) -> bytes:
     return made if isinstance(made, bytes) else made.file()
 
 
-# ---- files that others are changes of ----------------------------------------------------------------------
+# ---- files that others are derived from ----------------------------------------------------------------------
 
 
 def lone(**fields) -> Plant:
@@ -118,7 +118,7 @@ def still(stems: list[Stem], **fields) -> Plant:
 
 
 def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **fields) -> Plant:
-    """Rows by chance on all levels."""
+    """Random rows at all levels."""
     scripts = {}
     for level in range(33):
         scripts[rd.STEMS, level] = lambda level=level: Chance(100 * seed + level)
@@ -471,7 +471,7 @@ valid("unknown-optional-damaged", "what is skipped is not read: its Checksum doe
 def frame(content: bytes, *, stated: int | None = -1, single_segment: bool = True, window: int = 0,
           checksum: int | None = -1,
           dictionary: int | None = None, reserved: int = 0, blocks: bytes | None = None) -> bytes:
-    """A zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: what is true; None: left out.
+    """A zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: the true value; None: left out.
 
     window: the byte Window_Descriptor, where there is no single segment."""
     size = len(content) if stated == -1 else stated
@@ -492,7 +492,7 @@ def raw_block(content: bytes, last: bool) -> bytes:
 
 
 def run_block(byte: bytes, count: int, last: bool) -> bytes:
-    """A byte over and over."""
+    """A repeated byte."""
     return struct.pack("<I", count << 3 | 1 << 1 | last)[:3] + byte
 
 
@@ -538,8 +538,7 @@ def attributes(*contents: bytes) -> Draft:
     return with_static(*((rd.ATTRIBUTE, content) for content in contents))
 
 
-# What zstd 1.5 makes of a text of 456 bytes at level 19: literals with a Huffman table, sequences with FSE
-# tables.
+# A text of 456 bytes compressed by zstd 1.5 at level 19: literals with a Huffman table, sequences with FSE tables.
 WIND_FRAME = bytes.fromhex(
     "28b52ffd60c800ad020022451011a0ed1eed626666b605a3aadb6d42a28a6b759b222fa48e0e364efd01138aae2035fb"
     "a691439684d741439ee7d467ee9d9ba6e65e2cb76b7bb06c2fb6558b4b0305004e05f0d550b2ea0815558a6bb10205")
@@ -674,7 +673,7 @@ valid("everything", "every kind of chunk, flag, method and stream in one file", 
 
 
 def encoded(name: str) -> bytes:
-    """What athcodec makes of a small plant."""
+    """A small plant encoded by athcodec."""
     import athcodec
     from athcodec.clip import MotionClip
 
@@ -703,13 +702,13 @@ def encoded(name: str) -> bytes:
         return target.read_bytes()
 
 
-for each, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "binary64 positions"),
+for name, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "binary64 positions"),
                   ("encoded-exact-rest", "a rest pose bit for bit"),
                   ("encoded-noise", "vertices that follow no plant"),
                   ("encoded-clips", "two clips, one of them a loop"),
                   ("encoded-lossless", "every bit of the source at the last level"),
                   ("encoded-lossless-wide", "every bit of binary64 positions at the last level")):
-    valid(each, f"what athcodec wrote: {why}", lambda each=each: encoded(each), scripted=False)
+    valid(name, f"what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
 
 
 # ---- invalid: the header -----------------------------------------------------------------------------------
@@ -831,7 +830,7 @@ def swapped(i: int, j: int) -> Draft:
 
 
 def moved(kind: int, **place: int) -> Draft:
-    """The last chunk of a kind, said to be elsewhere."""
+    """The last chunk of a kind, with another level or segment in the table."""
     draft = fork()
     i = max(i for i, entry in enumerate(draft.entries) if entry.kind == kind)
     return replace(draft,
@@ -925,7 +924,7 @@ table("shapes-of-segment-1", "BAD_CHUNK_TABLE", "SHAPES stands with segment 0",
 
 
 def cut(short: Callable[[Draft], int]) -> bytes:
-    """The fork as far as a number of its chunks, less some bytes."""
+    """The first chunks of the fork, less some bytes."""
     draft = fork()
     return draft.file()[:short(draft)]
 
@@ -1383,7 +1382,7 @@ invalid("shapes-too-many-at-last", "BAD_CHUNK", 1, "a level adds more shapes tha
 
 
 def lossless(first: bytes = b"") -> Draft:
-    """A level behind the others, its streams empty."""
+    """An additional last level with empty streams."""
     return fork().with_header(level_count=4, full_level_count=4).add(
         Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
 
@@ -1623,35 +1622,34 @@ zstd_frame("window-largest", "the largest window there is", frame(
 
 
 def results(data: bytes) -> dict[str, str]:
-    """Every item of a file and what the reference decoder says of it."""
+    """The reference decoder's result for every item of a file."""
     return {item: conformance.result(conformance.reference, data, item) for item in conformance.items(data)}
 
 
 def line_of(vector: Vector, data: bytes) -> str:
-    """Of expected.txt. Raises ValueError where the reference decoder says something else than the vector
-    states."""
-    said = results(data)
-    wrong = {item: result for item, result in said.items() if result in conformance.ERRORS}
-    if vector.error and said.get(vector.item) != vector.error or not vector.error and wrong:
-        raise ValueError(f"{vector.path}: got {said}; expected {vector.error or 'no error'} {vector.item}")
+    """The line in expected.txt. Raises ValueError if the reference decoder's result is not the vector's."""
+    found = results(data)
+    wrong = {item: result for item, result in found.items() if result in conformance.ERRORS}
+    if (vector.error and found.get(vector.item) != vector.error) or (not vector.error and wrong):
+        raise ValueError(f"{vector.path}: got {found}; expected {vector.error or 'no error'} {vector.item}")
     first = next(iter(wrong), "")
     if vector.error and first != vector.item and not (vector.item == "open" and first == "strict"):
         if not (vector.error == "TRUNCATED" and first == "strict"):
-            raise ValueError(f"{vector.path}: got {said}; expected nothing wrong before {vector.item}")
-    return conformance.format_line(vector.path, data, said, vector.reason)
+            raise ValueError(f"{vector.path}: got {found}; expected nothing wrong before {vector.item}")
+    return conformance.format_line(vector.path, data, found, vector.reason)
 
 
-def make(anew: bool = False, folder: Path = conformance.FOLDER) -> int:
-    """Writes the vectors that are not there, or all; returns how many."""
+def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
+    """Writes missing vectors, or all; returns their number."""
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"
-    lines = [] if anew or not listed.exists() else [line for line in listed.read_text("utf-8").splitlines()
+    lines = [] if every or not listed.exists() else [line for line in listed.read_text("utf-8").splitlines()
                                                     if line]
-    there = {line.split()[0] for line in lines if not line.startswith("#")}
+    existing = {line.split()[0] for line in lines if not line.startswith("#")}
     made = 0
     for vector in VECTORS:
-        if vector.path in there:
+        if vector.path in existing:
             continue
         data = vector.make()
         lines.append(line_of(vector, data))
@@ -1665,9 +1663,9 @@ def make(anew: bool = False, folder: Path = conformance.FOLDER) -> int:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m spec.make_vectors",
-                                     description="Makes the vectors that are not there.")
-    parser.add_argument("--anew", action="store_true", help="make all anew")
-    print(f"{make(parser.parse_args().anew)} vectors made, {len(VECTORS)} in all")
+                                     description="Makes missing vectors.")
+    parser.add_argument("--all", action="store_true", help="make all again")
+    print(f"{make(parser.parse_args().all)} vectors made, {len(VECTORS)} in all")
     return 0
 
 

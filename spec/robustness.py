@@ -1,8 +1,8 @@
-"""The command `python -m spec.robustness`: runs every class of hostile and unlucky input, and writes what came of it to
+"""The command `python -m spec.robustness`: runs every class of hostile input and fault, and writes the results to
 spec/robustness.md and spec/robustness.json.
 
-Exit code 1 where anything crashed, hung, took more memory than its limits or gave a wrong result. What is tried, and
-how that is noticed, is known to the modules of spec/robust. Results of classes that a run leaves out stay in the
+Exit code 1 if anything crashed, hung, took more memory than its limits or gave a wrong result. The modules of
+spec/robust define what is tried and how faults are detected. Results of classes that a run leaves out stay in the
 report.
 """
 

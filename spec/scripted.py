@@ -1,9 +1,9 @@
-"""Streams and files that say exactly what a script says, for vectors that no encoder would write.
+"""Streams and files with exactly the values of a script, for vectors that no encoder would write.
 
-Every function of the reference decoder that reads a stream is also its writer here: it is run with a coder
-that encodes each decision as it is asked for, and takes what is decided from a script. So a stream can hold
-any numbers in the order of FORMAT.md, valid or not, and nothing of athcodec is needed. `Plant` makes whole
-files of such streams, `Draft` is a file in pieces that can be spoilt.
+Every function of the reference decoder that reads a stream also writes it here: it runs with a coder that encodes each
+decision instead of decoding it, with the value taken from a script. So a stream can hold any numbers in the order of
+FORMAT.md, valid or not, and athcodec is not needed. `Plant` makes complete files of such streams; `Draft` is a file in
+pieces that can be corrupted.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from spec.reference_decoder import LOOSE, SHEET, WHOLE, crc32c  # noqa: F401 (fl
 
 
 class Script:
-    """Values in the order in which a stream asks for them; 0 (an empty row, a bit 0) when they are used
-    up."""
+    """Values in the order in which a stream reads them; 0 (an empty row, a bit 0) when they are used up."""
 
     def __init__(self, *values):
         self.values = deque(values)
@@ -34,7 +33,7 @@ class Script:
 
 
 class Chance(Script):
-    """Values made by chance: bits, small and now and then large numbers, rows of any length."""
+    """Random values: bits, small and sometimes large numbers, rows of any length."""
 
     def __init__(self, seed: int, empty: float = 0.3, large: int = 12):
         super().__init__()
@@ -50,19 +49,19 @@ class Chance(Script):
 
 
 def row(*frequencies: tuple[int, int, int]) -> list[int]:
-    """Script of a row: how many frequencies are coded, then x, y, z of each."""
+    """Script of a row: the number of coded frequencies, then x, y, z of each."""
     return [len(frequencies), *(n for xyz in frequencies for n in xyz)]
 
 
 def magnitude_bits(magnitude: int, longest: int) -> list[int]:
-    """Decisions of a magnitude: its length in unary, and what follows the leading bit."""
+    """Decisions of a magnitude: its length in unary, and the bits after the leading one."""
     length = magnitude.bit_length()
     assert length <= longest, "no stream can hold this number"
     return [1] * length + [0] * (length < longest) + [int(bit) for bit in f"{magnitude:b}"[1:]]
 
 
 class ScriptedCoder(rd.RangeDecoder):
-    """Keeps the interval that its decisions lead to, as an encoder does."""
+    """Tracks the interval of its decisions, as an encoder does."""
 
     def __init__(self, script: Script):
         self.script, self.decisions = script, deque()
@@ -76,10 +75,10 @@ class ScriptedCoder(rd.RangeDecoder):
         return bit
 
     def finish(self) -> None:
-        assert not self.decisions and not self.script.values, "the script has more than the stream asks for"
+        assert not self.decisions and not self.script.values, "the script has more values than the stream reads"
 
     def stream(self) -> bytes:
-        """A number of the interval, with as many zeros at its end as there can be; those are left out."""
+        """A number of the interval with as many trailing zeros as possible; these are left out."""
         last, zeros = self.low + self.range - 1, 0
         while zeros < 8 * self.length and last >> zeros + 1 << zeros + 1 >= self.low:
             zeros += 1
@@ -114,7 +113,7 @@ def scripted_count(original: Callable):
 
 def scripted_exact(original: Callable):
     def code(coder, model, n, expected, before):
-        """The script has the number, or (magnitude, negative) of its difference from the one expected."""
+        """The script has the number, or (magnitude, negative) of its difference from the predicted one."""
         value = coder.script.answer("exact", 0)
         if not isinstance(value, tuple):
             likely = rd.single(expected) if n == 32 else expected
@@ -128,7 +127,7 @@ def scripted_exact(original: Callable):
 
 @contextmanager
 def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
-    """The reference decoder as a writer; what it has made is the coder in the list."""
+    """The reference decoder as a writer; the coder that it makes is put into the list."""
     made: list[ScriptedCoder] = []
 
     def coder(_: bytes) -> ScriptedCoder:
@@ -152,7 +151,7 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
 def write(function: Callable, script: Script | list, *arguments) -> bytes:
     """The stream that `function` of the reference decoder reads as the script.
 
-    It ends where the function refuses what the script says, whatever comes then."""
+    It ends at a value that the function refuses."""
     script = script if isinstance(script, Script) else Script(*script)
     with scripted(script) as made, np.errstate(all="ignore"):
         try:
@@ -172,7 +171,7 @@ ENTRY = struct.Struct("<HBBIII")
 
 @dataclass(frozen=True)
 class Entry:
-    """A chunk and what the table says of it; None: what is true."""
+    """A chunk and its entry in the table; None: the true value."""
 
     kind: int
     content: bytes
@@ -194,7 +193,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Draft:
-    """A file whose counts, lengths and checksums are right unless `header` says otherwise."""
+    """A file whose counts, lengths and checksums are correct unless `header` has others."""
 
     header: dict
     entries: tuple[Entry, ...]
@@ -228,7 +227,7 @@ class Draft:
         return self.entries[self.index(kind, level, segment)].content
 
     def change(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0, **fields) -> Draft:
-        """Another content, or another entry in the table, of one chunk."""
+        """The file with another content, or another entry in the table, for one chunk."""
         i = self.index(kind, level, segment)
         return replace(self,
                        entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1:]))
@@ -242,7 +241,7 @@ class Draft:
         return replace(self, entries=tuple(sorted(together, key=lambda e: e.key) if sort else together))
 
     def upto(self, level: int) -> Draft:
-        """Less the levels behind one."""
+        """The file without the levels after one."""
         header = self.header | {"level_count": level + 1}
         return replace(self, header=header, entries=tuple(
             e for e in self.entries if e.key[0] != 1 or e.level <= level))
@@ -283,7 +282,7 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None,
 
 
 def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
-    """None: as expected."""
+    """Script of a permutation; None: the predicted one."""
     if source is None:
         return [0]
     runs = [(0, len(stems))]
@@ -303,7 +302,7 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
 
 
 def rest_script(branches: list, points: list) -> list:
-    """Steps to whole-numbered positions, for stems whose Lag is not 0."""
+    """Steps to integer positions, for stems whose Lag is not 0."""
     script = []
     for branch in branches:
         for i in range(branch.count):
@@ -313,7 +312,7 @@ def rest_script(branches: list, points: list) -> list:
 
 
 def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
-    """Whole-numbered positions of stems that wander at random."""
+    """Integer positions of stems that are random walks."""
     random, points, first = np.random.default_rng(seed), [], []
     for stem in stems:
         first.append(len(points))
@@ -375,14 +374,13 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
 
 @dataclass
 class Plant:
-    """A file of scripts, by (kind, level, segment) or (kind, level). Streams that have none hold empty
-    rows."""
+    """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows."""
 
     stems: list[Stem]
     frames: int = 1
     segments: int = 1
     clips: tuple[rd.Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
-    points: list | None = None  # whole numbers of Rest_Step; None: `grown`
+    points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
     time: bytes | None = None  # TIME
     branch_source: list | None = None
@@ -442,7 +440,7 @@ class Plant:
                 self.plan.rest = np.array(rd.decode_rest(chunk[36:], branches, rd.f64(chunk, 28)))
 
     def _shapes(self, level: int) -> bytes:
-        """By its script. What it holds counts for the streams of STEMS."""
+        """SHAPES by its script; its values are used by the streams of STEMS."""
         motion = rd.Motion(1, rd.cosine_waves(1), shapes=self.shapes)
         return write(rd.decode_shapes, self.scripts[rd.SHAPES, level, 0], self.plan, motion, level)
 

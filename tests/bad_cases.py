@@ -1,4 +1,4 @@
-"""Cases that go wrong in every way there is, for the tests of what is to notice them (spec/robust/_cases.py)."""
+"""Cases that crash, hang, flood the memory or are wrong, for the tests of what counts them (spec/robust/_cases.py)."""
 
 from __future__ import annotations
 

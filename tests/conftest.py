@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import athcodec
+from athcodec import player
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 from blender import INSTALL, Blender, build_extension
+from counting import CountedCore
 from plants import awkward, plant
 from programs import blender_python
 from s3 import S3Server
@@ -112,7 +114,7 @@ def medley_clips():
 
     def part(start, stop, time):
         return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent,
-                          stem_index=clip.stem_index, rest=clip.rest.astype(clip.rest_dtype),
+                          stem_index=clip.stem_index, rest=clip.source_rest,
                           metadata={"unit": "m", "from": start})
 
     return {"calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
@@ -135,6 +137,18 @@ def full_ath(full_clip, tmp_path_factory):
     path = tmp_path_factory.mktemp("full") / "full.ath"
     athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16)
     return path
+
+
+@pytest.fixture(scope="session")
+def _counted_core(tmp_path_factory):
+    return CountedCore(tmp_path_factory.mktemp("counted"))
+
+
+@pytest.fixture
+def work_of(_counted_core, monkeypatch):
+    """A function that counts the work of an action; until the test ends, Python decodes with a core that counts."""
+    monkeypatch.setattr(player, "lib", _counted_core)
+    return _counted_core.work_of
 
 
 @pytest.fixture(scope="session")

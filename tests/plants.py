@@ -94,7 +94,7 @@ def awkward(seed: int, branches: int = 6, longest: int = 7, frames: int = 20, ro
             offset: float = 0.0, dtype=np.float32, **more) -> MotionClip:
     """A plant of degenerate stems in degenerate motion; a `shape` or `motion` of None is drawn anew for each branch or
     clip. offset: distance from the origin in plant sizes. shuffled: vertices and branches numbered at random, with a
-    stem index that tells their order.
+    stem index that gives their order.
     """
     rng = np.random.default_rng(seed)
     vertex_branch, branch_parent = random_hierarchy(rng, branches, longest, roots)

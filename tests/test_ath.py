@@ -4,16 +4,15 @@ the survey that makes it for any thresholds from one reading of the clip.
 
 from __future__ import annotations
 
-import time
 from itertools import product
 
 import numpy as np
 import pytest
 
+from athcodec import ath as ath_module
 from athcodec.ath import Ath, Gaps, Thresholds, build_ath, survey
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.hierarchy import hierarchy_of
 
 FRAMES = 12
 BUSHY = (np.tile(np.arange(6), 8), [-1, 0, 0, 1, 1, 2])
@@ -337,15 +336,16 @@ def test_the_result_does_not_depend_on_how_the_frames_are_read(sample_clip, monk
     np.testing.assert_array_equal(whole.whole, portions.whole)
 
 
-def test_a_chain_of_two_thousand_branches_takes_bounded_time():
+def test_of_a_chain_of_two_thousand_branches_only_the_subtrees_above_the_depth_limit_are_fitted(monkeypatch):
     rng = np.random.default_rng(10)
     rest = np.cumsum(0.01 * rng.normal(size=(4000, 3)) + (0, 0.05, 0), axis=0)
     positions = rest + np.cumsum(0.001 * rng.normal(size=(20, 4000, 3)), axis=1)
     clip = make_clip(rest, positions, np.repeat(np.arange(2000), 2), list(range(-1, 1999)))
-    hierarchy = hierarchy_of(clip)
-    begin = time.process_time()
-    ath = build_ath(clip, max_error=1e-6, hierarchy=hierarchy)
-    assert time.process_time() - begin < 3.0
+    fitted, fit = [], ath_module._Pieces.fit
+    monkeypatch.setattr(ath_module._Pieces, "fit", lambda pieces, frames: (
+        fitted.append(pieces.counts.sum() * frames.shape[1]), fit(pieces, frames))[1])
+    ath = build_ath(clip, max_error=1e-6)
+    assert sum(fitted) < 29 * clip.vertex_count * clip.frame_count
     assert ath.height == 29 and ath.node_count == 30 and ath.whole[-1]
 
 

@@ -1,4 +1,5 @@
-"""Many clips at once: every clip is there once, whole and the same as alone, whatever dies, fills up or is broken."""
+"""Batches: every clip is encoded once, completely and to the bytes of a single encoding, whatever process dies, disk
+fills up or input is broken."""
 
 from __future__ import annotations
 
@@ -61,7 +62,7 @@ def lines(out: Path) -> list[dict]:
 
 
 def done_once(out: Path) -> set[str]:
-    """Outputs that have one line that they are done, and the file that it tells of."""
+    """Outputs that have one line that they are done; each is checked against its file."""
     done = [line for line in lines(out) if line["status"] == "done"]
     assert len({line["output"] for line in done}) == len(done)
     for line in done:
@@ -118,7 +119,7 @@ def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
         assert (decoder.clip.loop, decoder.frame_count) == (True, 40)
 
 
-def test_a_blend_that_a_clip_is_too_short_for_is_told(clips, tmp_path, cluster, capsys):
+def test_a_blend_that_is_too_long_for_a_clip_is_reported(clips, tmp_path, cluster, capsys):
     words = ["batch", str(clips / "a.h5"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
     assert cli.main([*words, "--loop-blend", "7"]) == 1
     assert "loop: got 7 frames to blend, expected 0 to 6" in capsys.readouterr().err
@@ -171,7 +172,7 @@ def test_an_output_directory_may_be_moved_with_its_manifest(clips, tmp_path, clu
 
 
 @pytest.mark.parametrize("cut", [1, 10, 11, 60, 10_000])
-def test_a_torn_last_line_is_removed_and_its_clip_done_again(cut, tmp_path):
+def test_an_incomplete_last_line_is_removed_and_its_clip_encoded_again(cut, tmp_path):
     path = tmp_path / "m.jsonl"
     with Manifest(path) as notes:
         notes.add({"output": "a", "status": "done"})
@@ -186,7 +187,7 @@ def test_a_torn_last_line_is_removed_and_its_clip_done_again(cut, tmp_path):
 
 
 @pytest.mark.parametrize("rest", [b"\0" * 50, b"\0" * 50 + b"\n", b'{"outp', b'{"output": "b", "st\n'])
-def test_zeros_and_halves_at_the_end_are_torn_lines_too(rest, tmp_path):
+def test_zeros_and_half_lines_at_the_end_of_a_manifest_are_removed(rest, tmp_path):
     path = tmp_path / "m.jsonl"
     path.write_bytes(b'{"output": "a", "status": "done"}\n' + rest)
     with Manifest(path) as notes:
@@ -213,7 +214,7 @@ def test_two_runs_on_one_manifest_are_refused(clips, tmp_path, capsys):
     assert [path.name for path in out.iterdir()] == [runs.MANIFEST]
 
 
-def test_a_dry_run_says_what_would_be_done_and_writes_nothing(clips, tmp_path, capsys):
+def test_a_dry_run_lists_what_would_be_done_and_writes_nothing(clips, tmp_path, capsys):
     assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--dry-run", "--max-error", "1mm"]) == 0
     out = capsys.readouterr().out
     assert "sub/c.h5" in out and "max_error=1mm" in out and "4 clips of 4 to do" in out
@@ -256,7 +257,7 @@ def test_inputs_are_files_folders_and_patterns(clips, tmp_path, monkeypatch):
         assert batch.find([series], "out")[0].output == str(tmp_path / "out" / "frame.ath")
 
 
-def test_inputs_come_from_a_list_too(clips, tmp_path, monkeypatch, capsys):
+def test_inputs_can_come_from_a_list(clips, tmp_path, monkeypatch, capsys):
     (tmp_path / "list.txt").write_text(f"{clips}/a.h5\n\n{clips}/b.h5\n")
     words = ["batch", "--list", str(tmp_path / "list.txt"), "--out", str(tmp_path / "out"), "--dry-run", "--json"]
     assert cli.main(words) == 0
@@ -264,7 +265,7 @@ def test_inputs_come_from_a_list_too(clips, tmp_path, monkeypatch, capsys):
     assert [each["input"] for each in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
 
 
-def test_names_that_are_no_text_are_as_good_as_others(clips, tmp_path, cluster):
+def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, tmp_path, cluster):
     name = os.fsdecode(b"b\xe4um.h5")
     (clips / "a.h5").rename(clips / name)
     out = tmp_path / "out"
@@ -343,7 +344,7 @@ def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path,
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
 
 
-def test_an_input_whose_server_tells_nothing_is_known_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
+def test_an_input_without_a_modification_time_is_recognised_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
     monkeypatch.setattr(Quiet, "unsaid", "Last-Modified")
     out = tmp_path / "out"
     items = batch.find([f"{served}/a.h5"], out, settings=FAST)
@@ -412,7 +413,7 @@ def test_memory_serves_workers_in_this_process_and_is_no_place_for_others(clips,
     ("memory://out", "memory://out: got no manifest, expected a file of this machine where outputs go to a URL"),
     ("https://me:hush@example.org/out?key=hush", "https://example.org/out: got a chain of file systems or a query"),
 ])
-def test_an_output_url_that_will_not_do_is_one_line(out, message, clips, capsys):
+def test_an_unusable_output_url_is_an_error_of_one_line(out, message, clips, capsys):
     assert cli.main(["batch", str(clips / "a.h5"), "--out", out]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and message in err and "hush" not in err
@@ -462,7 +463,7 @@ def test_without_dask_the_command_that_installs_it_is_named(clips, tmp_path, mon
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scheduler_that_is_not_there_is_one_line(clips, tmp_path, monkeypatch, capsys):
+def test_an_unreachable_scheduler_is_an_error_of_one_line(clips, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs, "CONNECTING", 0.5)
     assert cli.main(["batch", str(clips), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
     err = capsys.readouterr().err
@@ -613,7 +614,7 @@ def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, tmp_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [2000, 9000])
-def test_a_full_disk_is_told_and_a_second_run_does_what_is_missing(limit, many, tmp_path):
+def test_a_full_disk_is_reported_and_a_second_run_does_what_is_missing(limit, many, tmp_path):
     out = tmp_path / "out"
     process = start(many, out, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
     code, err = finished(process)
@@ -627,7 +628,7 @@ def test_a_full_disk_is_told_and_a_second_run_does_what_is_missing(limit, many, 
 
 
 @pytest.mark.slow
-def test_a_small_disk_that_is_really_full(many, tmp_path):
+def test_a_full_tmpfs_is_reported_and_a_second_run_does_what_is_missing(many, tmp_path):
     """A tmpfs in a mount namespace of its own, which the system has to allow."""
     out, kept = tmp_path / "out", tmp_path / "kept"
     out.mkdir()

@@ -1,11 +1,10 @@
-"""The benchmark's clips are what they are said to be: plants that hang together, move, and come out alike."""
+"""The clips of the benchmark: connected plants that move as described, and the same in every run."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import ClassVar
 
@@ -86,12 +85,9 @@ def test_gusts_have_the_intensity_asked_for_and_travel_with_the_wind():
     assert np.abs(near - wind.at(points[:50], 0.0)).max() < np.abs(gusts).max() / 5
 
 
+@pytest.mark.programs
 def test_a_simulated_plant_moves_keeps_its_lengths_and_comes_out_the_same_again(recipes, tmp_path):
     recipes["small"] = SMALL
-    if find_spec("mujoco") is None:
-        with pytest.raises(simulation.MissingEngine, match="pip install mujoco"):
-            data.path_of("small", tmp_path)
-        return
     files = [data.path_of("small", tmp_path / folder) for folder in ("one", "two")]
     with athcodec.read_hdf5(files[0]) as clip, athcodec.read_hdf5(files[1]) as again:
         clip.check()
@@ -112,11 +108,8 @@ def test_without_the_engine_a_message_says_what_to_install(monkeypatch, tmp_path
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.programs
 def test_forces_around_hinges_are_those_of_the_engine():
-    if find_spec("mujoco") is None:
-        with pytest.raises(simulation.MissingEngine):
-            simulation.engine()
-        return
     mujoco = simulation.engine()
     plant = grow(60, 2, 4.0, seed=5)
     links = simulation._Links(plant)
@@ -133,11 +126,8 @@ def test_forces_around_hinges_are_those_of_the_engine():
     assert np.allclose(run._around_hinges(state.xipos[bodies], force), expected, atol=1e-12)
 
 
+@pytest.mark.programs
 def test_a_pole_bends_under_a_force_at_its_tip_as_beam_theory_says():
-    if find_spec("mujoco") is None:
-        with pytest.raises(simulation.MissingEngine):
-            simulation.engine()
-        return
     mujoco = simulation.engine()
     grown = grow(31, 0, 3.0, seed=1)
     upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]

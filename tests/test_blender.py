@@ -53,7 +53,7 @@ def test_the_sample_plays_as_the_decoder_has_it(extended_blender, sample_ath, le
 
 
 @pytest.mark.programs
-def test_speed_offset_and_loop(extended_blender, sample_ath):
+def test_speed_and_frame_offset_choose_the_frames_of_a_loop(extended_blender, sample_ath):
     script = PLAY.replace("shown = []", "shown = []\nobj.ath.speed = 2\nobj.ath.frame_offset = 11")
     shown = extended_blender.run(script, ath=sample_ath, level=-1, loop=True, frames=[11, 16, 71, 10])["shown"]
     with athcodec.open(sample_ath) as decoder:
@@ -113,7 +113,7 @@ def test_objects_play_clips_of_one_file_by_name_and_loops_go_on(extended_blender
 
 
 @pytest.mark.programs
-def test_it_plays_in_a_saved_blend_that_has_moved(extended_blender, sample_ath, tmp_path):
+def test_a_saved_blend_file_plays_after_it_was_moved(extended_blender, sample_ath, tmp_path):
     here, there = tmp_path / "here", tmp_path / "there"
     for folder in (here, there):
         folder.mkdir()
@@ -181,7 +181,7 @@ save(played=np.array(played), still=np.array(still))
 
 
 @pytest.mark.programs
-def test_what_cannot_be_played_is_said_and_stops_nothing(extended_blender, sample_ath, bushy_ath, tmp_path):
+def test_files_that_cannot_be_played_are_reported_and_stop_nothing(extended_blender, sample_ath, bushy_ath, tmp_path):
     (tmp_path / "bad.ath").write_bytes(b"no such thing")
     found = extended_blender.run("""
 fresh()
@@ -251,7 +251,7 @@ def test_what_blender_shows_is_written_within_the_bound(extended_blender, tmp_pa
 
 
 @pytest.mark.programs
-def test_an_export_comes_back_where_it_was(extended_blender, tmp_path):
+def test_an_exported_mesh_is_imported_at_the_same_place(extended_blender, tmp_path):
     found = extended_blender.run(EXPORT + """
 bpy.ops.import_scene.ath(filepath=args["ath"])
 other, again = bpy.context.active_object, []

@@ -1,4 +1,4 @@
-"""Blender moves by the caches that are written as the clip does, and what Blender writes is read."""
+"""Point caches that are written move a mesh in Blender as the clip moves, and files that Blender writes are read."""
 
 from __future__ import annotations
 

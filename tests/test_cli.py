@@ -150,6 +150,14 @@ def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path)
         assert np.array_equal(part.time, decoder.time[20:70])
 
 
+def test_depth_is_another_word_for_level(encoded, tmp_path):
+    for word in ("level", "depth"):
+        assert run("truncate", encoded, tmp_path / f"{word}.ath", f"--{word}", 1) == 0
+        assert run("decode", encoded, tmp_path / f"{word}.mdd", f"--{word}", 0) == 0
+    for suffix in ("ath", "mdd"):
+        assert (tmp_path / f"level.{suffix}").read_bytes() == (tmp_path / f"depth.{suffix}").read_bytes()
+
+
 def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, capsys):
     shorter = tmp_path / "a.ath"
     assert run("truncate", encoded, shorter, "--level", 1) == 0
@@ -160,7 +168,7 @@ def test_a_truncated_file_is_a_whole_one_of_fewer_levels(encoded, tmp_path, caps
         assert np.array_equal(decoder.positions(30), whole.positions(30, level=1))
 
 
-def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_where_told(tmp_path, capsys):
+def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_path, capsys):
     assert run("demo", "--keep", tmp_path / "new") == 0
     assert "ath-file" in (tmp_path / "new" / "athcodec_demo.html").read_text("utf-8")
     out, err = capsys.readouterr()
@@ -370,8 +378,16 @@ def test_a_reader_that_leaves_early_is_no_error(encoded, tmp_path):
     process.stderr.close()
 
 
+@pytest.fixture
+def interruptible():
+    """SIGINT interrupts, also where the tests run in the background of a shell, which has it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize("kind, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys, kind, code):
+def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys, interruptible, kind, code):
     def interrupt(stage, fraction):
         if stage == "motion":
             signal.raise_signal(kind)
@@ -379,8 +395,8 @@ def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys
     monkeypatch.setattr("athcodec.cli.verbs.progress", lambda: nullcontext(interrupt))
     try:
         result = run("encode", SAMPLE, tmp_path / "a.ath", "--effort", "fast")
-    except SystemExit as told:
-        result = told.code
+    except SystemExit as end:
+        result = end.code
     assert result == code and list(tmp_path.iterdir()) == [] and capsys.readouterr().err == ""
 
 

@@ -43,6 +43,15 @@ def test_a_clip_is_made_of_plain_arrays(forked):
     assert clip.rest.dtype == np.float64 and clip.rest_dtype == np.float32
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_changed_clip_keeps_the_dtype_of_its_rest_pose_unless_another_is_given(forked, dtype):
+    clip = MotionClip(**forked | {"rest": np.full((6, 3), 0.1, dtype)})
+    again = clip.replace(metadata={"unit": "m"})
+    assert again.metadata == {"unit": "m"} and clip.metadata == {"unit": "m", "up_axis": "y"}
+    assert again.rest_dtype == again.source_rest.dtype == dtype and np.array_equal(again.rest, clip.rest)
+    assert clip.replace(rest=np.zeros((6, 3))).rest_dtype == np.float64
+
+
 def test_fps_is_the_median_rate_of_uneven_times(forked_clip):
     assert forked_clip.fps == pytest.approx(1 / 0.15)
 

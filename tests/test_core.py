@@ -1,5 +1,5 @@
 """What an engine that calls the C core relies on (ath.h): sizes that are enough and checked, bytes in any order,
-levels and times that mean what the header says, and the same bits whichever way a frame is come by.
+levels and times that mean what the header says, and the same bits in whatever order frames are decoded.
 
 The functions are declared here from the header alone, as a program would, apart from the package's own binding.
 """
@@ -126,7 +126,7 @@ _SIGNATURES = {
     "ath_positions_float64": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
     "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
     "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
-    "ath_depth_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
 }
 
 
@@ -823,8 +823,8 @@ def test_a_blend_names_the_segments_of_its_frames(player):
 
 
 def test_a_distance_asks_for_the_coarsest_level_whose_error_is_not_seen(player):
-    def depth_for(segments, distance, pixels=1.0):
-        return core.ath_depth_for(player.address, *segments, distance, 1.0, 1080.0, pixels)
+    def level_for(segments, distance, pixels=1.0):
+        return core.ath_level_for(player.address, *segments, distance, 1.0, 1080.0, pixels)
 
     for segments in ((0, player.segments[-1]), *((each, each) for each in player.segments)):
         error = c_double()
@@ -834,11 +834,11 @@ def test_a_distance_asks_for_the_coarsest_level_whose_error_is_not_seen(player):
             worst.append(error.value)
         unit = 1080 / (2 * np.tan(0.5))
         distances = np.geomspace(worst[-1] * unit / 10, worst[0] * unit * 10, 200)
-        depths = [depth_for(segments, distance) for distance in distances]
-        for distance, depth in zip(distances, depths):
-            under = [level for level in player.levels if worst[level] * unit / distance <= 1.0]
-            assert depth == (under[0] if under else player.levels[-1])
-            assert depth_for(segments, distance, 0.5) >= depth
-        assert (np.diff(depths) <= 0).all() and (depths[0], depths[-1]) == (player.levels[-1], 0)
+        levels = [level_for(segments, distance) for distance in distances]
+        for distance, level in zip(distances, levels):
+            under = [finer for finer in player.levels if worst[finer] * unit / distance <= 1.0]
+            assert level == (under[0] if under else player.levels[-1])
+            assert level_for(segments, distance, 0.5) >= level
+        assert (np.diff(levels) <= 0).all() and (levels[0], levels[-1]) == (player.levels[-1], 0)
         for nowhere in (0.0, -1.0, float("nan")):
-            assert depth_for(segments, nowhere) == player.levels[-1]
+            assert level_for(segments, nowhere) == player.levels[-1]

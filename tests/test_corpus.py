@@ -1,4 +1,4 @@
-"""Every input that once went wrong, and what it must come to now. Files that are small are kept in corpus/.
+"""Every input that once went wrong, and what must come of it now. Files that are small are kept in corpus/.
 
 An .ath file there is used through Python and by all fuzz targets; one that is named after a target is that target's own
 input. A find without a test here is a failure.
@@ -6,8 +6,6 @@ input. A find without a test here is a failure.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -24,23 +22,13 @@ CORPUS = Path(__file__).resolve().parent / "corpus"
 TESTED = {"colliding_gaps.ath", "integers_not_yet_written.prelude"}
 
 
-def seconds(action: Callable[[], object]) -> float:
-    """The least of three."""
-    taken = []
-    for _ in range(3):
-        start = time.perf_counter()
-        action()
-        taken.append(time.perf_counter() - start)
-    return min(taken)
-
-
 def test_every_find_has_a_test():
     assert {path.name for path in CORPUS.iterdir()} == TESTED
 
 
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.ath")), ids=lambda path: path.stem)
-def test_every_file_is_refused_or_plays(path):
-    use(path.read_bytes())
+def test_every_file_plays(path):
+    assert use(path.read_bytes())
 
 
 @pytest.mark.parametrize("target", targets.TARGETS)
@@ -50,13 +38,13 @@ def test_every_input_goes_through_the_targets(target):
     assert outcome.kind == "", outcome.log
 
 
-def test_stems_whose_gaps_collide_open_nearly_as_fast_as_others():
+def test_stems_whose_gaps_collide_are_opened_with_hardly_more_work_than_others(work_of):
     """Stems with gaps of one hash were each compared with all before them: 40,000 took 7 s, and twice as many four
     times as long."""
-    others = random_gaps(np.random.default_rng(0), 20_000, 10)
-    first, second = (seconds(lambda data=stems_with_gaps(gaps): athcodec.open(BytesIO(data)))
-                     for gaps in (colliding_gaps(20_000), others))
-    assert first < 4 * second
+    others = random_gaps(np.random.default_rng(0), 4_000, 10)
+    first, second = (work_of(lambda data=stems_with_gaps(gaps): athcodec.open(BytesIO(data)))
+                     for gaps in (colliding_gaps(4_000), others))
+    assert first < 1.5 * second
 
 
 def test_what_collides_has_the_bases_that_it_would_have_alone():
@@ -66,26 +54,26 @@ def test_what_collides_has_the_bases_that_it_would_have_alone():
     assert np.array_equal(decoder.positions(0)[1:, 0], np.cumsum(rows, axis=1).ravel())
 
 
-def test_many_segments_play_in_time_proportional_to_their_number():
+def test_the_work_of_playing_segments_is_proportional_to_their_number(work_of):
     """Decoder.blocks went over all segments for each: 16,000 took 200 s."""
 
     def play(data: bytes) -> None:
         for _ in athcodec.open(BytesIO(data)).blocks():
             pass
 
-    short, long = (seconds(lambda data=segments_of_one_frame(count): play(data)) for count in (500, 4000))
-    assert long < 2.5 * 8 * short
+    short, long = (work_of(lambda data=segments_of_one_frame(count): play(data)) for count in (100, 800))
+    assert long < 1.2 * 8 * short
 
 
-def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others():
+def test_the_bytes_of_a_segment_are_found_without_looking_at_those_of_others(work_of):
     """ath_ranges looked at every chunk of the file, for each segment that was asked for."""
 
-    def ask(count: int) -> float:
+    def ask(count: int) -> int:
         decoder = athcodec.open(BytesIO(segments_of_one_frame(count)))
         core: core_file.File = decoder.file.core
-        return seconds(lambda: [core.missing(1, segment) for segment in range(0, count, count // 250)])
+        return work_of(lambda: [core.missing(1, segment) for segment in range(0, count, count // 250)])
 
-    assert ask(32_000) < 8 * ask(250), "128 times the chunks"
+    assert ask(8_000) < 2 * ask(250), "32 times the chunks"
 
 
 def test_integers_are_not_looked_at_before_they_are_written():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import time
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -19,7 +20,7 @@ from athcodec import container as ct
 from athcodec._native import LOOSE
 from athcodec.encoding import streams
 from athcodec.encoding.motion import Plan
-from athcodec.errors import BadChecksum, FormatError, LevelUnavailable
+from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
 
 
 @pytest.fixture(scope="module")
@@ -340,8 +341,8 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
     def read(_) -> None:
         for _ in range(10):
             decoder.file.check()
-            for name in ("attributes", "joined_metadata", "faces", "edges"):
-                vars(decoder.file).pop(name)  # remembered otherwise
+            for name in ("attributes", "metadata", "faces", "edges"):
+                vars(decoder.file).pop(name)   # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata == full_clip.metadata
 
@@ -387,7 +388,7 @@ def test_what_is_not_in_the_file_is_refused_with_the_range(ask, bushy_ath):
 
 def test_a_path_is_closed_again_and_a_file_object_is_left_open(bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
-        own = decoder._file
+        own = decoder.file.source
     with open(bushy_ath, "rb") as file:
         with athcodec.open(file) as decoder:
             decoder.positions(0)
@@ -432,12 +433,12 @@ def test_one_frame_has_no_frame_rate(tmp_path):
         assert decoder.fps == 0.0 and decoder.positions().shape[0] == 1
 
 
-def test_allow_partial_changes_nothing_about_a_sound_file(bushy_ath):
+def test_allow_partial_changes_nothing_about_an_intact_file(bushy_ath):
     with athcodec.open(bushy_ath) as plain, athcodec.open(bushy_ath, allow_partial=True) as partial:
         assert partial.complete and partial.missing == "" and partial.deepest == plain.deepest
         assert np.array_equal(partial.positions(), plain.positions())
-        plain.check()
-        partial.check()
+        plain.file.check()
+        partial.file.check()
 
 
 def test_checking_reads_every_byte_behind_the_tables(full_ath):
@@ -484,6 +485,19 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
             attach = hierarchy.attach[branch][hung]
             placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
             assert np.abs(placed - shown[attach]).max(initial=0) < 1e-9 * size
+
+
+@pytest.mark.parametrize("clip", [tube(8, 6, 3), plant(3, branches=6, frames=3)], ids=["one solid stem", "thin stems"])
+def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(clip, tmp_path):
+    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
+    parts = Parts.of((tmp_path / "a.ath").read_bytes())
+    level = max(chunk.level for chunk, _ in parts.chunks if chunk.kind == ct.STEMS)
+    largest = struct.pack("<f", 1e38) + parts.payload(ct.STEMS, level)[4:]
+    decoder = opened(parts.with_payload(ct.STEMS, largest, level))
+    assert np.isinf(decoder.positions(0)).any()
+    for ask in (decoder.affines, decoder.residual):
+        with pytest.raises(BadChunk, match="frame 0: got positions"):
+            ask(0)
 
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():

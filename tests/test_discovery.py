@@ -3,7 +3,6 @@ compressed; what was found can be kept, edited and used again."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections import Counter
 from pathlib import Path
@@ -34,8 +33,7 @@ def dressed() -> MotionClip:
 
 def bare(clip: MotionClip, **changes) -> MotionClip:
     """The clip without its branches."""
-    rest = changes.pop("rest", clip.rest).astype(clip.rest_dtype)
-    return dataclasses.replace(clip, vertex_branch=None, branch_parent=None, stem_index=None, rest=rest, **changes)
+    return clip.replace(vertex_branch=None, branch_parent=None, stem_index=None, **changes)
 
 
 def right_parents(found: discovery.Found, clip: MotionClip) -> float:
@@ -48,9 +46,8 @@ def right_parents(found: discovery.Found, clip: MotionClip) -> float:
 def renumbered(clip: MotionClip, order: np.ndarray) -> MotionClip:
     """The clip with vertex order[i] as vertex i."""
     place = np.argsort(order)
-    return dataclasses.replace(clip, positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
-                               vertex_branch=clip.vertex_branch[order], stem_index=None,
-                               rest=clip.rest[order].astype(clip.rest_dtype))
+    return clip.replace(positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
+                        vertex_branch=clip.vertex_branch[order], stem_index=None, rest=clip.source_rest[order])
 
 
 def test_tubes_and_leaves_are_found_again(dressed):
@@ -60,7 +57,7 @@ def test_tubes_and_leaves_are_found_again(dressed):
     assert right_parents(found, dressed) > 0.98
 
 
-def test_whatever_the_order_of_the_vertices(dressed):
+def test_branches_are_found_whatever_the_order_of_the_vertices(dressed):
     mixed = renumbered(dressed, np.random.default_rng(0).permutation(dressed.vertex_count))
     found = athcodec.find_branches(bare(mixed))
     assert right_parents(found, mixed) > 0.98
@@ -219,7 +216,7 @@ def test_a_file_without_usable_branches_is_refused(tmp_path, text, message):
         discovery.load(tmp_path / "a.json")
 
 
-def test_a_method_that_has_nothing_to_go_by_says_so(dressed):
+def test_a_method_without_the_data_that_it_needs_is_refused(dressed):
     with pytest.raises(ClipError, match="expected joints with weights"):
         athcodec.find_branches(bare(dressed), "skeleton")
     with pytest.raises(ValueError, match="method: got 'luck'"):

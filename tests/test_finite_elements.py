@@ -120,7 +120,7 @@ def test_numbered_files_of_meshio_are_read(tmp_path, suffix, how):
 @pytest.mark.parametrize("make", [mixed_clip, quad_clip])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("name, gzip", [("a.xdmf", False), ("a.xdmf", True), ("a.pvd", False), ("a.vtu", True)])
-def test_a_motion_comes_back(tmp_path, make, dtype, name, gzip):
+def test_a_motion_comes_back_from_xdmf_pvd_and_vtu(tmp_path, make, dtype, name, gzip):
     clip = make(dtype=dtype)
     clip.attributes["radius"] = np.linspace(0, 1, clip.vertex_count, dtype=np.float32)
     athcodec.write(clip, tmp_path / name, gzip=gzip)
@@ -335,13 +335,13 @@ def test_arrays_that_are_only_promised_are_not_allocated(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.xdmf.h5", "a.pvd", "a_0001.vtu", "a_0002.vtu"])
 @pytest.mark.parametrize("gzip", [False, True])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, name, gzip):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name, gzip):
     opened = tmp_path / ("a.xdmf" if "xdmf" in name else "a.pvd")
     athcodec.write(mixed_clip(frames=3), opened, gzip=gzip)
     assert survives_damage(tmp_path / name, lambda: athcodec.read(opened), cuts=15, changes=30) > 12
 
 
-def test_damage_to_legacy_files_is_an_error_and_nothing_worse(tmp_path):
+def test_damaged_legacy_files_are_refused_with_a_clip_error(tmp_path):
     points, cells = CELLS["quads and lines"]
     for how in ({}, {"binary": False}):
         for frame, each in enumerate(moved(points)[0][:2]):
@@ -351,7 +351,7 @@ def test_damage_to_legacy_files_is_an_error_and_nothing_worse(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.pvd", "a.vtu"])
-def test_a_failed_write_leaves_nothing(tmp_path, name):
+def test_a_failed_write_leaves_no_file(tmp_path, name):
     positions = np.array(quad_clip().positions)
     positions[5, 0, 0] = np.nan
     with pytest.raises(ClipError, match="frame 5"):

@@ -25,7 +25,7 @@ except OSError as error:
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limits of file sizes to take the place of a full disk")
 @pytest.mark.parametrize("name", ["a.pc2", "a.mdd", "a.obj", "a.ply", "a.npz", "a.xdmf", "a.pvd"])
-def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path, name):
+def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, name):
     for limit in (3000, 40000):
         done = subprocess.run([sys.executable, "-c", WRITE, str(tmp_path / name), str(limit)], capture_output=True,
                               text=True, timeout=120, env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)})

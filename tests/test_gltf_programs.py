@@ -4,7 +4,6 @@ Needs Node and npm; the packages are installed once, into pytest's cache. Run wi
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import shutil
@@ -161,8 +160,7 @@ def test_a_clip_goes_from_three_through_ath_and_back_to_three(three_file, node, 
 
 
 def read_as_one_branch(clip):
-    return dataclasses.replace(clip, vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]),
-                               rest=clip.rest.astype(clip.rest_dtype))
+    return clip.replace(vertex_branch=np.zeros(clip.vertex_count, np.int32), branch_parent=np.array([-1]))
 
 
 def structure(path):
@@ -173,11 +171,10 @@ def structure(path):
 def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):  # noqa: F811
     with athcodec.read_hdf5(athcodec.sample_path()) as sample:
         write(sample, tmp_path / "lines.glb", animation="joints")
-        write(dataclasses.replace(sample, edges=None, rest=sample.rest.astype(np.float32)), tmp_path / "points.glb")
+        write(sample.replace(edges=None), tmp_path / "points.glb")
     counts = np.array([leafy.vertex_count])
-    objects = dataclasses.replace(leafy, attributes=leafy.attributes | {"part_vertex_counts": counts},
-                                  metadata=leafy.metadata | {"part_names": ["bush"], "unit": "cm", "up_axis": "z"},
-                                  rest=leafy.rest.astype(np.float32))
+    objects = leafy.replace(attributes=leafy.attributes | {"part_vertex_counts": counts},
+                            metadata=leafy.metadata | {"part_names": ["bush"], "unit": "cm", "up_axis": "z"})
     write(objects, tmp_path / "objects.glb", animation="joints")
     for name in ("lines", "points", "objects"):
         assert_valid(node, tmp_path / f"{name}.glb")

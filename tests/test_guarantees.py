@@ -20,8 +20,8 @@ FORMATS = {
 }
 NUMBERED = {"obj", "ply"}  # a file per frame
 
-NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: the reader is told
-WITHOUT_UNIT = {"pc2", "mdd", "obj", "ply", "pvd"}  # formats that cannot say a unit or an axis: the reader is told
+NO_RATE = {"pc2", "obj", "ply", "pvd"}  # frames have numbers or times there, but no rate: who reads has to give it
+WITHOUT_UNIT = {"pc2", "mdd", "obj", "ply", "pvd"}  # formats without a place for a unit or an axis
 NO_STATICS = {"pc2", "mdd"}  # but for what their mesh file holds
 METRES = {"gltf"}  # always metres with y up: the reader gives that
 EXACT = {"hdf5", "npz", "usdc", "usda", "pc2", "mdd", "obj", "ply", "pvd"}  # positions bit for bit
@@ -44,8 +44,8 @@ def clip() -> MotionClip:
 def there_and_back(clip, folder, name: str) -> MotionClip:
     path = folder / FORMATS[name]
     athcodec.write(clip, path, **({"animation": "morphs"} if name == "gltf" else {}))
-    told = {"fps": RATE} if name in NO_RATE else {}
-    return athcodec.read(min(folder.glob("a_*.*")) if name in NUMBERED else path, **told)
+    given = {"fps": RATE} if name in NO_RATE else {}
+    return athcodec.read(min(folder.glob("a_*.*")) if name in NUMBERED else path, **given)
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -1,4 +1,4 @@
-"""What an engine that takes the C core relies on: the decoder compiles alone, as C and as C++, needs nothing but
+"""The C core in an engine: the decoder compiles alone, as C and as C++, needs nothing but
 memory functions, is found by CMake and pkg-config once it is installed, and plays."""
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import pytest
 
 import athcodec
 from athcodec._native import crc32c
+from fuzz.targets import CORE, decoder_sources
 
-CORE = Path(__file__).resolve().parent.parent / "athcodec" / "core"
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
 TOOLS = {**os.environ, "PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}
@@ -85,11 +85,6 @@ def run(*command, env=TOOLS) -> str:
 
 
 # ---- compiling ----
-
-
-def decoder_sources() -> list[Path]:
-    (names,) = re.findall(r"ATH_DECODER_SOURCES ([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    return [CORE / name for name in names.split()]
 
 
 @pytest.mark.parametrize("command", [
@@ -244,14 +239,14 @@ def test_the_example_plays_the_same_again(played, engine, sample_ath):
     assert without_times(again) == without_times(played) and len(rows(played)) == 24
 
 
-@pytest.mark.parametrize("spoil, says", [
+@pytest.mark.parametrize("damage, says", [
     (lambda data: b"", "header: got 0 bytes; expected 64"),
     (lambda data: data[:200], r"chunk table: got 136 bytes; expected \d+"),
     (lambda data: b"PK" + data, "file: got first bytes 0x504b8941; expected 0x89415448"),
     (lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:],
      "preparing: chunk STEMS of level 2, segment 1 at byte 8329: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
 ], ids=["empty", "cut off", "another file", "damaged"])
-def test_the_example_says_in_one_line_what_is_wrong_with_a_file(spoil, says, engine, sample_ath, tmp_path):
-    (tmp_path / "bad.ath").write_bytes(spoil(sample_ath.read_bytes()))
+def test_the_example_says_in_one_line_what_is_wrong_with_a_file(damage, says, engine, sample_ath, tmp_path):
+    (tmp_path / "bad.ath").write_bytes(damage(sample_ath.read_bytes()))
     done = subprocess.run([engine / "play", tmp_path / "bad.ath"], capture_output=True, text=True)
     assert done.returncode == 1 and re.fullmatch(rf"play: .*{says}\n", done.stderr)

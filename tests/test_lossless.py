@@ -77,7 +77,7 @@ def test_leaving_the_last_level_out_leaves_a_lossy_file(tmp_path):
     assert bits(cut.positions()) == bits(shorter.positions())
 
 
-def test_what_is_wrong_with_the_exact_level_is_said(tmp_path):
+def test_a_missing_or_corrupted_exact_level_is_refused_by_name(tmp_path):
     clip = plant(seed=6, branches=5, frames=40)
     parts = Parts.of(encoded(clip, path=tmp_path / "a.ath", segment_frames=16))
     last = parts.header.level_count - 1

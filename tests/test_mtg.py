@@ -153,7 +153,7 @@ def test_what_is_no_mtg_is_refused_with_its_line(tmp_path, code, message, header
     assert str(path) in str(caught.value)
 
 
-def test_damage_is_an_error_and_nothing_worse(tmp_path):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path):
     data = written(tmp_path, MEASURED).read_bytes()
     rng, refused = np.random.default_rng(0), 0
     for _ in range(300):
@@ -165,4 +165,4 @@ def test_damage_is_an_error_and_nothing_worse(tmp_path):
             read_mtg(tmp_path / "plant.mtg")
         except ClipError:
             refused += 1
-    assert refused > 30
+    assert 30 < refused < 300

@@ -81,7 +81,7 @@ def test_only_the_frames_asked_for_are_read(tmp_path, monkeypatch):
     assert made == [(2, 7, 3)]
 
 
-def test_going_forward_unpacks_once(tmp_path, monkeypatch):
+def test_reading_forward_unpacks_once(tmp_path, monkeypatch):
     motion = np.random.default_rng(0).random((64, 7, 3))
     np.savez_compressed(tmp_path / "a.npz", positions=motion)
     with athcodec.read(tmp_path / "a.npz") as clip:
@@ -102,7 +102,7 @@ def test_branches_are_derived_from_edges_as_in_hdf5(forked, tmp_path):
         assert clip.stem_index.tolist() == [3, 2, 1, 0, 0, 1]
 
 
-def test_end_to_end_the_bound_holds(tmp_path):
+def test_decoded_frames_written_to_an_archive_keep_the_bound(tmp_path):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder, frames=range(4, 20)), tmp_path / "a.npz")
@@ -157,7 +157,7 @@ def test_static_arrays_that_are_too_large_can_be_skipped(tmp_path, monkeypatch):
         assert clip.attributes == {}
 
 
-def test_nothing_is_unpickled(tmp_path):
+def test_a_pickle_in_an_archive_is_not_executed(tmp_path):
     class Trap:
         def __reduce__(self):
             return os.mkdir, (str(tmp_path / "sprung"),)
@@ -170,12 +170,12 @@ def test_nothing_is_unpickled(tmp_path):
 
 
 @pytest.mark.parametrize("gzip", [False, True])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, gzip):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path, gzip):
     athcodec.write(quad_clip(), tmp_path / "a.npz", gzip=gzip)
     assert survives_damage(tmp_path / "a.npz", lambda: athcodec.read(tmp_path / "a.npz"), changes=80) > 30
 
 
-def test_a_failed_write_leaves_nothing(tmp_path):
+def test_a_failed_write_leaves_no_file(tmp_path):
     positions = np.array(quad_clip().positions)
     positions[5, 0, 0] = np.nan
     with pytest.raises(ClipError, match="frame 5"):

@@ -49,7 +49,7 @@ def test_a_pc2_cache_states_a_rate_only_where_it_is_given_or_needed(tmp_path):
     assert (tmp_path / "c.pc2").read_bytes() == (tmp_path / "b.pc2").read_bytes()
 
 
-def test_the_times_of_an_mdd_cache_tell_its_rate(tmp_path):
+def test_the_times_of_an_mdd_cache_give_its_rate(tmp_path):
     for rate, start in ((24, 0), (25, 1), (30, 100), (24000 / 1001, 5), (60, -3)):
         times = [(start + frame) / rate for frame in range(4)]
         (tmp_path / "a.mdd").write_bytes(mdd_bytes(times=times))
@@ -163,7 +163,7 @@ def test_a_broken_cache_is_refused_and_named(tmp_path, name, data, message):
 
 
 @pytest.mark.parametrize("name", ["tree.pc2", "tree.mdd"])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, name):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name):
     athcodec.write(quad_clip(), tmp_path / name)
     assert survives_damage(tmp_path / name, lambda: athcodec.read(tmp_path / name)) > 25
 
@@ -178,7 +178,7 @@ def test_a_cache_that_shrinks_while_it_is_read_is_an_error(tmp_path):
             pass
 
 
-def test_a_failed_write_leaves_nothing(tmp_path):
+def test_a_failed_write_leaves_no_file(tmp_path):
     positions = np.array(quad_clip().positions)
     positions[5, 0, 0] = np.nan
     broken = MotionClip(positions, np.arange(6.0), faces=quad_clip().faces)

@@ -154,7 +154,7 @@ def outcome(call) -> object:
 
 
 @pytest.mark.parametrize("name", ["clips-loops", "clips-time-uneven"])
-def test_spoilt_clips_and_times_are_refused_alike_or_mean_the_same(name):
+def test_corrupted_clips_and_times_are_refused_alike_or_mean_the_same(name):
     parts = Parts.of((VECTORS / f"{name}.ath").read_bytes())
     outcomes = []
     for kind, content in changed_contents(parts, {"CLIPS", "TIME"}):
@@ -181,7 +181,7 @@ def changed_contents(parts: Parts, names: set[str]) -> Iterator[tuple[int, bytes
         yield kind, bytes(changed)
 
 
-def test_spoilt_chunks_are_refused_alike_or_mean_the_same(full_ath):
+def test_corrupted_chunks_are_refused_alike_or_mean_the_same(full_ath):
     """Motion, hierarchy, rest and times with some bytes changed, and checksums that fit."""
     parts, rng = Parts.of(full_ath.read_bytes()), np.random.default_rng(0)
     motion_or_prelude = [i for i, (c, _) in enumerate(parts.chunks) if c.is_motion or c.kind < 4]

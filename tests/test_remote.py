@@ -1,4 +1,4 @@
-"""Files behind a URL: few requests, the same bits, and one clear line where the server does not play along.
+"""Files behind a URL: few requests, the same bits, and an error of one line where the server fails.
 
 The server is a real one on this machine, with faults that a test switches on.
 """
@@ -11,7 +11,6 @@ import re
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -39,7 +38,7 @@ class Server(ThreadingHTTPServer):
         self.data, self.tags = data, {"ETag": '"one"', "Last-Modified": "Mon, 01 Jan 2024 00:00:00 GMT"}
         self.ranges: list[tuple[int, int]] = []
         self.fault: Callable[[Handler, int, int], bool] = lambda handler, start, stop: False
-        self.served = 0
+        self.ending = threading.Event()
 
     @property
     def url(self) -> str:
@@ -120,7 +119,7 @@ def hang_up(handler: Handler, start: int, stop: int) -> bool:
 
 
 def stall(handler: Handler, start: int, stop: int) -> bool:
-    time.sleep(2)
+    handler.server.ending.wait()
     handler.close_connection = True
     return True
 
@@ -159,6 +158,7 @@ def server(large_ath, monkeypatch):
         thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()
         yield server
+        server.ending.set()
         server.shutdown()
         thread.join()
 
@@ -302,7 +302,7 @@ def test_several_threads_play_from_one_server(server, local):
 
 
 @pytest.mark.parametrize("fault", [drop, hang_up, overloaded])
-def test_a_fault_that_passes_is_not_noticed(fault, server, local):
+def test_a_passing_fault_is_retried_unnoticed(fault, server, local):
     server.fault = first(2, fault)
     with athcodec.open(server.url) as decoder:
         server.fault = first(3, fault)
@@ -322,11 +322,11 @@ def test_a_fault_that_stays_is_named_with_the_number_of_tries(fault, message, wh
 
 
 def test_a_server_that_stalls_is_given_up(server, local):
-    server.fault = after(1, stall)
-    with Remote(server.url, timeout=0.1, retries=1) as source, athcodec.open(source) as decoder:
+    with Remote(server.url, retries=1) as source, athcodec.open(source) as decoder:
+        patience, source.timeout, server.fault = source.timeout, 0.1, stall
         with pytest.raises(RemoteError, match=r"no answer, or not all of it, within 0\.1 seconds; tried 2 times"):
             decoder.positions()
-        server.fault = lambda *_: False
+        source.timeout, server.fault = patience, lambda *_: False
         assert np.array_equal(decoder.positions(), local.positions()), "and can be asked again"
 
 
@@ -334,7 +334,7 @@ def test_a_server_that_sends_a_byte_now_and_then_is_given_up_too(server, monkeyp
     def trickle(handler: Handler, start: int, stop: int) -> bool:
         handler.send_range(start, stop, b"")
         for byte in handler.server.data[start:stop]:
-            time.sleep(0.02)
+            handler.server.ending.wait(0.02)
             handler.wfile.write(bytes([byte]))
         return True
 
@@ -485,7 +485,7 @@ def other_url(request, large_ath):
     return "memory://deep/tree.ath"
 
 
-def test_other_systems_of_fsspec_work(other_url, local):
+def test_other_file_systems_of_fsspec_give_the_same_positions(other_url, local):
     with athcodec.open(other_url) as decoder:
         decoder.file.check()
         assert np.array_equal(decoder.positions(), local.positions())
@@ -545,7 +545,7 @@ def test_without_the_optional_packages_the_message_names_the_command_that_instal
                                        'pip install "athcodec[remote]"\n')
 
 
-def test_a_plain_file_is_opened_without_them():
+def test_a_local_file_is_opened_without_fsspec_and_aiohttp():
     code = ("import sys; sys.modules['fsspec'] = sys.modules['aiohttp'] = None\n"
             "import athcodec.sources, athcodec.cli; assert 'asyncio' not in sys.modules")
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

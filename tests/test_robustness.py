@@ -1,4 +1,4 @@
-"""`python -m spec.robustness` counts what it is there to count, and reports all of it."""
+"""`python -m spec.robustness` counts crashes, hangs, floods of memory and wrong results, and reports all of them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_crashes_hangs_floods_and_wrong_results_are_counted_and_the_rest_goes_on
     assert row.faults == 5 and row.note.startswith("all; ")
 
 
-def test_cases_end_with_their_time():
+def test_cases_stop_when_their_time_is_up():
     cases = _cases.Cases("slow", {"plant": b"seed"}, [("plant", "nap")] * 500, behave)
     row = _cases.run(cases, 1)
     assert 0 < row.tried < 500 and row.faults == 0 and row.note == "of 500"
@@ -45,7 +45,7 @@ def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monk
 
 
 @pytest.mark.slow
-def test_hostile_files_do_no_harm(tmp_path):
+def test_hostile_files_cause_no_crash_hang_or_flood_of_memory(tmp_path):
     done = subprocess.run([sys.executable, "-m", "spec.robustness", "--only", "hostile", "--seconds", "90", "--out",
                            str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

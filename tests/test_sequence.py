@@ -68,7 +68,7 @@ def test_numbers_without_zeros_and_with_gaps_are_frames(tmp_path, named):
     assert sorted(path.name for path in tmp_path.glob("v*")) == ["v_0002.obj", "v_0003.obj", "v_0010.obj"]
 
 
-def test_numbers_that_outgrow_their_zeros_go_on(tmp_path):
+def test_frame_numbers_may_outgrow_their_leading_zeros(tmp_path):
     write_triangles(tmp_path, ["a099.obj", "a100.obj", "a1000.obj", "a7.obj"])
     for named in ("a099.obj", "a100.obj", "a###.obj", "a%03d.obj", "a1000.obj"):
         with athcodec.read(tmp_path / named, fps=1) as clip:
@@ -104,7 +104,7 @@ def test_normals_and_names_that_change_from_file_to_file_are_no_topology(tmp_pat
         assert clip.block(0, 3)[:, 0, 2].tolist() == [0, 1, 2] and clip.faces.tolist() == [[0, 1, 2]]
 
 
-def test_obj_as_people_write_it():
+def test_obj_with_comments_continuations_and_relative_numbers_is_read():
     mesh = obj("# a leaf\r\nv  0 0 0 1 0 0\r\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\nvt 1 1\n"
                "usemtl green\nf -4/1/1 -3/2/1 \\\n -2/3/1\nusemtl bark\nf 1 3 4\nl 1 2 3\np 4\ns off\ncstype bezier\n")
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.edges.tolist() == [[0, 1], [1, 2]]
@@ -175,7 +175,7 @@ def test_other_libraries_read_what_is_written(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply"])
-def test_end_to_end_the_bound_holds(tmp_path, suffix):
+def test_decoded_frames_written_as_numbered_files_keep_the_bound(tmp_path, suffix):
     clip = quad_clip(frames=20)
     with athcodec.open(coded(clip, tmp_path)) as decoder:
         athcodec.write(ClipView(decoder), tmp_path / f"out{suffix}")
@@ -207,7 +207,7 @@ def test_files_of_another_motion_are_not_mixed_in(tmp_path):
     assert len(os.listdir(tmp_path)) == 6
 
 
-def test_a_failed_write_leaves_nothing(tmp_path):
+def test_a_failed_write_leaves_no_file(tmp_path):
     positions = np.array(quad_clip().positions)
     positions[5, 0, 0] = np.nan
     with pytest.raises(ClipError, match="frame 5"):
@@ -216,7 +216,7 @@ def test_a_failed_write_leaves_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["tree_0001.obj", "tree_0003.obj", "tree_0001.ply", "tree_0003.ply"])
-def test_damage_is_an_error_and_nothing_worse(tmp_path, name):
+def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name):
     athcodec.write(mixed_clip(frames=4), tmp_path / f"tree{name[-4:]}")
     assert survives_damage(tmp_path / name, lambda: athcodec.read(tmp_path / f"tree_0002{name[-4:]}")) > 15
 
@@ -248,7 +248,7 @@ def test_a_broken_file_is_refused_and_named(tmp_path, name, text, message):
     assert str(tmp_path / name) in str(caught.value)
 
 
-def test_what_is_not_there_is_said(tmp_path):
+def test_missing_files_are_reported(tmp_path):
     with pytest.raises(ClipError, match="got no such files, expected some like a_0001.obj"):
         athcodec.read(tmp_path / "a_####.obj")
     with pytest.raises(FileNotFoundError):

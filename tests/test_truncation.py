@@ -72,18 +72,18 @@ def test_every_chunk_boundary_is_a_place_to_stop(whole):
         assert_plays_as_far_as_it_goes(whole, size)
 
 
-def test_so_is_any_byte_behind_the_prelude(whole):
+def test_any_byte_behind_the_prelude_is_a_place_to_stop(whole):
     for size in np.random.default_rng(0).integers(whole.prelude, len(whole.data), 40):
         assert_plays_as_far_as_it_goes(whole, int(size))
 
 
 @pytest.mark.slow
-def test_so_is_every_byte_of_a_small_file(full):
+def test_every_byte_of_a_small_file_behind_the_prelude_is_a_place_to_stop(full):
     for size in range(full.prelude, len(full.data)):
         assert_plays_as_far_as_it_goes(full, size)
 
 
-def test_every_byte_inside_the_prelude_is_too_early(bushy, full):
+def test_files_cut_inside_the_prelude_are_refused(bushy, full):
     for whole in (bushy, full):
         for size in range(whole.prelude):
             with pytest.raises((Truncated, NotAnAthFile)) as caught:

@@ -39,7 +39,7 @@ def test_every_file_is_listed_once_and_has_not_changed():
         assert f"{container.crc32c(vector.path.read_bytes()):08x}" == vector.checksum, vector.name
 
 
-def test_there_are_many_and_they_are_small():
+def test_there_are_over_eighty_vectors_in_less_than_a_megabyte():
     sizes = [vector.path.stat().st_size for vector in VECTORS]
     assert sum(vector.valid for vector in VECTORS) >= 40 and sum(not vector.valid for vector in VECTORS) >= 40
     assert sum(sizes) < 1 << 20 and sorted(sizes)[len(sizes) * 9 // 10] < 2048
@@ -90,7 +90,7 @@ def test_scripts_still_make_the_very_same_files():
             assert vector.make() == (conformance.FOLDER / vector.path).read_bytes(), vector.path
 
 
-def test_what_is_there_is_left_alone(tmp_path):
+def test_existing_vectors_are_left_alone(tmp_path):
     folder = tmp_path / "vectors"
     kept, listed = "valid/smallest.ath 00000000 strict=ok # an older one", folder / "expected.txt"
     (folder / "valid").mkdir(parents=True)
@@ -107,7 +107,7 @@ def test_what_is_there_is_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("name", conformance.OWN)
-def test_own_decoders_say_what_is_expected(name):
+def test_own_decoders_answer_as_expected(name):
     own = conformance.OWN[name]
     if name == "wasm" and conformance.shutil.which("node") is None:
         pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
@@ -148,7 +148,7 @@ def test_a_program_that_decodes_well_passes(tmp_path):
     ("data = b''", "valid/all-at-origin.ath", "0: got 00000000"),
     ("data = data.replace(b'storm', b'Storm')", "valid/clips-two.ath", "clips: got "),
 ], ids=["other bits", "another error", "no error's name", "no error", "a crash", "nothing", "another name"])
-def test_a_program_that_does_not_is_told_what_is_wrong(body, only, complaint, tmp_path):
+def test_a_wrong_answer_of_a_program_is_reported(body, only, complaint, tmp_path):
     printed = run("--only", only, *decoder_that(tmp_path, body), code=1)
     assert complaint in printed and only in printed and "0 wrong" not in printed
 

@@ -1,4 +1,4 @@
-"""What a web page relies on: the decoder in WebAssembly shows the same bits as the C library, plays files
+"""The decoder in WebAssembly: it shows the same bits as the C library, plays files
 that arrive in pieces, names what is wrong with a damaged one, and is what the sources make."""
 
 from __future__ import annotations
@@ -271,12 +271,12 @@ answer({
     (_, clip) => seconds.map((s) => file.frameAt(s, wrap, clip)))),
   clips: file.clips.map((clip, i) => [clip.name, clip.duration, clip.firstFrame, clip.frameCount, clip.firstSegment,
                                       clip.segmentCount, clip.loop, levels.map((level) => file.seamError(i, level))]),
-  depthFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.depthFor(d, 0.8, 1080, 1)),
+  levelFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.levelFor(d, 0.8, 1080, 1)),
 });
 """
 
 
-def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
+def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
     native = Native(any_ath.read_bytes())
     lib, file, info = native.lib, native.file, native.info
     rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))
@@ -298,7 +298,7 @@ def test_tells_of_a_file_what_the_c_library_does(any_ath, tmp_path):
                    clip.segment_count, bool(clip.loop),
                    [lib.ath_seam_error(file, i, level) for level in range(info.level_count)]]
                   for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])],
-        "depthFor": [lib.ath_depth_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080),
+        "levelFor": [lib.ath_level_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080),
                                        c_double(1)) for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
     assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
 

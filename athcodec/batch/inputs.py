@@ -24,14 +24,24 @@ from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
 from athcodec.sources.sequence import sequence_files
 
 FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
-SUFFIXES = tuple(suffix for each in FORMATS for suffix in each.suffixes if suffix not in FRAME_SUFFIXES)
+SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
 TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified", "mtime", "md5Hash", "generation",
         "created")  # what file systems say of a file that changes with it
 
 
 @dataclass(frozen=True)
 class Item:
-    """A clip of a batch: its name, where it is and where its file goes (absolute paths or URLs), its settings."""
+    """A clip of a batch.
+
+    Parameters
+    ----------
+    name : str
+        Its path below the directory that was given, or the name of a plain file.
+    input, output : str
+        Where it is, and where its .ath file goes: absolute paths or URLs.
+    settings : dict
+        As `check_settings` gives them.
+    """
 
     name: str
     input: str
@@ -40,7 +50,7 @@ class Item:
 
     @property
     def fingerprint(self) -> str:
-        """Short, and of plain characters whatever the names have."""
+        """Of the output: short, and of plain characters whatever the names have."""
         return hashlib.sha256(os.fsencode(self.output)).hexdigest()[:16]
 
     @property
@@ -52,13 +62,33 @@ class Item:
 def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
          settings: Mapping[str, Any] | None = None,
          patterns: Mapping[str, Mapping[str, Any]] | None = None) -> list[Item]:
-    """The clips that `inputs` name, by name, with outputs in the directory `output`, a path or a URL.
+    """List the clips of a batch.
 
-    settings: those of all clips; patterns: further ones by pattern, see settings.py. Raises ClipError where an input
-    names nothing, settings do not exist, or two inputs would have one output; OSError.
+    Parameters
+    ----------
+    inputs : iterable of str or path
+        Files, directories, patterns of names, URLs.
+    output : str or path
+        The directory of the .ath files, a path or a URL.
+    settings : dict, optional
+        Those of all clips; see `check_settings`.
+    patterns : dict of str to dict, optional
+        Further settings by pattern of the clips' names; see `load_settings`.
+
+    Returns
+    -------
+    list of Item
+        In the order of their names.
+
+    Raises
+    ------
+    ClipError
+        Where an input names no clip, a setting does not exist, or two inputs would have the same output.
+    OSError
+        Where an input does not exist.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(each, f'["{pattern}"]') for pattern, each in (patterns or {}).items()}
+    patterns = {pattern: check_settings(given, f'["{pattern}"]') for pattern, given in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
@@ -147,9 +177,9 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
     except Exception as error:  # each file system has errors of its own
         raise RemoteError(f"{shown}: {type(error).__name__}: {_one_line(error)}") from None
     base = path.rstrip("/") if is_folder else _fixed_part(path, "/")
-    for each in sorted(found):
-        if not is_folder or _is_clip(posixpath.basename(each)):
-            yield posixpath.relpath(each, base) if base else each, system.unstrip_protocol(each)
+    for found_path in sorted(found):
+        if not is_folder or _is_clip(posixpath.basename(found_path)):
+            yield posixpath.relpath(found_path, base) if base else found_path, system.unstrip_protocol(found_path)
 
 
 def file_system(url: str) -> tuple[Any, str]:
@@ -214,7 +244,7 @@ def _frames(path: str) -> list[str]:
 
 def _files_identity(paths: list[str]) -> dict[str, Any]:
     stats = [os.stat(path) for path in paths]
-    known = {"size": sum(each.st_size for each in stats), "mtime_ns": max(each.st_mtime_ns for each in stats)}
+    known = {"size": sum(stat.st_size for stat in stats), "mtime_ns": max(stat.st_mtime_ns for stat in stats)}
     return known | ({"files": len(stats)} if len(stats) > 1 else {})
 
 

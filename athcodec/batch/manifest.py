@@ -1,8 +1,8 @@
 """The manifest of a batch: one JSON line per clip that was finished or failed, appended when its file is in place.
 
-A line is on the disk before the next is written. The last line for an output counts. A line that was torn off, by a
-kill or a full disk, is removed when the manifest is opened again: its clip is done anew. One process at a time has a
-manifest open; the system drops its lock when the process dies.
+A line is on the disk before the next is written. The last line for an output counts. A line that is incomplete, after
+a kill or on a full disk, is removed when the manifest is opened again, and its clip is encoded again. One process at a
+time has a manifest open; the system drops its lock when the process dies.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Record = dict[str, Any]
 
 
 class ManifestError(AthError):
-    """A manifest is in use, or is none."""
+    """A manifest is in use by another run, or is no manifest."""
 
 
 class Manifest:

@@ -1,4 +1,4 @@
-"""A run of a batch, as the process sees it that was started: what is left to do, workers, results, the manifest.
+"""A run of a batch, in the process that was started: which clips are to be encoded, workers, results, the manifest.
 
 Only this process writes the manifest, and only when a clip's file is in its place. Clips that fail are noted and
 do not stop the others. Drafts and coded segments of long clips, and inputs that were downloaded, lie in a folder
@@ -48,7 +48,17 @@ class SchedulerError(AthError):
 
 @dataclass
 class Outcome:
-    """What a run did: the records it added to the manifest, and the clips that were as they should be."""
+    """What a run did.
+
+    Attributes
+    ----------
+    done, failed : list of dict
+        The records that it added to the manifest.
+    kept : list of Item
+        Clips whose files were up to date.
+    seconds : float
+        How long it took.
+    """
 
     done: list[Record] = field(default_factory=list)
     failed: list[Record] = field(default_factory=list)
@@ -57,17 +67,27 @@ class Outcome:
 
     @property
     def bytes(self) -> int:
+        """Size of all files that it wrote."""
         return sum(record["bytes"] for record in self.done)
 
     @property
     def raw_bytes(self) -> int:
+        """Size of the positions in these files, uncompressed."""
         return sum(record["raw_bytes"] for record in self.done)
 
 
 @dataclass(frozen=True)
 class Todo:
-    """A clip, why it has to be encoded ("" where it is as it should be), and its record where only the content of its
-    input can tell whether it has changed."""
+    """Whether a clip has to be encoded.
+
+    Attributes
+    ----------
+    item : Item
+    reason : str
+        Why; "" where its file is up to date.
+    known : dict or None
+        Its record in the manifest, where only the content of its input can show whether it has changed.
+    """
 
     item: Item
     reason: str
@@ -76,7 +96,25 @@ class Todo:
 
 def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
             redo: bool = False) -> list[Todo]:
-    """What `run` would do with each clip. Nothing is written."""
+    """What `run` would do with each clip. Nothing is written.
+
+    Parameters
+    ----------
+    items, output, manifest, redo
+        As in `run`.
+
+    Returns
+    -------
+    list of Todo
+        One for each item.
+
+    Raises
+    ------
+    ManifestError
+        Where the manifest is none.
+    OSError
+        Where it cannot be read.
+    """
     records = read_records(_manifest_path(output, manifest))
     return [_todo(item, records.get(_key(item, output)), redo) for item in items]
 
@@ -84,15 +122,47 @@ def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: 
 def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
         workers: int | None = None, scheduler: str | None = None, split: int = SPLIT, verify: bool = False,
         redo: bool = False, show: Show | None = None) -> Outcome:
-    """Encodes what is left to do of some items, whose outputs are in the directory `output`, a path or a URL.
+    """Encode those clips of a batch whose files are not up to date.
 
-    manifest: its file (default: athcodec-batch.jsonl in `output`; needed where that is a URL); clips that it has as
-    done, with the same settings and input, and whose file has the checksum that it says, are kept; of files behind a
-    URL, what their server says has to be as it was. workers: processes on this machine (default: one
-    per core); scheduler: the address of a scheduler of Dask to use instead, whose workers have the same athcodec and
-    see inputs and outputs under the same paths. split: a clip of more segments is coded that many at a time, in any
-    workers. verify: each file is opened and every level decoded before it is noted. redo: keep nothing. Raises
-    MissingExtra, ManifestError, SchedulerError, OSError; what goes wrong with a clip is in the outcome.
+    Parameters
+    ----------
+    items : sequence of Item
+        See `find`.
+    output : str or path
+        The directory of their outputs, a path or a URL.
+    manifest : str or path, optional
+        The manifest, athcodec-batch.jsonl in `output` by default; it must be given where that is a URL. A clip that it
+        has as done, with the same settings and input, and whose file has the recorded checksum, is kept; of a file
+        behind a URL, what its server says must be as recorded.
+    workers : int, optional
+        Processes on this machine, one per core by default.
+    scheduler : str, optional
+        Address of a Dask scheduler to use instead, whose workers have the same athcodec and see inputs and outputs
+        under the same paths.
+    split : int, optional
+        A clip of more segments than this is coded that many segments at a time, by any workers.
+    verify : bool, optional
+        Open each file and decode every level of it before it is recorded.
+    redo : bool, optional
+        Keep nothing.
+    show : Show, optional
+        How the run is followed; not at all by default.
+
+    Returns
+    -------
+    Outcome
+        Also with the clips that failed: they do not stop the others.
+
+    Raises
+    ------
+    MissingExtra
+        Where dask.distributed is missing.
+    ManifestError
+        Where the manifest is in use, or is none.
+    SchedulerError
+        Where the scheduler, or all workers, cannot be reached.
+    OSError
+        Where the manifest cannot be written.
     """
     if find_spec("distributed") is None:
         raise MissingExtra('batch: needs dask.distributed: pip install "athcodec[batch]"')
@@ -104,15 +174,15 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
         os.chmod(folder, 0o700)  # workers unpickle what lies there
         todo = []
         for item in items:
-            each = _todo(item, notes.records.get(_key(item, output)), redo)
-            todo.append(each) if each.reason else outcome.kept.append(item)
-        show.begin([each.item for each in todo], len(outcome.kept))
+            entry = _todo(item, notes.records.get(_key(item, output)), redo)
+            todo.append(entry) if entry.reason else outcome.kept.append(item)
+        show.begin([entry.item for entry in todo], len(outcome.kept))
         try:
             if todo:
                 with _client(workers, scheduler) as client:
                     _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
         finally:
-            _tidy(each.item.output for each in todo if not is_url(each.item.output))
+            _tidy(entry.item.output for entry in todo if not is_url(entry.item.output))
             show.end()
     outcome.seconds = time.monotonic() - start
     return outcome
@@ -126,7 +196,7 @@ def _manifest_path(output: str | os.PathLike[str], manifest: str | os.PathLike[s
 
 
 def _tidy(outputs: Iterable[str]) -> None:
-    """Removes what workers that were stopped have left."""
+    """Removes the unfinished files of workers that were stopped."""
     folders: dict[str, list[str]] = {}
     for output in outputs:
         folder, name = os.path.split(output)
@@ -203,7 +273,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # workers that die are no news: the manifest tells
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # of workers that die the manifest has a record
     if scheduler is None:
         with _cluster(workers or os.cpu_count() or 1) as cluster, distributed.Client(cluster) as client:
             yield client
@@ -236,7 +306,7 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 class _Run:
-    """Clips on their way through the workers."""
+    """The clips that workers encode, and their results."""
 
     def __init__(self, client: Any, output: str, folder: str, notes: Manifest, outcome: Outcome, show: Show, split: int,
                  verify: bool):
@@ -250,18 +320,18 @@ class _Run:
 
     def all(self, todo: Sequence[Todo]) -> None:
         """Until each clip is in the manifest."""
-        outputs = {each.item.fingerprint: each.item.output for each in todo}
+        outputs = {entry.item.fingerprint: entry.item.output for entry in todo}
 
         def show(event: tuple[float, dict[str, Any]]) -> None:
             self.show.stage(outputs[event[1]["clip"]], event[1]["stage"], event[1]["fraction"])
 
         self.client.subscribe_topic(self.topic, show)
         try:
-            for each in todo:
-                if not is_url(each.item.output):
-                    os.makedirs(os.path.dirname(each.item.output), exist_ok=True)
-                self._submit(each.item, "begin", tasks.begin, self._folder(each.item), split=self.split,
-                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=each.known)
+            for entry in todo:
+                if not is_url(entry.item.output):
+                    os.makedirs(os.path.dirname(entry.item.output), exist_ok=True)
+                self._submit(entry.item, "begin", tasks.begin, self._folder(entry.item), split=self.split,
+                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=entry.known)
             while self.pending:
                 self._take()
         finally:

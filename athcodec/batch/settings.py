@@ -38,7 +38,26 @@ Settings = dict[str, Any]
 
 
 def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
-    """Settings by pattern, in the file's order; paths in it are relative to its folder. Raises ClipError, OSError."""
+    """Read the settings of a batch from a TOML file.
+
+    Parameters
+    ----------
+    path : str or path
+        A table of settings under each pattern of names (fnmatch); of all patterns that a name fits, later ones win.
+        Paths in it are relative to its folder.
+
+    Returns
+    -------
+    dict of str to dict
+        Checked settings by pattern, in the order of the file.
+
+    Raises
+    ------
+    ClipError
+        Where it is no TOML, or a setting does not exist or has a value that it cannot have.
+    OSError
+        Where it cannot be opened.
+    """
     with open(path, "rb") as file:
         try:
             content = tomllib.load(file)
@@ -54,7 +73,28 @@ def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
 
 def check_settings(settings: Mapping[str, Any], where: str = "settings",
                    folder: str | os.PathLike[str] = ".") -> Settings:
-    """Settings as they are compared: paths absolute, numbers as numbers. Raises ClipError."""
+    """Check the settings of clips, and bring them to the form in which the manifest has them.
+
+    Parameters
+    ----------
+    settings : dict
+        Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop and loop_blend.
+        Lengths and sizes may be text with a unit, "1mm".
+    where : str, optional
+        What error messages begin with.
+    folder : str or path, optional
+        What paths are relative to.
+
+    Returns
+    -------
+    dict
+        The settings with absolute paths, and numbers as numbers.
+
+    Raises
+    ------
+    ClipError
+        Where a setting does not exist or has a value that it cannot have.
+    """
     checked = {}
     for name, value in settings.items():
         if name not in _CHECKS:
@@ -184,7 +224,7 @@ def _one_of(*names: str) -> Callable[[Any], str]:
 
 def _patterns(value: Any) -> list[str]:
     patterns = [value] if isinstance(value, str) else list(value)
-    if not all(isinstance(each, str) for each in patterns):
+    if not all(isinstance(pattern, str) for pattern in patterns):
         raise ValueError("expected a pattern or a list of them")
     return patterns
 

@@ -22,19 +22,19 @@ ENDED = ("done", "failed", "kept")
 
 
 class Show:
-    """What a run tells while it lasts; nothing is shown. Stages come from another thread than the rest."""
+    """What a run reports; this base class shows nothing. `stage` is called by another thread than the others."""
 
     def begin(self, items: Sequence[Item], kept: int) -> None:
-        """Before the first clip; `kept` are as they should be already."""
+        """Before the first clip; the files of `kept` further ones are up to date."""
 
     def stage(self, output: str, stage: str, fraction: float) -> None:
-        """How far a clip is."""
+        """How far the clip of an output is: the stage, and the fraction of it that is done."""
 
     def finished(self, item: Item, record: dict[str, Any]) -> None:
-        """A clip that is done or has failed."""
+        """A clip that is done or has failed, and its record in the manifest."""
 
     def kept(self, item: Item) -> None:
-        """A clip that turned out to be as it should be."""
+        """A clip whose file has turned out to be up to date."""
 
     def end(self) -> None:
         """After the last clip, or an interruption."""
@@ -94,9 +94,9 @@ class LiveTable(Show):
 
     def _ended(self, output: str, state: str, said: str) -> None:
         self.rows.pop(output, None)
-        ended = [each for each, (before, _) in self.rows.items() if before in ENDED]
-        for each in ended[: max(0, len(ended) - ROWS // 2)]:
-            del self.rows[each]
+        ended = [row for row, (before, _) in self.rows.items() if before in ENDED]
+        for row in ended[: max(0, len(ended) - ROWS // 2)]:
+            del self.rows[row]
         self.rows[output] = state, said
 
     def _table(self) -> Group:

@@ -1,8 +1,8 @@
-"""What workers do: encode a clip, or the three steps of a long one, and say what came of it as plain dictionaries.
+"""What workers do: encode a clip, or the three steps of a long one, and return the result as plain dictionaries.
 
 `begin` encodes a clip of few segments, and of others makes the draft, `code` some of its segments, `finish` the file.
 Draft and coded segments lie as files in the run's scratch folder, beside the outputs, which all workers see under the
-same path; only names and figures go between tasks. A task that is run again, for its worker died, finds what it has
+same path; only names and figures go between tasks. A task that is run again because its worker died finds what it has
 finished. A file that goes to a URL is made in that folder too, and stored when it is whole. Whatever goes wrong with a
 clip is its result, in one line: nothing is raised but what ends the worker.
 """
@@ -38,8 +38,7 @@ Report = Callable[[str, float], None]
 def begin(item: Item, folder: str, *, split: int, verify: bool, version: str, topic: str | None = None,
           known: dict[str, Any] | None = None) -> Result:
     """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
-    folder. known: the record of an output that is as it should be, where only the input's content can tell whether it
-    has to be made again."""
+    folder. known: the record of an output that is up to date unless the content of its input has changed."""
     return _result(lambda: _begin(item, folder, split, verify, version, _reporter(item, topic), known), item, folder)
 
 
@@ -164,8 +163,8 @@ def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
     """One after the other into a file that is there whole or not at all, also where two workers write it."""
     temporary = f"{path}.{os.getpid()}.{time.monotonic_ns()}"
     with open(temporary, "wb") as file:
-        for each in objects:
-            pickle.dump(each, file, pickle.HIGHEST_PROTOCOL)
+        for item in objects:
+            pickle.dump(item, file, pickle.HIGHEST_PROTOCOL)
     os.replace(temporary, path)
 
 
@@ -195,7 +194,7 @@ def _result(work: Callable[[], Result], item: Item, folder: str) -> Result:
 
 
 def one_line(error: BaseException) -> str:
-    """What went wrong; an error that nobody foresaw is named by its class."""
+    """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     text = " ".join(str(error).split())

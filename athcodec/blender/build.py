@@ -37,11 +37,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def pack(output: Path, wheels: Sequence[Path]) -> None:
     """Write the extension with these wheels. Raises ValueError where none of them is athcodec's, OSError."""
-    own = [each for each in wheels if each.name.startswith("athcodec-")]
+    own = [wheel for wheel in wheels if wheel.name.startswith("athcodec-")]
     if not own:
-        raise ValueError(f"wheels: got {', '.join(each.name for each in wheels)}, expected one of athcodec")
-    platforms = sorted({platform(each) for each in own})
-    names = sorted({each.name: each for each in wheels})
+        raise ValueError(f"wheels: got {', '.join(wheel.name for wheel in wheels)}, expected one of athcodec")
+    platforms = sorted({platform(wheel) for wheel in own})
+    names = sorted({wheel.name: wheel for wheel in wheels})
     manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
     for before, after in (('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
                           ("platforms = []", f"platforms = {_toml(platforms)}"),
@@ -51,7 +51,7 @@ def pack(output: Path, wheels: Sequence[Path]) -> None:
         archive.writestr("blender_manifest.toml", manifest)
         for source in sorted(EXTENSION.glob("*.py")):
             archive.write(source, source.name)
-        for wheel in {each.name: each for each in wheels}.values():
+        for wheel in {wheel.name: wheel for wheel in wheels}.values():
             archive.write(wheel, f"wheels/{wheel.name}", zipfile.ZIP_STORED)
 
 
@@ -71,11 +71,11 @@ def platform(wheel: Path) -> str:
 
 def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
     """Wheels of what is needed and not given, for each platform and Python, by pip."""
-    missing = [name for name in NEEDED if not any(each.name.startswith(f"{name}-") for each in wheels)]
+    missing = [name for name in NEEDED if not any(wheel.name.startswith(f"{name}-") for wheel in wheels)]
     if not missing:
         return []
-    for tag in sorted({each.stem.split("-")[-1] for each in wheels}):
-        tags = [option for each in _pip_platforms(tag) for option in ("--platform", each)]
+    for tag in sorted({wheel.stem.split("-")[-1] for wheel in wheels}):
+        tags = [option for name in _pip_platforms(tag) for option in ("--platform", name)]
         for python in PYTHONS:
             subprocess.run([sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
                             "--python-version", python, *tags, "--dest", str(folder), *missing], check=True)

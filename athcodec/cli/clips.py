@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -41,7 +40,7 @@ def clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip
         clips: dict[str, MotionClip] = {}
         for name, (_, _, clip) in zip(names, parts):
             if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
-                clip = dataclasses.replace(clip, rest=next(iter(clips.values())).rest)
+                clip = clip.replace(rest=next(iter(clips.values())).source_rest)
             clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
@@ -88,7 +87,7 @@ def with_sources(decoder: Decoder, args: argparse.Namespace,
                for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
     if len(sources) != len(played):
         raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
-    return [(each, path, clip) for each, (path, clip) in zip(played, sources)]
+    return [(decoder, path, clip) for decoder, (path, clip) in zip(played, sources)]
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:

@@ -151,13 +151,13 @@ def print_verdict(result: dict[str, Any]) -> None:
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:
     if as_json:
-        print_json({"clips": [{"input": each.item.shown, "output": each.item.output, "settings": each.item.settings,
-                                "reason": each.reason or None} for each in todo]})
+        print_json({"clips": [{"input": task.item.shown, "output": task.item.output, "settings": task.item.settings,
+                                "reason": task.reason or None} for task in todo]})
         return
-    rows = [[each.item.name, each.reason or "kept", each.item.output,
-             ", ".join(f"{name}={value}" for name, value in each.item.settings.items()) or "default"] for each in todo]
+    rows = [[task.item.name, task.reason or "kept", task.item.output,
+             ", ".join(f"{name}={value}" for name, value in task.item.settings.items()) or "default"] for task in todo]
     print_table(["clip", "why", "output", "settings"], rows, "left")
-    print(f"{counted(sum(bool(each.reason) for each in todo), 'clip')} of {len(todo):,} to do.")
+    print(f"{counted(sum(bool(task.reason) for task in todo), 'clip')} of {len(todo):,} to do.")
 
 
 def print_outcome(outcome: Any, args: argparse.Namespace) -> None:

@@ -203,10 +203,10 @@ def truncate(args: argparse.Namespace) -> int:
 def formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
-    read, written = ({each.name: each for each in module.FORMATS} for module in (sources, exporters))
+    read, written = ({kind.name: kind for kind in module.FORMATS} for module in (sources, exporters))
     rows = [{"format": name, "reads": _suffixes(read.get(name)), "writes": _suffixes(written.get(name)),
-             "title": each.title, "extra": each.extra, "installed": each.is_installed}
-            for name, each in (written | read).items()]
+             "title": kind.title, "extra": kind.extra, "installed": kind.is_installed}
+            for name, kind in (written | read).items()]
     if args.json:
         print_json({"formats": rows})
         return 0

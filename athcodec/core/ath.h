@@ -4,7 +4,7 @@
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
- *     ath_depth_for                             which level to draw at a distance
+ *     ath_level_for                             which level to draw at a distance
  *
  * Memory. Nothing here allocates, and there are no globals: the caller asks for a size, provides that many bytes,
  * aligned to 16, and keeps them while they are in use. Objects are freed by freeing their memory. An ath_file holds
@@ -403,7 +403,7 @@ ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *
  * is. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than
  * the one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang and
  * Peng 2011: the view-dependent choice.) */
-ATH_API int32_t ath_depth_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance,
+ATH_API int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance,
                               double fov, double height, double pixels);
 
 /* CRC-32C (Castagnoli) of `size` bytes, continuing from `crc` (0 to start). */

@@ -91,46 +91,36 @@ static void parse_header(const uint8_t *bytes, ath_header *header)
     header->max_error = f64_at(bytes + 48);
 }
 
-static int check_counts(const ath_limits *limits, const ath_header *header, ath_fault_info *fault)
+/* Whether the value is none of those allowed: then the fault is filled in. */
+static int is_outside(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
 {
-    const struct {
-        ath_field field;
-        uint32_t count, limit;
-    } rules[] = {
-        {ATH_FIELD_VERTEX_COUNT, header->vertex_count, limits->vertices},
-        {ATH_FIELD_BRANCH_COUNT, header->branch_count, limits->branches},
-        {ATH_FIELD_FRAME_COUNT, header->frame_count, limits->frames},
-        {ATH_FIELD_SEGMENT_COUNT, header->segment_count, limits->frames},
-        {ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks},
-    };
-    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
-        uint32_t count = rules[i].count, most = rules[i].limit < MOST_COUNT ? rules[i].limit : MOST_COUNT;
-        int result = count < 1 ? ATH_BAD_HEADER : count > most ? ATH_LIMIT_EXCEEDED : ATH_OK;
-        if (result != ATH_OK) return ath_refuse(fault, result, rules[i].field, count, 1, most);
-    }
-    return ATH_OK;
+    return !(found >= least && found <= most) && ath_refuse(fault, code, field, found, least, most);
 }
 
-static int check_header(const uint8_t *bytes, const ath_header *header, ath_fault_info *fault)
+static int is_bad_count(ath_fault_info *fault, ath_field field, uint32_t count, uint32_t limit)
+{
+    double most = limit < MOST_COUNT ? limit : MOST_COUNT;
+    if (count == 0) return is_outside(fault, ATH_BAD_HEADER, field, 0, 1, most);
+    return is_outside(fault, ATH_LIMIT_EXCEEDED, field, count, 1, most);
+}
+
+static int is_bad_header(const uint8_t *bytes, const ath_limits *limits, const ath_header *header, ath_fault_info *fault)
 {
     uint32_t least_segments = (header->frame_count + ATH_SEGMENT_FRAMES - 1) / ATH_SEGMENT_FRAMES;
-    const struct {
-        ath_field field;
-        double found, least, most;
-    } rules[] = {
-        {ATH_FIELD_BRANCH_COUNT, (double)header->branch_count, 1, (double)header->vertex_count},
-        {ATH_FIELD_SEGMENT_COUNT, (double)header->segment_count, (double)least_segments, (double)header->frame_count},
-        {ATH_FIELD_FULL_LEVEL_COUNT, (double)header->full_level_count, 2, ATH_LEVELS},
-        {ATH_FIELD_LEVEL_COUNT, (double)header->level_count, 1, (double)header->full_level_count},
-        {ATH_FIELD_CLIP_COUNT, (double)header->clip_count, 1, 255},
-        {ATH_FIELD_FLAGS, (double)bytes[47], 0, 1},
-        {ATH_FIELD_RESERVED, (double)u64_at(bytes + 56), 0, 0},
-        {ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST},
-    };
-    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
-        if (!(rules[i].found >= rules[i].least && rules[i].found <= rules[i].most))
-            return ath_refuse(fault, ATH_BAD_HEADER, rules[i].field, rules[i].found, rules[i].least, rules[i].most);
-    return ATH_OK;
+    return is_bad_count(fault, ATH_FIELD_VERTEX_COUNT, header->vertex_count, limits->vertices)
+           || is_bad_count(fault, ATH_FIELD_BRANCH_COUNT, header->branch_count, limits->branches)
+           || is_bad_count(fault, ATH_FIELD_FRAME_COUNT, header->frame_count, limits->frames)
+           || is_bad_count(fault, ATH_FIELD_SEGMENT_COUNT, header->segment_count, limits->frames)
+           || is_bad_count(fault, ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_BRANCH_COUNT, header->branch_count, 1, header->vertex_count)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_SEGMENT_COUNT, header->segment_count, least_segments,
+                         header->frame_count)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 2, ATH_LEVELS)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LEVEL_COUNT, header->level_count, 1, header->full_level_count)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_CLIP_COUNT, header->clip_count, 1, 255)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FLAGS, bytes[47], 0, 1)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_RESERVED, (double)u64_at(bytes + 56), 0, 0)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST);
 }
 
 static int check_size(size_t available, uint64_t needed, ath_field field, ath_fault_info *fault)
@@ -147,8 +137,7 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
     if (result == ATH_OK) result = check_size(available, HEADER_SIZE, ATH_FIELD_HEADER_SIZE, fault);
     if (result != ATH_OK) return result;
     parse_header(bytes, header);
-    if ((result = check_counts(limits, header, fault)) != ATH_OK) return result;
-    if ((result = check_header(bytes, header, fault)) != ATH_OK) return result;
+    if (is_bad_header(bytes, limits, header, fault)) return fault->code;
     uint64_t size = (uint64_t)CHUNK_SIZE * header->chunk_count + ERRORS_SIZE * error_count(header);
     if (size > limits->table_bytes)
         return ath_refuse(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, (double)size, 0, limits->table_bytes);
@@ -190,26 +179,17 @@ static uint64_t key_of(const ath_chunk *chunk)
     return (uint64_t)(kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)kind_id(chunk);
 }
 
-static int check_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t index,
-                       int reserved, ath_fault_info *fault)
+static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int reserved,
+                        ath_fault_info *fault)
 {
     int motion = ath_is_motion(chunk);
     double least_level = motion ? 0 : ATH_NO_LEVEL, most_level = motion ? header->level_count - 1 : ATH_NO_LEVEL;
     double most_segment = motion ? (double)header->segment_count - 1 : 0;
-    if (is_refused(chunk->kind))
-        return ath_refuse_chunk(fault, ATH_UNKNOWN_CHUNK, ATH_FIELD_CHUNK_KIND, chunk, index, chunk->kind, 0, 0);
-    if (chunk->length > limits->chunk_bytes)
-        return ath_refuse_chunk(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_CHUNK_SIZE, chunk, index, chunk->length, 0,
-                                limits->chunk_bytes);
-    if (chunk->level < least_level || chunk->level > most_level)
-        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, chunk, index, chunk->level, least_level,
-                                most_level);
-    if (chunk->segment > most_segment)
-        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk, index, chunk->segment, 0,
-                                most_segment);
-    if (reserved != 0)
-        return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_RESERVED, chunk, index, reserved, 0, 0);
-    return ATH_OK;
+    return is_outside(fault, ATH_UNKNOWN_CHUNK, ATH_FIELD_CHUNK_KIND, is_refused(chunk->kind), 0, 0)
+           || is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_CHUNK_SIZE, chunk->length, 0, limits->chunk_bytes)
+           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, chunk->level, least_level, most_level)
+           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk->segment, 0, most_segment)
+           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_RESERVED, reserved, 0, 0);
 }
 
 static ath_chunk chunk_of(const uint8_t *entry, uint64_t offset)
@@ -234,12 +214,12 @@ static int parse_chunks(const uint8_t *table, const ath_limits *limits, const at
     for (uint32_t i = 0; i < header->chunk_count; i++) {
         const uint8_t *entry = table + (size_t)CHUNK_SIZE * i;
         ath_chunk chunk = chunk_of(entry, offset);
-        int result = check_chunk(limits, header, &chunk, (int32_t)i, entry[2], fault);
-        if (result != ATH_OK) return result;
         uint64_t key = key_of(&chunk);
         int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;
-        if (i > 0 && (key < key_before || (key == key_before && !repeatable)))
-            return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, &chunk, (int32_t)i, i, 0, i - 1);
+        int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
+        if (is_bad_chunk(limits, header, &chunk, entry[2], fault)
+            || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, i, 0, in_order ? i : i - 1.0))
+            return ath_fault_at(fault, &chunk, (int32_t)i);
         if (key >> 62 > 0 && (i == 0 || key_before >> 62 == 0)) *prelude = offset;
         key_before = key;
         offset += chunk.length;

@@ -13,10 +13,9 @@ typedef struct {
     int32_t level_count, full_level_count, clip_count, is_float64;
 } ath_header;
 
-/* Fill in the fault and return its code; of a fault of a chunk with its place in the table. */
+/* Fills in a fault, and the chunk that it is about. Both return its code. */
 int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
-int ath_refuse_chunk(ath_fault_info *fault, int code, ath_field field, const ath_chunk *chunk, int32_t index, double found,
-                     double least, double most);
+int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 
 /* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the prelude. */
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,

@@ -25,16 +25,14 @@ int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, d
     return code;
 }
 
-int ath_refuse_chunk(ath_fault_info *fault, int code, ath_field field, const ath_chunk *chunk, int32_t index, double found,
-                     double least, double most)
+int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index)
 {
-    ath_refuse(fault, code, field, found, least, most);
     fault->chunk = index;
     fault->kind = chunk->kind;
     fault->level = chunk->level;
     fault->segment = chunk->segment;
     fault->offset = chunk->offset;
-    return code;
+    return fault->code;
 }
 
 const char *ath_kind_name(int kind)
@@ -123,59 +121,66 @@ static void put_number(writer *out, double value)
 
 /* ---- sentences ---- */
 
-typedef enum { NUMBER, HEX, VERSION, NOTHING } number_form;
-
-typedef struct {
-    ath_field field;
-    number_form form;
-    const char *where;        /* of a fault that is about no chunk of the table */
-    const char *before, *after; /* of the value found */
-    const char *expected;     /* in place of the values allowed; null: these */
-} sentence;
-
-static const sentence sentences[] = {
-    {ATH_FIELD_MAGIC, HEX, "file", "first bytes ", "", 0},
-    {ATH_FIELD_VERSION, VERSION, "file", "format version ", "", 0},
-    {ATH_FIELD_FILE_SIZE, NUMBER, "file", "", " bytes", 0},
-    {ATH_FIELD_HEADER_SIZE, NUMBER, "header", "", " bytes", 0},
-    {ATH_FIELD_TABLE_SIZE, NUMBER, "chunk table", "", " bytes", 0},
-    {ATH_FIELD_PRELUDE_SIZE, NUMBER, "prelude", "", " bytes", 0},
-    {ATH_FIELD_VERTEX_COUNT, NUMBER, "header", "Vertex_Count ", "", 0},
-    {ATH_FIELD_BRANCH_COUNT, NUMBER, "header", "Branch_Count ", "", 0},
-    {ATH_FIELD_FRAME_COUNT, NUMBER, "header", "Frame_Count ", "", 0},
-    {ATH_FIELD_SEGMENT_COUNT, NUMBER, "header", "Segment_Count ", "", 0},
-    {ATH_FIELD_CHUNK_COUNT, NUMBER, "header", "Chunk_Count ", "", 0},
-    {ATH_FIELD_FULL_LEVEL_COUNT, NUMBER, "header", "Full_Level_Count ", "", 0},
-    {ATH_FIELD_LEVEL_COUNT, NUMBER, "header", "Level_Count ", "", 0},
-    {ATH_FIELD_CLIP_COUNT, NUMBER, "header", "Clip_Count ", "", 0},
-    {ATH_FIELD_FLAGS, NUMBER, "header", "Flags ", "", 0},
-    {ATH_FIELD_RESERVED, NUMBER, "header", "Reserved ", "", 0},
-    {ATH_FIELD_MAX_ERROR, NUMBER, "header", "Max_Error ", "", "a finite length"},
-    {ATH_FIELD_FRONT_CHECKSUM, HEX, "header and chunk table", "checksum ", "", 0},
-    {ATH_FIELD_ERROR, NUMBER, "error table", "", "", "a finite length"},
-    {ATH_FIELD_FILE_LENGTH, NUMBER, "chunk table", "chunks that end at byte ", "", 0},
-    {ATH_FIELD_MEMORY, NUMBER, "header", "a need of ", " bytes of memory", 0},
-    {ATH_FIELD_MISSING_CHUNK, NOTHING, "chunk table", "no ", "", "one"},
-    {ATH_FIELD_CHUNK_KIND, NOTHING, "", "a required kind", "", "one that this decoder knows"},
-    {ATH_FIELD_CHUNK_SIZE, NUMBER, "", "", " bytes", 0},
-    {ATH_FIELD_CHUNK_RESERVED, NUMBER, "", "Reserved ", "", 0},
-    {ATH_FIELD_CHUNK_LEVEL, NUMBER, "", "level ", "", 0},
-    {ATH_FIELD_CHUNK_SEGMENT, NUMBER, "", "segment ", "", 0},
-    {ATH_FIELD_CHUNK_PLACE, NUMBER, "", "entry ", " of the chunk table", "an earlier one, in file order, each chunk once"},
-    {ATH_FIELD_UNEXPECTED_CHUNK, NOTHING, "", "a chunk that the hierarchy does not ask for", "", "none"},
-    {ATH_FIELD_CHUNK_CHECKSUM, HEX, "", "checksum ", "", 0},
-    {ATH_FIELD_HIERARCHY_DEPTH, NUMBER, "", "branches ", " deep", 0},
-    {ATH_FIELD_CONTENT, NOTHING, "", "content that does not decode", "", "a valid stream"},
+/* By field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and segment;
+ * %l: level and segment. */
+static const char *const sentences[] = {
+    0,
+    "file: got first bytes %f%a",
+    "file: got format version %f%a",
+    "file: got %f bytes%a",
+    "header: got %f bytes%a",
+    "chunk table: got %f bytes%a",
+    "prelude: got %f bytes%a",
+    "header: got Vertex_Count %f%a",
+    "header: got Branch_Count %f%a",
+    "header: got Frame_Count %f%a",
+    "header: got Segment_Count %f%a",
+    "header: got Chunk_Count %f%a",
+    "header: got Full_Level_Count %f%a",
+    "header: got Level_Count %f%a",
+    "header: got Clip_Count %f%a",
+    "header: got Flags %f%a",
+    "header: got Reserved %f%a",
+    "header: got Max_Error %f; expected a finite length",
+    "header and chunk table: got checksum %f%a",
+    "error table: got %f%l; expected a finite length",
+    "chunk table: got chunks that end at byte %f%a",
+    "header: got a need of %f bytes of memory%a",
+    "chunk table: got no %k; expected one",
+    "%p: got a required kind; expected one that this decoder knows",
+    "%p: got %f bytes%a",
+    "%p: got Reserved %f%a",
+    "%p: got level %f%a",
+    "%p: got segment %f%a",
+    "%p: got entry %f of the chunk table; expected an earlier one, in file order, each once",
+    "%p: got a chunk that the hierarchy does not ask for; expected none",
+    "%p: got checksum %f%a",
+    "%p: got branches %f deep%a",
+    "%p: got content that does not decode; expected a valid stream",
 };
 
-static void put_value(writer *out, number_form form, double value)
+static void put_value(writer *out, int32_t field, double value)
 {
-    if (form == HEX) put_hex(out, (uint32_t)value, 8);
-    if (form == NUMBER) put_number(out, value);
-    if (form != VERSION) return;
-    put_integer(out, (uint64_t)value >> 16);
-    put_character(out, '.');
-    put_integer(out, (uint64_t)value & 0xffff);
+    if (field == ATH_FIELD_VERSION) {
+        put_integer(out, (uint64_t)value >> 16);
+        put_character(out, '.');
+        put_integer(out, (uint64_t)value & 0xffff);
+    } else if (field == ATH_FIELD_MAGIC || field == ATH_FIELD_FRONT_CHECKSUM || field == ATH_FIELD_CHUNK_CHECKSUM) {
+        put_hex(out, (uint32_t)value, 8);
+    } else {
+        put_number(out, value);
+    }
+}
+
+static void put_allowed(writer *out, const ath_fault_info *fault)
+{
+    int is_limit = fault->code == ATH_LIMIT_EXCEEDED;
+    put(out, is_limit ? "; the limit is " : "; expected ");
+    if (!is_limit && fault->least < fault->most) {
+        put_value(out, fault->field, fault->least);
+        put(out, " to ");
+    }
+    put_value(out, fault->field, fault->most);
 }
 
 static void put_level(writer *out, const ath_fault_info *fault)
@@ -195,56 +200,36 @@ static void put_kind(writer *out, const ath_fault_info *fault)
     put_level(out, fault);
 }
 
-static void put_place(writer *out, const ath_fault_info *fault, const sentence *s)
+static void put_place(writer *out, const ath_fault_info *fault)
 {
-    if (fault->chunk < 0) {
-        put(out, s->where);
-        return;
-    }
     put(out, "chunk ");
     put_kind(out, fault);
     put(out, " at byte ");
     put_integer(out, fault->offset);
 }
 
-static void put_found(writer *out, const ath_fault_info *fault, const sentence *s)
+static void put_sentence(writer *out, const ath_fault_info *fault, const char *sentence)
 {
-    put(out, ": got ");
-    put(out, s->before);
-    put_value(out, s->form, fault->found);
-    put(out, s->after);
-    if (s->field == ATH_FIELD_MISSING_CHUNK) put_kind(out, fault);
-    if (s->field == ATH_FIELD_ERROR) put_level(out, fault);
-}
-
-static void put_allowed(writer *out, const ath_fault_info *fault, const sentence *s)
-{
-    int is_limit = fault->code == ATH_LIMIT_EXCEEDED;
-    put(out, is_limit ? "; the limit is " : "; expected ");
-    if (s->expected) {
-        put(out, s->expected);
-        return;
+    for (; *sentence; sentence++) {
+        if (*sentence != '%') {
+            put_character(out, *sentence);
+            continue;
+        }
+        switch (*++sentence) {
+        case 'f': put_value(out, fault->field, fault->found); break;
+        case 'a': put_allowed(out, fault); break;
+        case 'p': put_place(out, fault); break;
+        case 'k': put_kind(out, fault); break;
+        default: put_level(out, fault);
+        }
     }
-    if (!is_limit && fault->least < fault->most) {
-        put_value(out, s->form, fault->least);
-        put(out, " to ");
-    }
-    put_value(out, s->form, fault->most);
 }
 
 size_t ath_fault_text(const ath_fault_info *fault, char *text, size_t capacity)
 {
     writer out = {text, capacity, 0};
-    const sentence *s = 0;
-    for (size_t i = 0; i < sizeof sentences / sizeof *sentences; i++)
-        if ((int32_t)sentences[i].field == fault->field) s = sentences + i;
-    if (s) {
-        put_place(&out, fault, s);
-        put_found(&out, fault, s);
-        put_allowed(&out, fault, s);
-    } else {
-        put(&out, ath_result_name(fault->code));
-    }
+    int known = fault->field > ATH_FIELD_NONE && fault->field < (int32_t)(sizeof sentences / sizeof *sentences);
+    put_sentence(&out, fault, known ? sentences[fault->field] : ath_result_name(fault->code));
     if (capacity > 0) text[out.length < capacity ? out.length : capacity - 1] = 0;
     return out.length;
 }

@@ -110,8 +110,10 @@ static int load(const ath_file *file, int32_t kind, ath_bytes *content, ath_faul
     content->bytes = chunk->bytes;
     content->size = chunk->length;
     int result = ath_check_chunk(file, index, fault);
-    if (result == ATH_OK) ath_refuse_chunk(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, chunk, index, 0, 0, 0);
-    return result;
+    if (result != ATH_OK) return result;
+    ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
+    ath_fault_at(fault, chunk, index);
+    return ATH_OK;
 }
 
 static int same_name(const char *a, const char *b)
@@ -263,8 +265,10 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
     int32_t count[3][ATH_LEVELS] = {{0}};
     for (int32_t c = 0; c < file->info.chunk_count; c++) {
         const ath_chunk *chunk = file->chunks + c;
-        if (!is_wanted(file, chunk))
-            return ath_refuse_chunk(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_UNEXPECTED_CHUNK, chunk, c, 1, 0, 0);
+        if (!is_wanted(file, chunk)) {
+            ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_UNEXPECTED_CHUNK, 1, 0, 0);
+            return ath_fault_at(fault, chunk, c);
+        }
         for (int32_t i = 0; i < 3; i++)
             if (chunk->kind == kinds[i]) count[i][chunk->level]++;
     }
@@ -570,13 +574,12 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
 {
     const ath_chunk *chunk = file->chunks + index;
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    uint32_t found = chunk->bytes ? ath_crc32c(0, chunk->bytes, chunk->length) : 0;
     why->code = ATH_OK;
-    if (!chunk->bytes)
-        return ath_refuse_chunk(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, index, 0, chunk->length, chunk->length);
-    uint32_t found = ath_crc32c(0, chunk->bytes, chunk->length);
-    if (found == chunk->checksum) return ATH_OK;
-    return ath_refuse_chunk(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, index, found, chunk->checksum,
-                            chunk->checksum);
+    if (!chunk->bytes) ath_refuse(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, 0, chunk->length, chunk->length);
+    else if (found != chunk->checksum)
+        ath_refuse(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, found, chunk->checksum, chunk->checksum);
+    return ath_fault_at(why, chunk, index);
 }
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)

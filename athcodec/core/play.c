@@ -371,7 +371,7 @@ int ath_matrices_float64(const ath_file *file, const ath_segment *const *segment
 
 /* ---- level of detail ---- */
 
-int32_t ath_depth_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance, double fov,
+int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance, double fov,
                       double height, double pixels)
 {
     int32_t deepest = file->info.level_count - 1;

@@ -162,8 +162,8 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 
 static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
 {
-    return ath_refuse_chunk(&work->fault, code, field, chunk, (int32_t)(chunk - work->file->chunks), found, expected,
-                            expected);
+    ath_refuse(&work->fault, code, field, found, expected, expected);
+    return ath_fault_at(&work->fault, chunk, (int32_t)(chunk - work->file->chunks));
 }
 
 /* Notes the chunk whose content is not valid, if it is not. */

@@ -131,9 +131,7 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
     bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
     if bad.size:
         raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
-    metadata = clip.metadata | {WEIGHTS: name}
-    rest = clip.rest.astype(clip.rest_dtype)
-    return dataclasses.replace(clip, attributes=attributes, metadata=metadata, rest=rest), values
+    return clip.replace(attributes=attributes, metadata=clip.metadata | {WEIGHTS: name}), values
 
 
 def time_chunk(*times: np.ndarray) -> bytes:

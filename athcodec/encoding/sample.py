@@ -14,8 +14,8 @@ from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan
 from athcodec.encoding.segment import Source
+from athcodec.frames import Frames
 from athcodec.hierarchy import Hierarchy
-from athcodec.sources.frames import Frames
 
 LARGE = 1 << 16  # vertices: smaller plants are not sampled
 LEAST_SAMPLE = 1 << 15  # vertices of a sample
@@ -47,7 +47,7 @@ class PlantSample:
         clip, places = source.clip, source.hierarchy.vertex_source[self.vertices]
         chosen = np.sort(places)
         some = MotionClip(Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen),
-                                 clip.dtype), clip.time, rest=clip.rest[chosen].astype(clip.rest_dtype),
+                                 clip.dtype), clip.time, rest=clip.source_rest[chosen],
                           clip_ranges=clip.clip_ranges)
         sample = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
                        weights=None if source.weights is None else source.weights[self.vertices])

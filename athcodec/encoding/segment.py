@@ -175,7 +175,7 @@ class CodedPrelude:
     def _code_rest(self, source: Source, branches: np.ndarray, settings: Settings) -> ct.Rest:
         head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
         if source.exact_rest:
-            pose = source.clip.rest[source.hierarchy.vertex_source].astype(source.clip.rest_dtype)
+            pose = source.clip.source_rest[source.hierarchy.vertex_source]
             head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
         else:

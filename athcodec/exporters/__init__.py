@@ -21,11 +21,21 @@ Report = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class WriteOptions:
-    """What a user may say about a file to write. A writer ignores what has no meaning for its format.
+    """Options of `write` for a file. A writer ignores those that have no meaning for its format.
 
-    gzip    compress without loss where the format can
-    animation  how glTF moves: "joints", "morphs", or "auto", the one that keeps the error, the smaller of both
-    half    textures in half precision in place of float
+    Parameters
+    ----------
+    gzip : bool, optional
+        Compress without loss where the format can.
+    animation : {"auto", "joints", "morphs"}, optional
+        How glTF moves: by joints, by morph targets, or by the one that keeps the error, the smaller if both do.
+    half : bool, optional
+        Textures in half precision in place of float.
+
+    Raises
+    ------
+    ValueError
+        For another animation.
     """
 
     gzip: bool = False
@@ -59,15 +69,34 @@ FORMATS = (
 
 
 def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None,
-          **options: object) -> None:
-    """Write a MotionClip or a ClipView to `path`, which appears only when it is whole.
+          **options: Any) -> None:
+    """Write a motion to a file of any known format, which appears under its name only when it is complete.
 
-    format    the name of one of FORMATS; None: known by the suffix
-    options   see WriteOptions
-    progress  called with "export" and the fraction that is done
+    Parameters
+    ----------
+    motion : MotionClip or ClipView
+        A clip, or frames of an .ath file at some level.
+    path : str or path
+        The file to write; formats of one file per frame number their files by it.
+    format : str, optional
+        Name of one of `athcodec.exporters.FORMATS`; known by the suffix by default.
+    progress : callable, optional
+        Called with "export" and the fraction that is done.
+    **options
+        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half.
 
-    Raises ClipError where the format cannot hold the clip, or several, or is not known, MissingExtra where a package is
-    missing, OSError where nothing can be written there, ValueError for options that do not exist.
+    Raises
+    ------
+    ClipError
+        Where the format is not known, or cannot hold the clip or several clips.
+    MissingExtra
+        Where a package is missing that the format needs.
+    OSError
+        Where the file cannot be written.
+    ValueError
+        For a format or values of options that do not exist.
+    TypeError
+        For options that do not exist.
     """
     wanted = WriteOptions(**options)
     kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
@@ -82,11 +111,28 @@ def _check_clips(motion: Any, kind: Format) -> None:
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
-        suffixes = " ".join(suffix for each in FORMATS if each.holds_several for suffix in each.suffixes)
+        suffixes = " ".join(suffix for other in FORMATS if other.holds_several for suffix in other.suffixes)
         raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
                         f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
 
 
 def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None:
-    """Write `clip` in athcodec's HDF5 schema to `path`; see exporters/hdf5.py, and `write` for the rest."""
+    """Write a motion to an HDF5 file of athcodec's schema, which appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    clip : MotionClip or ClipView
+        Or anything with time, vertex_branch, branch_parent, rest, dtype and blocks() like them.
+    path : str or path
+        The file to write.
+    gzip : bool, optional
+        Compress without loss: smaller and slower.
+
+    Raises
+    ------
+    ClipError
+        Where the arrays make no clip.
+    OSError
+        Where the file cannot be written.
+    """
     write(clip, path, "hdf5", gzip=gzip)

@@ -1,4 +1,4 @@
-"""Writes Alembic (Ogawa): one mesh, curves or points object per part of a clip, its points sample by sample.
+"""Writes Alembic (Ogawa): one mesh, curves or points object per object of a clip, its points sample by sample.
 
 Faces and static arrays are written once; samples go to disk as they come. Points are float32, a clip in float64 is
 rounded. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
@@ -21,18 +21,19 @@ from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
-from athcodec.exporters.parts import (
+from athcodec.exporters.scene_objects import (
     DOMAINS,
     KNOWN_ATTRIBUTES,
     KNOWN_METADATA,
-    Part,
+    SceneObject,
+    distinct,
     domain_of,
-    frame_numbers,
+    objects_of,
     own_arrays,
-    parts_of,
     rows_of,
 )
-from athcodec.sources.parts import OWN, ArrayDescriptor, turned_corners
+from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.sources.scene_objects import DESCRIPTOR, OWN, turned_corners
 
 SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
           "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}
@@ -57,24 +58,24 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
 
 
 def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
-    numbers, rate = frame_numbers(motion)
+    numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     sampling = Abc.Argument(archive.addTimeSampling(_sampling(numbers, rate)))
     root = AbcGeom.OXform(archive.getTop(), "clip")
     if str(motion.metadata.get("up_axis", "y")).lower() == "z":
         turn = AbcGeom.XformSample()
-        turn.setMatrix(imath.M44d(*(float(each) for row in Z_UP for each in row)))
+        turn.setMatrix(imath.M44d(*(float(number) for row in Z_UP for number in row)))
         root.getSchema().set(turn)
-    parts = parts_of(motion)
+    objects = objects_of(motion)
     statics, left = _divide(motion)
     _keep_own(root.getSchema().getUserProperties(), motion, left)
-    taken: set[str] = set()
-    for part in parts:
-        part.target = _create(root, _free_name(part.name, taken), part, sampling)
+    names = distinct(re.sub(r"[/\0]", "_", obj.name.strip("/")) or "part" for obj in objects)
+    for obj, name in zip(objects, names):
+        obj.target = _create(root, name, obj, sampling)
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
-            for part in parts:
-                _add(part, positions[part.vertices], statics if start + row == 0 else None)
+            for obj in objects:
+                _add(obj, positions[obj.vertices], statics if start + row == 0 else None)
         report((start + len(block)) / len(numbers))
 
 
@@ -88,19 +89,8 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
     return AbcCoreAbstract.TimeSampling(acyclic, times)
 
 
-def _free_name(name: str, taken: set[str]) -> str:
-    """Alembic's names are any but those with a slash, and differ."""
-    wanted = found = re.sub(r"[/\0]", "_", name.strip("/")) or "part"
-    number = 1
-    while found in taken:
-        number += 1
-        found = f"{wanted}_{number}"
-    taken.add(found)
-    return found
-
-
-def _create(root: Any, name: str, part: Part, sampling: Any) -> Any:
-    kind = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}[part.kind]
+def _create(root: Any, name: str, obj: SceneObject, sampling: Any) -> Any:
+    kind = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}[obj.kind]
     return kind(AbcGeom.OXform(root, name), name, sampling)  # programs expect a transform of its own
 
 
@@ -114,29 +104,29 @@ def _filled(kind: Any, values: np.ndarray) -> Any:
 # ---- samples ----
 
 
-def _add(part: Part, positions: np.ndarray, statics: dict[str, tuple[np.ndarray, str]] | None) -> None:
+def _add(obj: SceneObject, positions: np.ndarray, statics: dict[str, tuple[np.ndarray, str]] | None) -> None:
     """A sample of the points; the first one brings what does not move."""
     points = _filled(imath.V3fArray, positions)
-    schema = part.target.getSchema()
+    schema = obj.target.getSchema()
     if statics is None:
         sample = {"mesh": AbcGeom.OPolyMeshSchemaSample, "curves": AbcGeom.OCurvesSchemaSample,
-                  "points": AbcGeom.OPointsSchemaSample}[part.kind](points)
+                  "points": AbcGeom.OPointsSchemaSample}[obj.kind](points)
         schema.set(sample)
         return
-    order = turned_corners(part.faces[0])
-    own = {name: (rows_of(values, domain, part), domain) for name, (values, domain) in statics.items()}
+    order = turned_corners(obj.faces[0])
+    own = {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
     own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
     # samples refer to arrays that somebody has to keep until they are written
-    held = {"points": points, "ids": _filled(imath.IntArray, np.arange(part.count)),
-            "counts": _filled(imath.IntArray, part.faces[0]), "curves": _filled(imath.IntArray, part.curves),
-            "indices": _filled(imath.IntArray, part.faces[1][order])}
-    schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[part.kind](part, held, own))
+    held = {"points": points, "ids": _filled(imath.IntArray, np.arange(obj.count)),
+            "counts": _filled(imath.IntArray, obj.faces[0]), "curves": _filled(imath.IntArray, obj.curves),
+            "indices": _filled(imath.IntArray, obj.faces[1][order])}
+    schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
     for name, (values, domain) in own.items():
-        if len(values) and (domain in ("vertex", "constant") or part.kind == "mesh"):
+        if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
             _write_param(schema.getArbGeomParams(), name, values, domain)
 
 
-def _mesh_sample(part: Part, held: dict, own: dict) -> Any:
+def _mesh_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     further = {}
     for name, row, array, keyword, kind in (
             ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
@@ -149,17 +139,17 @@ def _mesh_sample(part: Part, held: dict, own: dict) -> Any:
     return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
 
 
-def _curve_sample(part: Part, held: dict, own: dict) -> Any:
-    is_cubic = part.details.get("type") == "cubic"
+def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+    is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
     basis = AbcGeom.BasisType.kBsplineBasis if is_cubic else AbcGeom.BasisType.kNoBasis
-    is_closed = part.details.get("wrap") == "periodic"
+    is_closed = obj.details.get("wrap") == "periodic"
     wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
     return AbcGeom.OCurvesSchemaSample(held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis,
                                        **_widths(held, own, "iWidth"))
 
 
-def _point_sample(part: Part, held: dict, own: dict) -> Any:
+def _point_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, own, "iWidths"))
 
 
@@ -199,9 +189,6 @@ def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> Non
 def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
     kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
     Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
-    for i, (name, values, domain) in enumerate(own_arrays(motion, left)):
-        raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
-        held = _filled(imath.UnsignedCharArray, raw)
-        Abc.OUcharArrayProperty(properties, f"array{i}").setValue(held)
-        descriptor = ArrayDescriptor.of(name, values, domain)
-        Abc.OStringProperty(properties, f"array{i}.descriptor").setValue(json.dumps(descriptor._asdict()))
+    for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):
+        Abc.OUcharArrayProperty(properties, f"array{i}").setValue(_filled(imath.UnsignedCharArray, raw))
+        Abc.OStringProperty(properties, f"array{i}{DESCRIPTOR}").setValue(json.dumps(descriptor._asdict()))

@@ -27,6 +27,7 @@ class Cells:
 
 
 def cells_of(motion: Any) -> Cells:
+    """The cells that a motion's attributes, faces and edges are."""
     kinds, counts, nodes, domains = [], [], [], []
     volumes = {name.removeprefix("cells_"): values for name, values in motion.attributes.items()
                if name.startswith("cells_") and values.ndim == 2 and values.shape[1:] == (NODES.get(name[6:]),)}

@@ -1,4 +1,4 @@
-"""What of a motion moves as one, for formats that hold transforms in place of vertices.
+"""The rigid or affine parts of a motion, for formats that hold transforms in place of vertices.
 
 It starts from the parts that an .ath file has at a level (nodes and stems), or from the branches of a clip, and fits to
 each, frame by frame, what a format can do: `Placed` finds translation, rotation and three scales, `Mapped` any affine
@@ -41,7 +41,7 @@ def allowed_error(motion: Any) -> float:
 @dataclass(eq=False)
 class Parts:
     """K parts: part k is the vertices order[first[k] : first[k] + count[k]] of the clip. Its `middle` (K, 3), its axes
-    as columns (K, 3, 3), the mean squares along them (K, 3), and how far its vertices `reach` along them."""
+    as columns (K, 3, 3), the mean squares along them (K, 3), and how far its vertices go along them, the `extent`."""
 
     order: np.ndarray
     first: np.ndarray
@@ -49,7 +49,7 @@ class Parts:
     middle: np.ndarray
     axes: np.ndarray
     spread: np.ndarray
-    reach: np.ndarray
+    extent: np.ndarray
 
     def __len__(self) -> int:
         return len(self.first)
@@ -64,8 +64,8 @@ class Parts:
         spread, axes = np.linalg.eigh(square)
         axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
         local = np.einsum("nij,ni->nj", np.repeat(axes, count, axis=0), away)
-        reach = np.maximum.reduceat(np.abs(local), starts)
-        return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), reach)
+        extent = np.maximum.reduceat(np.abs(local), starts)
+        return cls(order, first, count, middle, axes, np.maximum(spread, 0.0), extent)
 
     def vertex_part(self) -> np.ndarray:
         """(N,) the part of each vertex; of parts that hold all vertices."""
@@ -151,7 +151,7 @@ def fit(motion: Any, solver: type, allowed: float, most: int, report: Callable[[
             kept = Parts.over(order, first[good], count[good], rest)
             places, values, error[good] = _fitted(motion, kept, solver(kept), rest)
             held = (error[good] <= allowed) | (kept.count == 1)
-            done.append((kept.first[held], kept.count[held], places[:, held], [each[:, held] for each in values]))
+            done.append((kept.first[held], kept.count[held], places[:, held], [value[:, held] for value in values]))
             good[good] = held
             number += int(held.sum())
         first, count = _cut(first[~good], count[~good], error[~good] / allowed if allowed > 0 else None)
@@ -222,10 +222,10 @@ def portions(motion: Any, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]
 
 
 def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
-    first, count = (np.concatenate([each[i] for each in done]) for i in range(2))
+    first, count = (np.concatenate([batch[i] for batch in done]) for i in range(2))
     by_place = np.argsort(first)
-    places = np.concatenate([each[2] for each in done], axis=1)[:, by_place]
-    values = [np.concatenate([each[3][i] for each in done], axis=1)[:, by_place] for i in range(len(done[0][3]))]
+    places = np.concatenate([batch[2] for batch in done], axis=1)[:, by_place]
+    values = [np.concatenate([batch[3][i] for batch in done], axis=1)[:, by_place] for i in range(len(done[0][3]))]
     return Moving(Parts.over(order, first[by_place], count[by_place], rest), places, values)
 
 

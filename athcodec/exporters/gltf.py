@@ -2,9 +2,9 @@
 
 "joints": a joint for each part that moves as one at the view's level (node or stem of the .ath file, branch of a
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
-further off than the level itself is (of a clip: parts.OF_CLIP of its size) is cut into shorter ones (parts.py).
-"morphs": a morph target per frame, exact but for float32, large. "auto": whichever is smaller, of a clip that is short;
-else joints. Some engines, three.js among them, move triangles only: lines and points stand still there.
+further off than the level itself is (of a clip: fitting.OF_CLIP of its size) is cut into shorter ones (fitting.py).
+"morphs": a morph target per frame, exact but for float32, and large. "auto": the smaller of both for a
+short clip, else joints. Some engines, three.js among them, move triangles only: lines and points stand still there.
 
 Each of several clips is an animation of its name over the same joints or targets, and moves all that any of them
 moves: players may go from one to the other. glTF knows no loops: theirs end with the first frame again, and have
@@ -33,13 +33,13 @@ from athcodec.exporters.gltf_build import (
     UNKNOWN_BOUND,
     VERTICES,
     Glb,
-    Shape,
+    GltfMesh,
     Take,
     add_mesh,
     branch_extras,
     clock,
+    meshes_of,
     root_transform,
-    shapes,
     takes,
 )
 from athcodec.exporters.gltf_joints import Joints, fit_joints
@@ -70,7 +70,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
     if isinstance(motion, ClipView):
         facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     try:
-        found, left_out = shapes(motion, Path(fspath(path)).stem)
+        found, left_out = meshes_of(motion, Path(fspath(path)).stem)
         if wanted == "joints":
             facts["joints"] = len(joints.bind)
         facts |= ({"left_out": left_out} if left_out else {}) | branch_extras(motion)
@@ -91,11 +91,11 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
 
 def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
     """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
-    found, left_out = shapes(motion, name, more)
+    found, left_out = meshes_of(motion, name, more)
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
     root = glb.node(name="plant", **root_transform(motion.metadata))
     for shape in found:
-        if "TEXCOORD_1" in shape.attributes:  # the second set may not be without the first
+        if "TEXCOORD_1" in shape.attributes:  # glTF allows a second set only beside a first
             shape.attributes.setdefault("TEXCOORD_0", np.zeros((len(shape.source), 2), np.float32))
         glb.node(root, name=shape.name, mesh=add_mesh(glb, shape, np.asarray(motion.rest)))
     with open(path, "wb") as out:
@@ -133,7 +133,7 @@ class _Joined:
         self._motion, self._joints = motion, joints
         self.max_error = joints.max_error
 
-    def add(self, glb: Glb, root: int, found: list[Shape], report: Callable[[float], None]) -> Iterator[bytes]:
+    def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
         joints = self._joints
         nodes = [glb.node(root, name=f"part_{i}", translation=t.tolist(), rotation=_unit(r))
                  for i, (t, r) in enumerate(zip(*joints.rest[:2]))]
@@ -206,7 +206,7 @@ class _Morphed:
         self._motion = motion
         self.max_error = 0.0
 
-    def add(self, glb: Glb, root: int, found: list[Shape], report: Callable[[float], None]) -> Iterator[bytes]:
+    def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
         meshes = [add_mesh(glb, shape, np.asarray(self._motion.rest)) for shape in found]
         channels = []
         for mesh, shape in zip(meshes, found):
@@ -222,8 +222,9 @@ class _Morphed:
         self.max_error = UNKNOWN_BOUND
         return self._targets(glb, found, bounds, report)
 
-    def _add_targets(self, glb: Glb, found: list[Shape], meshes: list[int], view: int, count: int) -> list[list[dict]]:
-        """The accessors, by frame and shape, whose bounds are not known yet."""
+    def _add_targets(self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int,
+                     count: int) -> list[list[dict]]:
+        """The accessors, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for frame in range(self._motion.frame_count):
             accessors.append([])
@@ -236,7 +237,7 @@ class _Morphed:
                 place += 12 * len(shape.source)
         return accessors
 
-    def _targets(self, glb: Glb, found: list[Shape], accessors: list[list[dict]],
+    def _targets(self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]],
                  report: Callable[[float], None]) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
         largest = 0.0

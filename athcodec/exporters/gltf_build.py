@@ -1,4 +1,4 @@
-"""The pieces of a GLB file: its structure, its binary chunk, and the shapes of a clip as meshes.
+"""The pieces of a GLB file: its structure, its binary chunk, and the objects of a clip as meshes.
 
 Polygons are drawn as triangles (which polygon a triangle came from is not kept), edges as lines where an object has no
 faces, vertices as points where it has neither. Vertices keep their order; one whose corners have different texture
@@ -18,9 +18,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from athcodec import __version__
-from athcodec.clip import ClipRange
+from athcodec.clip import ClipRange, stated_fps
 from athcodec.errors import ClipError
+from athcodec.exporters.timing import start_frame_of
 from athcodec.joining import metadata_of
+from athcodec.sources.timing import whole
 from athcodec.units import METRES, unit_symbol
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
@@ -35,7 +37,7 @@ SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": ("NORMAL", (3,)), "colors": 
 
 
 class Glb:
-    """A file on its way: `json` is its structure, arrays are added to its binary chunk."""
+    """A file that is being made: `json` is its structure, arrays are added to its binary chunk."""
 
     def __init__(self, extras: Mapping[str, Any]):
         self.json: dict[str, Any] = {
@@ -63,6 +65,7 @@ class Glb:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, view: int, dtype: np.dtype, count: int, width: int, **values: Any) -> int:
+        """The number of a new accessor of (count, width) values in a buffer view; values: further entries."""
         kind = {"bufferView": view, "componentType": COMPONENTS[dtype.name], "count": count, "type": TYPES[width]}
         self.json["accessors"].append(kind | values)
         return len(self.json["accessors"]) - 1
@@ -122,7 +125,7 @@ class Glb:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class GltfMesh:
     """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
     attributes by their semantic, (n, width)."""
 
@@ -132,7 +135,7 @@ class Shape:
     attributes: dict[str, np.ndarray]
 
 
-def shapes(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[Shape], list[str]]:
+def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[GltfMesh], list[str]]:
     """The objects of a clip, and the names of attributes that they cannot have. `more`: by semantic, (N, width)."""
     faces = motion.polygons
     triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
@@ -151,23 +154,23 @@ def shapes(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None)
         mine = triangles[(corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)]
         lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
         corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
-        made.append(Shape(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
+        made.append(GltfMesh(part_name, source[rows], corners, {key: array[rows] for key, array in values.items()}))
     return made, left_out
 
 
-def add_mesh(glb: Glb, shape: Shape, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
+def add_mesh(glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
              **primitive: Any) -> int:
-    """A mesh of the shape in its rest pose (N, 3)."""
-    semantic = {"POSITION": glb.array(rest[shape.source].astype(np.float32), bounds=True, target=VERTICES)}
-    for key, values in (shape.attributes | dict(attributes or {})).items():
+    """Adds a mesh to the file, in its rest pose (N, 3)."""
+    semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
+    for key, values in (mesh.attributes | dict(attributes or {})).items():
         is_ratio = key == "COLOR_0" or key.startswith("WEIGHTS_")
         semantic[key] = glb.array(values, target=VERTICES, normalized=is_ratio and values.dtype.kind == "u")
     primitive |= {"attributes": semantic, "mode": 0}
-    if shape.corners is not None:
-        dtype = np.uint16 if shape.corners.max() < 65535 else np.uint32
-        primitive["mode"] = 4 if shape.corners.shape[1] == 3 else 1
-        primitive["indices"] = glb.array(shape.corners.astype(dtype).reshape(-1, 1), target=INDICES)
-    glb.json["meshes"].append({"name": shape.name, "primitives": [primitive]})
+    if mesh.corners is not None:
+        dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
+        primitive["mode"] = 4 if mesh.corners.shape[1] == 3 else 1
+        primitive["indices"] = glb.array(mesh.corners.astype(dtype).reshape(-1, 1), target=INDICES)
+    glb.json["meshes"].append({"name": mesh.name, "primitives": [primitive]})
     return len(glb.json["meshes"]) - 1
 
 
@@ -228,13 +231,12 @@ def clock(motion: Any) -> dict[str, Any]:
 
 def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
     """Frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
-    fps = float(metadata.get("fps") or fps)
-    first = metadata.get("start_frame", 0)
-    first = (first if isinstance(first, (int, float)) else 0) + round(float(time[0]) * fps, 6)
-    return {"fps": fps, "start_frame": int(first) if float(first).is_integer() else first}
+    fps = stated_fps(metadata) or fps
+    return {"fps": fps, "start_frame": whole(start_frame_of(metadata) + round(float(time[0]) * fps, 6))}
 
 
 def branch_extras(motion: Any) -> dict[str, Any]:
+    """What extras say of the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
 
@@ -355,4 +357,4 @@ def _objects(motion: Any, name: str, triangles: np.ndarray, edges: np.ndarray) -
         part = np.searchsorted(stops, corners, "right")
         if (part != part[:, :1]).any():
             return whole
-    return [(str(each), int(stop - count), int(stop)) for each, count, stop in zip(names, counts, stops)]
+    return [(str(name), int(stop - count), int(stop)) for name, count, stop in zip(names, counts, stops)]

@@ -1,6 +1,6 @@
-"""Joints of glTF for a motion: parts (parts.py) with translation, rotation and scale along their own axes.
+"""Joints of glTF for a motion: parts (fitting.py) with translation, rotation and scale along their own axes.
 
-What hardly moves is held still, so that it needs no keys. The error is measured against the motion, in the precision
+What hardly moves is made constant, so that it needs no keys. The error is measured against the motion, in the precision
 that is written. It writes nothing.
 """
 
@@ -37,7 +37,7 @@ class Joints:
         own = self.vertex_joint
         bind = self.bind.astype(np.float64)[own]
         local = np.einsum("nij,nj->ni", bind[:, :3, :3], rest) + bind[:, :3, 3]
-        translation, rotation, scale = (each[frame].astype(np.float64) for each in self.poses)
+        translation, rotation, scale = (pose[frame].astype(np.float64) for pose in self.poses)
         matrices = rotation_matrices(rotation) * scale[:, None, :]
         return np.einsum("nij,nj->ni", matrices[own], local) + translation[own]
 
@@ -50,13 +50,13 @@ def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float],
     parts, poses = moving.parts, [moving.places, *moving.values]
     still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
     for start, stop in motion.clip_range_frames:
-        _hold([each[start:stop] for each in poses], still, parts.reach, SLACK * allowed)
+        _hold([pose[start:stop] for pose in poses], still, parts.extent, SLACK * allowed)
     bind = np.zeros((len(parts), 4, 4))
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
     bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)
     bind[:, 3, 3] = 1.0
     joints = Joints(parts.vertex_part(), bind.astype(np.float32), tuple(a.astype(np.float32) for a in still),
-                    tuple(each.astype(np.float32) for each in poses))
+                    tuple(pose.astype(np.float32) for pose in poses))
     joints.max_error = _measured(motion, joints, lambda done: report(0.7 + 0.3 * done))
     return joints
 
@@ -72,11 +72,11 @@ def _measured(motion: Any, joints: Joints, report: Callable[[float], None]) -> f
     return float(np.sqrt(largest))
 
 
-def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], reach: np.ndarray, slack: float) -> None:
+def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], extent: np.ndarray, slack: float) -> None:
     """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`."""
-    around = np.sqrt((reach**2).sum(axis=1, keepdims=True) - reach**2)  # from each axis
+    around = np.sqrt((extent**2).sum(axis=1, keepdims=True) - extent**2)  # from each axis
     moves = (lambda values, constant: values - constant, lambda values, constant: _turns(constant, values) * around,
-             lambda values, constant: (values - constant) * reach)
+             lambda values, constant: (values - constant) * extent)
     for values, rest, moved in zip(poses, still, moves):
         for constant in (values[0].copy(), rest):
             held = np.linalg.norm(moved(values, constant), axis=-1).max(axis=0) <= slack

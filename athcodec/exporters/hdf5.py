@@ -1,8 +1,7 @@
 """Writes the HDF5 schema of athcodec (see sources/hdf5.py), frame block by frame block.
 
 The file is written under another name in the same directory and takes its own name when it is complete, so a
-reader never sees half a clip and a failure leaves what was there before. It does not compute anything but
-branch_order.
+reader never sees half a clip, and a failure leaves the older file. It computes nothing but branch_order.
 """
 
 from __future__ import annotations
@@ -22,24 +21,37 @@ from athcodec.clip import RESERVED_NAMES, check_branches, check_float_dtype, che
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.hierarchy import branch_orders
-from athcodec.joining import with_clip_metadata
+from athcodec.joining import clip_metadata
 
 CHUNK_BYTES = 1 << 20
 
 
 class Hdf5Writer:
-    """Writes one clip whose frames are added in order; use it in a `with` statement.
+    """Writes one clip whose frames are added in order; use it in a ``with`` statement.
 
-    path           the file to write; an existing file is replaced when the new one is complete
-    time           (T,) seconds: says how many frames must be added
-    vertex_branch  (N,) and branch_parent (B,), as in MotionClip, or None both
-    rest           (N, 3), written in its own dtype
-    dtype          of the positions, float32 or float64
-    stem_index, edges, faces, attributes, metadata: as in MotionClip, or None
-    gzip           compress without loss: smaller and slower
+    Parameters
+    ----------
+    path : str or path
+        The file to write; an existing one is replaced when the new one is complete, and stays if it never is.
+    time : (T,) array
+        Seconds; says how many frames must be added.
+    vertex_branch, branch_parent : (N,) and (B,) arrays of integers, or None both
+        As in MotionClip.
+    rest : (N, 3) array of float32 or float64
+        The rest pose, written in its own dtype.
+    dtype : dtype, optional
+        Of the positions, float32 or float64.
+    stem_index, edges, faces, attributes, metadata : optional
+        As in MotionClip.
+    gzip : bool, optional
+        Compress without loss: smaller and slower.
 
-    Raises ClipError for arrays that make no clip and OSError where the file cannot be written; no file is
-    left then.
+    Raises
+    ------
+    ClipError
+        For arrays that make no clip.
+    OSError
+        Where the file cannot be written.
     """
 
     def __init__(
@@ -102,7 +114,19 @@ class Hdf5Writer:
             self.abort()
 
     def add(self, frames: np.ndarray) -> None:
-        """Append the (k, N, 3) `frames`; ClipError where their shape is another or there are too many."""
+        """Append frames.
+
+        Parameters
+        ----------
+        frames : (k, N, 3) array
+
+        Raises
+        ------
+        ClipError
+            Where their shape is another or there are too many.
+        OSError
+            Where they cannot be written.
+        """
         frames = np.asarray(frames)
         if frames.ndim != 3 or frames.shape[1:] != (self._vertex_count, 3):
             raise ClipError(f"frames: got shape {frames.shape}, expected (k, {self._vertex_count}, 3)")
@@ -114,8 +138,14 @@ class Hdf5Writer:
         self._written = stop
 
     def close(self) -> None:
-        """Complete the file and give it its name; ClipError where frames are missing. Does nothing once
-        done.
+        """Complete the file and give it its name; a second time does nothing.
+
+        Raises
+        ------
+        ClipError
+            Where frames are missing.
+        OSError
+            Where the file cannot be written.
         """
         if self._pending is None:
             return
@@ -131,7 +161,7 @@ class Hdf5Writer:
             raise
 
     def abort(self) -> None:
-        """Give up: remove what has been written. Does nothing once closed."""
+        """Remove what has been written; does nothing once the file is closed."""
         pending, self._pending = self._pending, None
         if pending is None:
             return
@@ -169,17 +199,16 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
     """Write `clip` to `path`, block by block; see Hdf5Writer.
 
     `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and rest_dtype are written where it has them.
+    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and source_rest where it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
-    rest = np.asarray(clip.rest)
     writer = Hdf5Writer(
         path,
         time=clip.time,
-        rest=rest.astype(getattr(clip, "rest_dtype", rest.dtype)),
+        rest=getattr(clip, "source_rest", clip.rest),
         dtype=clip.dtype,
         gzip=options.gzip,
-        metadata=with_clip_metadata(clip),
+        metadata=clip_metadata(clip),
         **{name: getattr(clip, name, None) for name in optional},
     )
     with writer:
@@ -189,9 +218,9 @@ def write_clip(clip: Any, path: str | PathLike[str], options: WriteOptions, repo
 
 
 class Sink:
-    """The bytes of an open file, whose errors name `path`, as HDF5 writes them through Python. HDF5 cannot be told that
-    the disk is full, or that there was an interruption: it loses track of its objects and crashes when the program
-    ends. So it is not told; `check` raises what has happened."""
+    """An open file that HDF5 writes to through Python. HDF5 loses track of its objects, and crashes when the program
+    ends, where writing fails because the disk is full or the program was interrupted. So it never sees errors; `check`
+    raises the first of them, with the name `path`."""
 
     def __init__(self, descriptor: int, path: str):
         self._file, self._path = open(descriptor, "r+b", buffering=0, closefd=False), path
@@ -238,7 +267,7 @@ class Sink:
         return size
 
     def flush(self) -> None:
-        pass  # nothing is held back here
+        pass  # nothing is buffered here
 
     @contextmanager
     def _noting(self) -> Iterator[None]:

@@ -24,7 +24,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
     """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
     float32 tells apart, OSError where nothing can be written."""
     check_counts(motion)
-    times = np.asarray(motion.time) + start_frame_of(motion) / frame_rate_of(motion)
+    times = np.asarray(motion.time) + start_frame_of(motion.metadata) / frame_rate_of(motion)
     stored = times.astype(">f4")
     if (np.diff(stored.astype(np.float64)) <= 0).any():
         raise ClipError("time: got frames closer together than float32 tells apart, expected times for an MDD cache")

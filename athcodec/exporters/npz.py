@@ -19,7 +19,7 @@ from athcodec.clip import RESERVED_NAMES
 from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.hierarchy import branch_orders
-from athcodec.joining import with_clip_metadata
+from athcodec.joining import clip_metadata
 from athcodec.sources.npz import METADATA
 
 
@@ -54,14 +54,13 @@ def _arrays(motion: Any) -> dict[str, np.ndarray]:
     taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
     if taken:
         raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
-    rest = np.asarray(motion.rest)
-    arrays = {"time": motion.time, "rest": rest.astype(getattr(motion, "rest_dtype", rest.dtype))}
+    arrays = {"time": motion.time, "rest": getattr(motion, "source_rest", motion.rest)}
     if motion.branch_parent is not None:
         arrays["branch_order"] = branch_orders(motion.branch_parent)
     for name in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
         arrays[name] = getattr(motion, name)
     arrays |= motion.attributes
-    metadata = with_clip_metadata(motion)
+    metadata = clip_metadata(motion)
     if metadata:
         arrays[METADATA] = np.array(json.dumps(metadata))
     return {name: np.asarray(values) for name, values in arrays.items() if values is not None}

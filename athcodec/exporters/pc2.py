@@ -42,6 +42,7 @@ def _counted(motion: Any, start: float, step: float) -> tuple[int, float, float,
 
 
 def check_counts(motion: Any) -> None:
+    """ClipError where a motion has more frames or vertices than a cache can count."""
     if max(motion.vertex_count, motion.frame_count) > LARGEST_COUNT:
         raise ClipError(f"got {motion.frame_count} frames of {motion.vertex_count} vertices, expected fewer than 2^31")
 

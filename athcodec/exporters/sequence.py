@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from athcodec.errors import ClipError
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.mesh import WRITERS
 from athcodec.exporters.timing import frame_numbers
-from athcodec.sources import NUMBER_PATTERN
 from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
 
 DIGITS = 4
@@ -37,11 +36,16 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
     names = file_names(motion, path)
     writer = WRITERS[suffix](motion)
     with new_files(path, named=False) as folder:
-        for start, frames in motion.blocks():
-            for frame, points in enumerate(frames, start):
-                with open(os.path.join(folder, names[frame]), "wb") as file:
-                    writer.write(file, points)
-                report((frame + 1) / motion.frame_count)
+        write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
+
+
+def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Callable[[float], None]) -> None:
+    """A file for each frame, by writer.write(file, points)."""
+    for start, frames in motion.blocks():
+        for frame, points in enumerate(frames, start):
+            with open(paths[frame], "wb") as file:
+                writer.write(file, points)
+            report((frame + 1) / motion.frame_count)
 
 
 def file_names(motion: Any, path: str | PathLike[str]) -> list[str]:
@@ -71,8 +75,4 @@ def file_numbers(motion: Any) -> list[int]:
 
 def _numbering(path: Path) -> Numbering | None:
     """How the files are to be called, where the path says so: by # or %04d, or by digits with a zero before them."""
-    pattern = NUMBER_PATTERN.fullmatch(path.name)
-    if pattern is not None:
-        prefix, marks, width, suffix = pattern.groups()
-        return Numbering(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
-    return numbering_of(path) if re.search(r"(^|\D)0\d*$", path.stem) else None
+    return Numbering.of_pattern(path) or (numbering_of(path) if re.search(r"(^|\D)0\d*$", path.stem) else None)

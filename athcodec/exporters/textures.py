@@ -13,7 +13,7 @@ import numpy as np
 from athcodec.clip_view import ClipView
 from athcodec.exporters.gltf_build import clock
 
-WIDEST = 4096  # what devices take
+WIDEST = 4096  # pixels of a side that all devices support
 LAYOUT = "athcodec/exporters/vat.md"
 
 
@@ -30,7 +30,7 @@ def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
-        with OpenEXR.File(header, {name: np.ascontiguousarray(each) for name, each in channels.items()}) as file:
+        with OpenEXR.File(header, {name: np.ascontiguousarray(values) for name, values in channels.items()}) as file:
             file.write(path)
     except RuntimeError as error:
         raise OSError(f"{path}: {error}") from None
@@ -51,6 +51,7 @@ def write_png(path: str, pixels: np.ndarray) -> None:
 
 
 def write_json(path: str, facts: dict[str, Any]) -> None:
+    """Raises OSError."""
     with open(path, "w", encoding="utf-8") as out:
         json.dump(facts, out, indent=1, allow_nan=False)
         out.write("\n")

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from athcodec.clip import stated_fps
+from athcodec.errors import ClipError
+
 
 def frame_rate_of(motion: Any) -> float:
-    """Frames per second: what the clip's metadata say, else the median rate of its times."""
-    said = motion.metadata.get("fps")
-    is_number = isinstance(said, (int, float)) and not isinstance(said, bool) and 0 < said < float("inf")
-    return float(said) if is_number else float(motion.fps)
+    """Frames per second: what the clip's metadata state, else the median rate of its times."""
+    return stated_fps(motion.metadata) or float(motion.fps)
 
 
-def start_frame_of(motion: Any) -> float:
-    """The number of the frame at time 0, 0 where the clip does not say."""
-    said = motion.metadata.get("start_frame", 0)
-    is_number = isinstance(said, (int, float)) and not isinstance(said, bool) and abs(said) < 1e9
-    return float(said) if is_number else 0.0
+def start_frame_of(metadata: Mapping[str, Any]) -> float:
+    """The number of the frame at time 0, 0 where the metadata state no number."""
+    stated = metadata.get("start_frame", 0)
+    is_number = isinstance(stated, (int, float)) and not isinstance(stated, bool) and abs(stated) < 1e9
+    return float(stated) if is_number else 0.0
 
 
 def frame_numbers(motion: Any) -> np.ndarray:
     """(T,) float64; whole where times fall on frames but for rounding. Those of a view are those of the clip."""
-    return start_frame_of(motion) + np.round(np.asarray(motion.time) * frame_rate_of(motion), 6)
+    return start_frame_of(motion.metadata) + np.round(np.asarray(motion.time) * frame_rate_of(motion), 6)
+
+
+def distinct_frame_numbers(motion: Any) -> np.ndarray:
+    """The same, for formats that find a frame by its number. Raises ClipError where two have the same."""
+    numbers = frame_numbers(motion)
+    same = np.flatnonzero(np.diff(numbers) <= 0)
+    if same.size:
+        frame = int(same[0]) + 1
+        raise ClipError(f"time: frame {frame} has the number {numbers[frame]:g} as the one before it, expected a "
+                        "larger one")
+    return numbers

@@ -1,4 +1,4 @@
-"""Writes USD: one Mesh, BasisCurves or Points prim per part of a clip, with time samples of points and extent.
+"""Writes USD: one Mesh, BasisCurves or Points prim per object of a clip, with time samples of points and extent.
 
 Faces, texture coordinates and other static arrays are written once. Frames are written as they come and saved now and
 then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are float32, a clip in
@@ -21,21 +21,21 @@ from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from athcodec.atomic_files import new_files
 from athcodec.exporters import WriteOptions
-from athcodec.exporters.parts import (
+from athcodec.exporters.scene_objects import (
     KNOWN_ATTRIBUTES,
     KNOWN_METADATA,
-    Part,
+    SceneObject,
+    distinct,
     domain_of,
-    frame_numbers,
+    objects_of,
     own_arrays,
-    parts_of,
     rows_of,
 )
-from athcodec.sources.parts import ArrayDescriptor
+from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.sources.scene_objects import OWN
 from athcodec.units import METRES, unit_symbol
 
 SAVE_BYTES = 16 << 20
-OWN = "athcodec"
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
 TYPES = {  # of a row's shape and kind; for the shape None any number of values per row
     "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
@@ -63,7 +63,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
 
 @contextmanager
 def _saying(path: str) -> Iterator[None]:
-    """USD's errors in one line each: that a file cannot be written is all that can go wrong here."""
+    """USD's errors become OSErrors of one line: all that can fail here is writing a file."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -74,7 +74,7 @@ def _saying(path: str) -> Iterator[None]:
 
 
 def _convert(binary: str, target: str, suffix: str) -> None:
-    """From the binary file that was written to what is wanted; the latter alone is left."""
+    """Converts the binary file that was written to the wanted kind; only that remains."""
     if suffix == ".usda":
         text = f"{binary}.usda"
         _must(Sdf.Layer.FindOrOpen(binary).Export(text), binary)
@@ -96,17 +96,17 @@ def _must(done: object, name: str) -> None:
 
 
 def _write(motion: Any, name: str, report: Callable[[float], None]) -> None:
-    codes, rate = frame_numbers(motion)
+    codes, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     root = UsdGeom.Xform.Define(stage, "/clip").GetPrim()
     stage.SetDefaultPrim(root)
     _describe_stage(stage, motion, codes, rate)
-    parts = parts_of(motion)
-    for part, place in zip(parts, _places(parts)):
-        part.target = _define(stage, place, part)
-    left = _static_arrays(stage, motion, parts)
+    objects = objects_of(motion)
+    for obj, name in zip(objects, distinct(_identifier(obj.name) for obj in objects)):
+        obj.target = _define(stage, f"/clip/{name}", obj)
+    left = _static_arrays(stage, motion, objects)
     _own_arrays(root, motion, left)
-    _write_frames(stage, motion, parts, codes, report)
+    _write_frames(stage, motion, objects, codes, report)
 
 
 def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: float) -> None:
@@ -134,41 +134,28 @@ def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: floa
         stage.GetRootLayer().customLayerData = {OWN: json.dumps(kept)}
 
 
-# ---- parts ----
+# ---- objects ----
 
 
 def _identifier(name: str) -> str:
     return Tf.MakeValidIdentifier(name.strip("/") or "part")
 
 
-def _places(parts: list[Part]) -> list[str]:
-    taken, places = set(), []
-    for part in parts:
-        wanted = name = _identifier(part.name)
-        number = 1
-        while name in taken:
-            number += 1
-            name = f"{wanted}_{number}"
-        taken.add(name)
-        places.append(f"/clip/{name}")
-    return places
-
-
-def _define(stage: Usd.Stage, place: str, part: Part) -> UsdGeom.PointBased:
-    if part.kind == "mesh":
+def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBased:
+    if obj.kind == "mesh":
         schema = mesh = UsdGeom.Mesh.Define(stage, place)
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateFaceVertexCountsAttr(_int_array(part.faces[0]))
-        mesh.CreateFaceVertexIndicesAttr(_int_array(part.faces[1]))
-        if part.details.get("orientation") == UsdGeom.Tokens.leftHanded:
+        mesh.CreateFaceVertexCountsAttr(_int_array(obj.faces[0]))
+        mesh.CreateFaceVertexIndicesAttr(_int_array(obj.faces[1]))
+        if obj.details.get("orientation") == UsdGeom.Tokens.leftHanded:
             mesh.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
-    elif part.kind == "curves":
+    elif obj.kind == "curves":
         schema = curves = UsdGeom.BasisCurves.Define(stage, place)
-        curves.CreateCurveVertexCountsAttr(_int_array(part.curves))
-        curves.CreateTypeAttr(part.details.get("type", UsdGeom.Tokens.linear))
-        curves.CreateWrapAttr(part.details.get("wrap", UsdGeom.Tokens.nonperiodic))
-        if part.details.get("basis"):
-            curves.CreateBasisAttr(part.details["basis"])
+        curves.CreateCurveVertexCountsAttr(_int_array(obj.curves))
+        curves.CreateTypeAttr(obj.details.get("type", UsdGeom.Tokens.linear))
+        curves.CreateWrapAttr(obj.details.get("wrap", UsdGeom.Tokens.nonperiodic))
+        if obj.details.get("basis"):
+            curves.CreateBasisAttr(obj.details["basis"])
     else:
         schema = UsdGeom.Points.Define(stage, place)
     schema.CreatePointsAttr()
@@ -183,7 +170,7 @@ def _int_array(values: np.ndarray) -> Vt.IntArray:
 # ---- static arrays ----
 
 
-def _static_arrays(stage: Usd.Stage, motion: Any, parts: list[Part]) -> dict[str, tuple[np.ndarray, str]]:
+def _static_arrays(stage: Usd.Stage, motion: Any, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
     """Writes those that belong to vertices, corners and faces; returns the others, with their domains."""
     left = {}
     domains = motion.metadata.get("domains", {})
@@ -191,14 +178,14 @@ def _static_arrays(stage: Usd.Stage, motion: Any, parts: list[Part]) -> dict[str
         if name in KNOWN_ATTRIBUTES:
             continue
         domain = domain_of(motion, name, values, domains)
-        if domain not in INTERPOLATION or not _write_array(name, values, domain, parts):
+        if domain not in INTERPOLATION or not _write_array(name, values, domain, objects):
             left[name] = values, domain
     return left
 
 
-def _write_array(name: str, values: np.ndarray, domain: str, parts: list[Part]) -> bool:
+def _write_array(name: str, values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
     if name == "radius" and domain in ("vertex", "constant") and values.ndim == 1 and values.dtype == np.float32:
-        return _write_radius(values, domain, parts)
+        return _write_radius(values, domain, objects)
     kind = WIDER.get(values.dtype.char)
     shapes = TYPES.get(kind or "", {})
     row = values.shape[1:]
@@ -208,9 +195,9 @@ def _write_array(name: str, values: np.ndarray, domain: str, parts: list[Part]) 
     if row not in shapes and len(row) > 1:
         return False
     type_name = _type_name(name, kind, row if row in shapes else ())
-    for part in parts:
-        rows = rows_of(values, domain, part)
-        primvar = UsdGeom.PrimvarsAPI(part.target).CreatePrimvar(
+    for obj in objects:
+        rows = rows_of(values, domain, obj)
+        primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
             PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size)
         primvar.Set(_vt(rows, type_name, NUMPY[kind]))
         if np.dtype(NUMPY[kind]) != values.dtype:
@@ -220,18 +207,18 @@ def _write_array(name: str, values: np.ndarray, domain: str, parts: list[Part]) 
     return True
 
 
-def _write_radius(values: np.ndarray, domain: str, parts: list[Part]) -> bool:
+def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
     """As widths of curves and points; of meshes as a primvar."""
-    for part in parts:
-        rows = rows_of(values, domain, part)
-        if part.kind == "mesh":
-            primvar = UsdGeom.PrimvarsAPI(part.target).CreatePrimvar("radius", Sdf.ValueTypeNames.FloatArray,
+    for obj in objects:
+        rows = rows_of(values, domain, obj)
+        if obj.kind == "mesh":
+            primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar("radius", Sdf.ValueTypeNames.FloatArray,
                                                                      INTERPOLATION[domain])
             primvar.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(rows)))
         else:
-            part.target.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(rows * np.float32(2))))
-            part.target.SetWidthsInterpolation(INTERPOLATION[domain])
-            part.width = 2 * float(rows.max(initial=0))
+            obj.target.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(rows * np.float32(2))))
+            obj.target.SetWidthsInterpolation(INTERPOLATION[domain])
+            obj.width = 2 * float(rows.max(initial=0))
     return True
 
 
@@ -251,22 +238,21 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
 
 def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
     """What has no place in the prims, byte for byte."""
-    for name, values, domain in own_arrays(motion, left):
-        attribute = root.CreateAttribute(f"{OWN}:{_identifier(name)}", Sdf.ValueTypeNames.UCharArray, True,
+    for descriptor, raw in own_arrays(motion, left):
+        attribute = root.CreateAttribute(f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True,
                                          Sdf.VariabilityUniform)
-        raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
         attribute.Set(Vt.UCharArray.FromNumpy(raw) if len(raw) else Vt.UCharArray())
-        for key, text in ArrayDescriptor.of(name, values, domain)._asdict().items():
+        for key, text in descriptor._asdict().items():
             attribute.SetCustomDataByKey(f"{OWN}:{key}", text)
 
 
 # ---- frames ----
 
 
-def _write_frames(stage: Usd.Stage, motion: Any, parts: list[Part], codes: np.ndarray,
+def _write_frames(stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray,
                   report: Callable[[float], None]) -> None:
     layer = stage.GetRootLayer()
-    places = [(part, part.target.GetPointsAttr().GetPath(), part.target.GetExtentAttr().GetPath()) for part in parts]
+    places = [(obj, obj.target.GetPointsAttr().GetPath(), obj.target.GetExtentAttr().GetPath()) for obj in objects]
     unsaved = 0
     for start, block in motion.blocks():
         for row, positions in enumerate(block.astype(np.float32, copy=False)):
@@ -281,10 +267,10 @@ def _write_frames(stage: Usd.Stage, motion: Any, parts: list[Part], codes: np.nd
 
 
 def _write_frame(layer: Sdf.Layer, places: list, positions: np.ndarray, code: float) -> None:
-    for part, points, extent in places:
-        own = np.ascontiguousarray(positions[part.vertices])
+    for obj, points, extent in places:
+        own = np.ascontiguousarray(positions[obj.vertices])
         layer.SetTimeSample(points, code, Vt.Vec3fArray.FromNumpy(own) if len(own) else Vt.Vec3fArray())
         if len(own):
-            half = np.float32(part.width / 2)
+            half = np.float32(obj.width / 2)
             box = np.stack([own.min(axis=0) - half, own.max(axis=0) + half])
             layer.SetTimeSample(extent, code, Vt.Vec3fArray.FromNumpy(box))

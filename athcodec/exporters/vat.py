@@ -1,7 +1,7 @@
 """Writes vertex animation textures of node matrices: a folder of EXR textures, a JSON file and the rest pose as GLB.
 
 A node has three texels per frame. Nodes are the parts of a level; stems that bend are cut until a map of each is no
-further off than the level itself (parts.py), so textures are small at any level. The error is measured on what is
+further off than the level itself (fitting.py), so textures are small at any level. The error is measured on what is
 written, rounding included, and stated in the JSON and by write_clip. The layout is in vat.md. Textures are made in
 memory, as image files are.
 """

@@ -21,7 +21,7 @@ import numpy as np
 from athcodec.atomic_files import check_target, new_files
 from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
-from athcodec.exporters.sequence import file_names
+from athcodec.exporters.sequence import file_names, write_frames
 
 _HEAD = ('<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
          'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n')
@@ -37,11 +37,7 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, re
         names = [f"{target.stem}_0001.vtu"]
     writer = _VtuWriter(motion, options.gzip)
     with new_files(target, named=False) as folder:
-        for start, frames in motion.blocks():
-            for frame, points in enumerate(frames, start):
-                with open(os.path.join(folder, names[frame]), "wb") as file:
-                    writer.write(file, points)
-                report((frame + 1) / motion.frame_count)
+        write_frames(motion, writer, [os.path.join(folder, name) for name in names], report)
         if index:
             Path(folder, index).write_text(_index(motion, names), "utf-8")
 

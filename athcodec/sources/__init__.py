@@ -7,7 +7,6 @@ none then (see discovery.py).
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import os
 import re
@@ -16,12 +15,14 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
+from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
@@ -30,17 +31,32 @@ NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a user may say about a source. A reader ignores what has no meaning for its format.
+    """Options of `read` for a source. A reader ignores those that have no meaning for its format.
 
-    rest   "auto" (the file's rest pose, else the first frame), "first", or "mean" (of all frames)
-    fps    frames per second: the rate at which curves are sampled; the rate of a source that states none
-    mesh   the file that has the faces of a point cache, a hierarchy's MTG ...
-    field  name of the displacement that is added to the points of a finite-element result
-    only   patterns (fnmatch) of the names of the prims, objects or meshes to read; () reads all
-    takes  names or patterns of a file's animations, each of which is a clip of its own in what is read (joining.py has
-           `split`), "all" of them; () reads the one motion that players begin with
-    skip   names of static arrays to leave out
-    root   the vertex, or one per connected part, at which branches derived from edges begin
+    Parameters
+    ----------
+    rest : {"auto", "first", "mean"}, optional
+        The rest pose: that of the file, else the first frame; the first frame; or the mean of all frames.
+    fps : float, optional
+        Frames per second: the rate at which curves are sampled, and the rate of a source that states none.
+    mesh : path, optional
+        The file that has the faces of a point cache, or of the vertices of a plant in MTG.
+    field : str, optional
+        Name of the displacement that is added to the points of a finite-element result.
+    only : sequence of str, optional
+        Patterns (fnmatch) of the names of the prims, objects or meshes to read; all by default.
+    takes : sequence of str or str, optional
+        Names or patterns of a file's animations, each of which becomes a clip of its own in what is read (`split` takes
+        them apart), "all" for all of them. By default the one motion that players begin with is read.
+    skip : collection of str, optional
+        Names of static arrays to leave out.
+    root : int or sequence of int, optional
+        The vertex, or one per connected component, at which branches that are derived from edges begin.
+
+    Raises
+    ------
+    ValueError
+        For values that rest and fps cannot have.
     """
 
     rest: str = "auto"
@@ -61,8 +77,25 @@ class ReadOptions:
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: `needs` are the importable modules that `extra` installs, `magic` what its files begin with;
-    `holds_several` clips of one plant, as far as they are written."""
+    """A file format that can be read or written.
+
+    Parameters
+    ----------
+    name, title : str
+        What a user calls it by, and what it is in words.
+    suffixes : tuple of str
+        Of its files, in lower case, with the dot.
+    module : str
+        The module that reads or writes it.
+    extra : str, optional
+        The optional dependencies of athcodec that it takes.
+    needs : tuple of str, optional
+        The modules that these install.
+    magic : tuple of bytes, optional
+        What its files begin with.
+    holds_several : bool, optional
+        Whether a file can be written with several clips of one plant.
+    """
 
     name: str
     title: str
@@ -75,13 +108,20 @@ class Format:
 
     @property
     def is_installed(self) -> bool:
+        """Whether the packages that it needs are installed."""
         return not self._missing()
 
     def _missing(self) -> list[str]:
         return [name for name in self.needs if find_spec(name) is None]
 
     def check(self) -> None:
-        """Raises MissingExtra where a package that this format needs is not installed."""
+        """Check that the packages that it needs are installed.
+
+        Raises
+        ------
+        MissingExtra
+            Where one is not; the message says how to install it.
+        """
         missing = self._missing()
         if missing:
             raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "athcodec[{self.extra}]"')
@@ -108,47 +148,70 @@ FORMATS = (
 
 
 def read(path: str | PathLike[str], format: str | None = None, *, unit: str | None = None,
-         up_axis: str | None = None, **options: object) -> MotionClip:
-    """Open the clip in `path`; close it, or use it in a `with` statement.
+         up_axis: str | None = None, **options: Any) -> MotionClip:
+    """Open the clip in a file of any known format.
 
-    format     the name of one of FORMATS; None: known by the file's content, then by its suffix
-    unit       a unit of length: a clip that has another is converted, one that has none is taken to be in it
-    up_axis    "x", "y" or "z", likewise: a clip with another is turned
-    options    see ReadOptions
+    Parameters
+    ----------
+    path : str or path
+        The file; of numbered files any one of them, or a name with # or %04d in place of the number.
+    format : str, optional
+        Name of one of `athcodec.sources.FORMATS`. By default the format is found by what the file begins with, then
+        by its suffix.
+    unit : str, optional
+        A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
+        is taken to be in it.
+    up_axis : {"x", "y", "z"}, optional
+        Likewise: a clip with another up axis is turned.
+    **options
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root.
 
-    Raises ClipError where the file is no usable clip, MissingExtra where a package is missing, OSError where it cannot
-    be opened, ValueError for options that do not exist.
+    Returns
+    -------
+    MotionClip
+        Close it, or use it in a ``with`` statement; frames are read from the file when they are asked for.
+
+    Raises
+    ------
+    ClipError
+        Where the file holds no usable clip.
+    MissingExtra
+        Where a package is missing that the format needs.
+    OSError
+        Where the file cannot be opened.
+    ValueError
+        For a format or values of options that do not exist.
+    TypeError
+        For options that do not exist.
     """
     wanted = ReadOptions(**options)
     kind = find_format(path) if format is None else format_named(format, FORMATS)
     kind.check()
-    clip = importlib.import_module(kind.module).read_clip(path, wanted)
-    try:
+    clip: MotionClip = importlib.import_module(kind.module).read_clip(path, wanted)
+    with closing_on_failure(clip):
         return _in_axes(_in_units(clip, unit), up_axis)
-    except BaseException:
-        clip.close()
-        raise
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:
-    """Whether a path is no file and stands for numbered ones, with # or %04d in its name."""
+    """Whether a path stands for numbered files, by # or %04d in its name, and is none itself."""
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
 def format_named(name: str, formats: Sequence[Format]) -> Format:
-    for each in formats:
-        if each.name == name:
-            return each
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(each.name for each in formats)}")
+    """The one of `formats` with this name. Raises ValueError."""
+    for candidate in formats:
+        if candidate.name == name:
+            return candidate
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
 
 
 def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
     suffix = Path(path).suffix.lower()
-    for each in formats:
-        if suffix in each.suffixes:
-            return each
-    known = " ".join(suffix for each in formats for suffix in each.suffixes)
+    for candidate in formats:
+        if suffix in candidate.suffixes:
+            return candidate
+    known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
 
 
@@ -161,9 +224,9 @@ def find_format(path: str | PathLike[str]) -> Format:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
-    for each in FORMATS:
-        if head.startswith(each.magic or ()):
-            return each
+    for candidate in FORMATS:
+        if head.startswith(candidate.magic or ()):
+            return candidate
     return format_by_suffix(path, FORMATS)
 
 
@@ -180,7 +243,7 @@ def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
 
 
 def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
-    """Turned by the right angle that takes one axis to the other."""
+    """Turned by the right angle that takes its up axis to the wanted one."""
     if up_axis is None:
         return clip
     up_axis = up_axis.lower()
@@ -205,17 +268,44 @@ def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip
         turned = clip.attributes["normals"] @ (matrix / np.cbrt(np.linalg.det(matrix))).T
         clip.attributes["normals"] = turned.astype(clip.attributes["normals"].dtype)
     source, dtype = clip.positions, clip.dtype
-    clip.positions = Frames(lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
-                            clip.frame_count, clip.vertex_count, dtype)
-    rest = clip.rest @ matrix.T
-    return dataclasses.replace(clip, rest=rest.astype(clip.rest_dtype))
+    positions = Frames(lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
+                       clip.frame_count, clip.vertex_count, dtype)
+    return clip.replace(positions=positions, rest=(clip.rest @ matrix.T).astype(clip.rest_dtype))
 
 
-def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: object) -> MotionClip:
-    """Open the clip in an HDF5 file of athcodec's schema; see sources/hdf5.py, and `read` for the rest."""
+def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> MotionClip:
+    """Open the clip in an HDF5 file of athcodec's schema.
+
+    Parameters
+    ----------
+    path : str or path
+        The file; `athcodec.sources.hdf5` says which datasets it has.
+    rest : {"auto", "first", "mean"}, optional
+        The rest pose: that of the file, else the first frame; the first frame; or the mean of all frames.
+    **options
+        Further parameters of `read`.
+
+    Returns
+    -------
+    MotionClip
+        Close it, or use it in a ``with`` statement.
+
+    Raises
+    ------
+    ClipError
+        Where the file is not HDF5 or holds no usable clip.
+    OSError
+        Where the file cannot be opened.
+    """
     return read(path, "hdf5", rest=rest, **options)
 
 
 def sample_path() -> Path:
-    """Where the clip that ships with athcodec lies: a small finite-element tree in wind, HDF5, 120 frames."""
+    """The clip that is installed with athcodec: a small finite-element tree in wind.
+
+    Returns
+    -------
+    pathlib.Path
+        An HDF5 file of athcodec's schema, with 120 frames.
+    """
     return Path(__file__).resolve().parent.parent / "sample" / "tree_1k_120f.h5"

@@ -6,7 +6,7 @@ everywhere else here. An Alembic file names no unit and no axis; Y is up by cust
 alone. Objects that are hidden throughout, NURBS patches, materials and velocities are not read.
 
 Alembic's library crashes on damaged archives. So it works in a process of its own (alembic_archive.py), which gives
-frames when it is asked for them and whose end is one line of error here.
+frames when it is asked for them, and whose crash becomes a ClipError.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import subprocess
 import sys
 import threading
 import weakref
-from collections.abc import Callable
 from os import PathLike, fspath
 
 import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 
 ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 READER = "athcodec.sources.alembic_archive"
@@ -40,11 +40,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     path = fspath(path)
     with open(path, "rb"):
         pass
-    unchanged = _watch(path)
+    unchanged = FileWatch(path)
     archive = _Archive(path, options)
-    try:
-        with np.load(io.BytesIO(archive.described)) as found:
-            arrays = {name: found[name] for name in found.files}
+    with naming(path), closing_on_failure(archive), np.load(io.BytesIO(archive.described)) as found:
+        arrays = {name: found[name] for name in found.files}
         attributes = {name.split("/", 1)[1]: values for name, values in arrays.items() if "/" in name}
         shape = len(arrays["time"]), len(arrays["rest"])
 
@@ -55,42 +54,21 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
         return MotionClip(Frames(frames, *shape), arrays["time"], rest=arrays["rest"], attributes=attributes,
                           metadata=json.loads(arrays["metadata"].tobytes()), resource=archive, unchanged=unchanged,
                           **{name: arrays[name] for name in ARRAYS if name in arrays})
-    except ClipError as error:
-        archive.close()
-        raise ClipError(f"{path}: {error}") from None
-    except BaseException:
-        archive.close()
-        raise
-
-
-def _watch(path: str) -> Callable[[], bool]:
-    def stamp() -> tuple[int, int]:
-        found = os.stat(path)
-        return found.st_size, found.st_mtime_ns
-
-    before = stamp()
-    return lambda: stamp() == before
 
 
 class _Archive:
     """The process that reads an archive."""
 
     def __init__(self, path: str, options: ReadOptions):
-        self.path, self._lock = path, threading.Lock()
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(each for each in sys.path if each)}
+        self._lock = threading.Lock()
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._process = subprocess.Popen([sys.executable, "-m", READER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                          stderr=subprocess.DEVNULL, env=env)
         self._end = weakref.finalize(self, _stop, self._process)
         wanted = {"path": os.path.abspath(path), "rest": options.rest, "fps": options.fps, "only": list(options.only),
                   "skip": list(options.skip)}
-        try:
+        with naming(path), closing_on_failure(self):
             self.described = self.ask(json.dumps(wanted))
-        except ClipError as error:
-            self.close()
-            raise ClipError(f"{path}: {error}") from None
-        except BaseException:
-            self.close()
-            raise
 
     def ask(self, line: str) -> bytes:
         """What the process answers. Raises ClipError where it says what is wrong, or has ended."""

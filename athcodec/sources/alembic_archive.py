@@ -2,7 +2,7 @@
 
 It takes a path and ReadOptions as one line of JSON, answers with the clip but for its motion, and then with the frames
 that it is asked for, until there is nothing more to read. Each answer is a line of JSON, {"size": bytes} and these
-bytes or {"error": what is wrong}. What kills this process, as a damaged archive may, is an end of answers there.
+bytes or {"error": message}. Where this process crashes, as a damaged archive may make it, the answers end.
 """
 
 from __future__ import annotations
@@ -23,17 +23,13 @@ from alembic3d import Abc, AbcGeom
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
-from athcodec.sources.parts import (
+from athcodec.sources.scene_objects import (
+    DESCRIPTOR,
     OWN,
     ArrayDescriptor,
-    Part,
-    Static,
-    edges,
-    faces,
-    fields,
-    joined,
-    names_and_kinds,
+    SceneObject,
+    clip_of_objects,
+    frames_of_objects,
     own_metadata,
     turned_corners,
 )
@@ -59,7 +55,8 @@ def main() -> None:
     wanted = json.loads(asked.readline())
     path = wanted.pop("path")
     with _answering(answers):
-        clip = _clip(_Archive(path), ReadOptions(**wanted))
+        archive = Abc.IArchive(path)
+        clip = _clip(archive, ReadOptions(**wanted))
         _send(answers, _described(clip))
     for line in asked:
         start, stop = map(int, line.split())
@@ -89,24 +86,11 @@ def _described(clip: MotionClip) -> bytes:
     for name in ("time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
         if getattr(clip, name) is not None:
             arrays[name] = getattr(clip, name)
-    arrays["rest"] = clip.rest.astype(clip.rest_dtype)
+    arrays["rest"] = clip.source_rest
     arrays["metadata"] = np.frombuffer(json.dumps(clip.metadata).encode(), np.uint8)
     out = io.BytesIO()
     np.savez(out, **arrays)
     return out.getvalue()
-
-
-class _Archive:
-    """An open archive."""
-
-    def __init__(self, path: str):
-        self.path = path
-        self.archive = Abc.IArchive(path)
-        if not self.archive.valid():
-            raise ClipError("archive: cannot be opened")
-
-    def close(self) -> None:
-        self.archive = None
 
 
 class _Track:
@@ -162,57 +146,55 @@ class _Xform:
 
 
 @dataclass
-class _Object(Part):
+class _Object(SceneObject):
     """An object that is read, the transforms above it, leaf first, and how its points are found."""
 
     schema: Any = None
     xforms: list[_Xform] = field(default_factory=list)
     points: Any = None
     track: _Track | None = None
-    still: np.ndarray | None = None
 
     def tracks(self) -> Iterator[_Track]:
-        yield from (each for each in (self.track, *(xform.track for xform in self.xforms)) if len(each.times) > 1)
+        yield from (track for track in (self.track, *(xform.track for xform in self.xforms)) if len(track.times) > 1)
 
     @property
     def moves(self) -> bool:
         return any(len(xform.track.times) > 1 for xform in self.xforms)
 
 
-def _clip(source: _Archive, options: ReadOptions) -> MotionClip:
-    own, kept = _own(source.archive)
-    parts = _find(source.archive, options.only)
-    times, rate = _times(source.archive, parts, options.fps)
+def _clip(archive: Any, options: ReadOptions) -> MotionClip:
+    if not archive.valid():
+        raise ClipError("archive: cannot be opened")
+    own, kept = _own(archive)
+    objects = _find(archive, options.only)
+    times, rate = _times(archive, objects, options.fps)
     first = 0
-    for part in parts:
-        part.first, part.count = first, len(_points(part, times[0]))
-        first += part.count
-        order = _topology(part)
-        _statics(part, order, times[0])
+    for obj in objects:
+        obj.first, obj.count, obj.is_still = first, len(_points(obj, times[0])), not any(obj.tracks())
+        first += obj.count
+        order = _topology(obj)
+        _statics(obj, order, times[0])
     if first == 0:
         raise ClipError("points: got none, expected at least one")
-    metadata = own_metadata(own) | _metadata(source.archive, times, rate) | names_and_kinds(parts)
-    attributes, domains = joined(parts, options.skip)
-    _add_kept(kept, attributes, domains, first, options.skip)
-    if domains:
-        metadata["domains"] = domains
-    known = fields(attributes, domains)
-    rest, links = known.pop("rest", None), known.pop("edges", None)
-    polygons = faces(parts, attributes)
-    reader = _Reader(source, parts, times)
-    return MotionClip(
-        positions=Frames(reader.read, len(times), first), time=times - times[0],
-        rest=rest if options.rest == "auto" else None, rest_pose="mean" if options.rest == "mean" else "first",
-        edges=edges(parts) if links is None else links, faces=polygons, attributes=attributes, metadata=metadata,
-        resource=source, **known,
-    )
+
+    def sample(obj: _Object, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        try:
+            return _points(obj, times[frame]), _matrix(obj, times[frame])
+        except ClipError:
+            raise
+        except BROKEN as error:
+            raise ClipError(f"positions: frame {frame} of {obj.path} cannot be read: "
+                            f"{' '.join(str(error).split())}") from None
+
+    return clip_of_objects(objects, frames_of_objects(objects, len(times), sample), times - times[0],
+                           own_metadata(own) | _metadata(archive, times, rate), kept, options)
 
 
 # ---- objects ----
 
 
 def _find(archive: Any, only: Sequence[str]) -> list[_Object]:
-    parts, visited = [], 0
+    objects, visited = [], 0
     waiting = [(archive.getTop(), [])]
     while waiting:
         parent, xforms = waiting.pop()
@@ -224,28 +206,28 @@ def _find(archive: Any, only: Sequence[str]) -> list[_Object]:
             child = parent.getChild(i)
             if _hidden(child):
                 continue
-            children.append((child, _add(child, xforms, parts, only)))
+            children.append((child, _add(child, xforms, objects, only)))
         waiting += reversed(children)
-    if not parts:
+    if not objects:
         what = f" named like {', '.join(only)}" if only else ""
         raise ClipError(f"objects: got none with points{what}, expected a visible mesh, curves or points")
-    return parts
+    return objects
 
 
-def _add(child: Any, xforms: list[_Xform], parts: list[_Object], only: Sequence[str]) -> list[_Xform]:
+def _add(child: Any, xforms: list[_Xform], objects: list[_Object], only: Sequence[str]) -> list[_Xform]:
     """Adds an object that has points; returns the transforms above its children."""
     name = child.getHeader().getMetaData().get("schema") or ""
     if name.startswith("AbcGeom_Xform"):
         return _above(child, xforms)
-    found = next((each for start, each in SCHEMAS.items() if name.startswith(start)), None)
+    found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     names = (child.getName(), child.getFullName())
-    if found is None or only and not any(fnmatchcase(each, pattern) for pattern in only for each in names):
+    if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
         return xforms
     kind, wrap = found
     schema = wrap(child, EXISTING).getSchema()
     points = schema.getPositionsProperty()
     if points.getNumSamples():
-        parts.append(_Object(kind, *names, schema=schema, xforms=xforms, points=points, track=_track(points)))
+        objects.append(_Object(kind, *names, schema=schema, xforms=xforms, points=points, track=_track(points)))
     return xforms
 
 
@@ -264,32 +246,32 @@ def _track(points: Any) -> _Track:
 
 
 def _hidden(child: Any) -> bool:
-    """Whether an object is never seen."""
+    """Whether an object is hidden in all frames."""
     visible = AbcGeom.GetVisibilityProperty(child)
     if not visible or not visible.valid() or not visible.isConstant() or not visible.getNumSamples():
         return False
     return AbcGeom.GetVisibility(child) == AbcGeom.ObjectVisibility.kVisibilityHidden
 
 
-def _topology(part: _Object) -> np.ndarray:
+def _topology(obj: _Object) -> np.ndarray:
     """Fills in faces or curves; returns where each corner lies in the file."""
-    if part.kind == "curves":
-        sample = part.schema.getValue()
-        part.curve_counts = _fixed(part, part.schema.getNumVerticesProperty())
+    if obj.kind == "curves":
+        sample = obj.schema.getValue()
+        obj.curve_counts = _fixed(obj, obj.schema.getNumVerticesProperty())
         if sample.getWrap() == AbcGeom.CurvePeriodicity.kPeriodic:
-            part.details["wrap"] = "periodic"
+            obj.details["wrap"] = "periodic"
         if sample.getType() == AbcGeom.CurveType.kCubic:
-            part.details["type"] = "cubic"
-    elif part.kind == "mesh":
-        part.face_counts = _fixed(part, part.schema.getFaceCountsProperty())
-        part.face_indices = _fixed(part, part.schema.getFaceIndicesProperty())
-    part.check()
-    order = turned_corners(part.face_counts)
-    part.face_indices = part.face_indices[order]
+            obj.details["type"] = "cubic"
+    elif obj.kind == "mesh":
+        obj.face_counts = _fixed(obj, obj.schema.getFaceCountsProperty())
+        obj.face_indices = _fixed(obj, obj.schema.getFaceIndicesProperty())
+    obj.check()
+    order = turned_corners(obj.face_counts)
+    obj.face_indices = obj.face_indices[order]
     return order
 
 
-def _fixed(part: _Object, found: Any) -> np.ndarray:
+def _fixed(obj: _Object, found: Any) -> np.ndarray:
     """Integers that are the same in every frame; ClipError where they change."""
     first = np.array(found.getValue(), np.int32)
     if found.isConstant():
@@ -297,7 +279,7 @@ def _fixed(part: _Object, found: Any) -> np.ndarray:
     track = _Track(found.getTimeSampling(), found.getNumSamples())
     for i in range(1, len(track.times)):
         if not np.array_equal(np.array(found.getValue(track.sample(i)), np.int32), first):
-            raise ClipError(f"{part.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
+            raise ClipError(f"{obj.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
                             "the same vertices and faces in all")
     return first
 
@@ -305,9 +287,9 @@ def _fixed(part: _Object, found: Any) -> np.ndarray:
 # ---- time ----
 
 
-def _times(archive: Any, parts: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
+def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
     """Seconds of the frames in the archive, and frames per second, None where nothing says it."""
-    tracks = [track for part in parts for track in part.tracks()]
+    tracks = [track for obj in objects for track in obj.tracks()]
     if not tracks:
         return np.zeros(1), fps
     step = min((track.step for track in tracks if track.step > 0), default=0.0)
@@ -323,7 +305,7 @@ def _times(archive: Any, parts: list[_Object], fps: float | None) -> tuple[np.nd
 
 
 def _rate(archive: Any, step: float, times: np.ndarray) -> float:
-    """What the samples are apart; where they differ, what the archive says of its maker's rate."""
+    """The rate of the samples; where their steps differ, the one that the archive states for the tool that made it."""
     said = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
     rate = 1 / step if step > 0 else float(said) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
@@ -349,27 +331,25 @@ def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, 
 # ---- what does not move ----
 
 
-def _statics(part: _Object, order: np.ndarray, time: float) -> None:
-    params = [] if part.kind == "points" else [("uv", part.schema.getUVsParam()),
-                                               ("normals", part.schema.getNormalsParam())]
-    if part.kind != "mesh":
-        params.append(("radius", part.schema.getWidthsParam()))
-    for name, param in params if part.kind != "mesh" or hasattr(part.schema, "getNormalsParam") else params[:1]:
-        _keep(part, name, param, order)
-    further = part.schema.getArbGeomParams()
+def _statics(obj: _Object, order: np.ndarray, time: float) -> None:
+    params = [] if obj.kind == "points" else [("uv", obj.schema.getUVsParam()),
+                                               ("normals", obj.schema.getNormalsParam())]
+    if obj.kind != "mesh":
+        params.append(("radius", obj.schema.getWidthsParam()))
+    for name, param in params if obj.kind != "mesh" or hasattr(obj.schema, "getNormalsParam") else params[:1]:
+        _keep(obj, name, param, order)
+    further = obj.schema.getArbGeomParams()
     for i in range(further.getNumProperties() if further.valid() else 0):
         header = further.getPropertyHeader(i)
-        kind = next((each for each in PARAMS if each.matches(header)), None)
+        kind = next((param for param in PARAMS if param.matches(header)), None)
         if kind is not None:
-            _keep(part, header.getName(), kind(further, header.getName()), order)
-    if "radius" in part.statics and part.kind != "mesh":
-        radius = part.statics["radius"]
-        scale = 0.5 * np.cbrt(abs(np.linalg.det(_matrix(part, time)[:3, :3])))
-        part.statics["radius"] = Static(radius.domain, (radius.values * scale).astype(radius.values.dtype))
-    _turn_normals(part, _matrix(part, time))
+            _keep(obj, header.getName(), kind(further, header.getName()), order)
+    if obj.kind != "mesh":
+        obj.halve_widths(_matrix(obj, time))
+    obj.turn_normals(_matrix(obj, time), obj.moves)
 
 
-def _keep(part: _Object, name: str, param: Any, order: np.ndarray) -> None:
+def _keep(obj: _Object, name: str, param: Any, order: np.ndarray) -> None:
     if not param.valid() or not param.isConstant() or not param.getNumSamples():
         return
     sample = param.getExpandedValue()
@@ -380,23 +360,11 @@ def _keep(part: _Object, name: str, param: Any, order: np.ndarray) -> None:
     extent = param.getArrayExtent()
     if extent > 1 and len(values) % extent == 0:
         values = values.reshape(len(values) // extent, -1)
-    if domain in (None, "constant") and len(values) == part.count:  # Blender's widths are said to be constant
+    if domain in (None, "constant") and len(values) == obj.count:  # Blender's widths are said to be constant
         domain = "vertex"
     if domain == "corner" and len(values) == len(order):
         values = values[order]
-    part.keep(name, domain, values)
-
-
-def _turn_normals(part: _Object, matrix: np.ndarray) -> None:
-    normals = part.statics.get("normals")
-    if normals is None or normals.values.shape[1:] != (3,):
-        return
-    if part.moves or not np.linalg.det(matrix[:3, :3]):
-        del part.statics["normals"]
-    elif not np.array_equal(matrix[:3, :3], np.eye(3)):
-        turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
-        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
-        part.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
+    obj.keep(name, domain, values)
 
 
 # ---- what exporters/alembic.py has written besides ----
@@ -415,7 +383,7 @@ def _is_own(schema: Any) -> bool:
     return _own_properties(schema) is not None
 
 
-def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]:
+def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
     """The metadata, JSON, and further arrays, that our writer has kept."""
     top = archive.getTop()
     if top.getNumChildren() != 1:
@@ -429,86 +397,39 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]
     names = [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
     kept = []
     for name in names:
-        if name != OWN and f"{name}.descriptor" in names:
-            descriptor = _descriptor(Abc.IStringProperty(properties, f"{name}.descriptor").getValue())
-            kept.append((descriptor, np.array(Abc.IUcharArrayProperty(properties, name).getValue(), np.uint8).tobytes()))
+        if name != OWN and name + DESCRIPTOR in names:
+            descriptor = _descriptor(Abc.IStringProperty(properties, name + DESCRIPTOR).getValue())
+            raw = np.array(Abc.IUcharArrayProperty(properties, name).getValue(), np.uint8).tobytes()
+            kept.append((descriptor, raw))
     return Abc.IStringProperty(properties, OWN).getValue(), kept
 
 
 def _descriptor(text: str) -> ArrayDescriptor:
+    """That of a JSON text; an empty one where it cannot be parsed."""
     try:
-        found = ArrayDescriptor(**json.loads(text))
-    except (ValueError, TypeError, RecursionError):
-        return ArrayDescriptor()
-    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
-
-
-def _add_kept(kept: list, attributes: dict[str, np.ndarray], domains: dict[str, str], vertices: int, skip: Any) -> None:
-    for descriptor, raw in kept:
-        name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
-        if values is None or name in skip or not name or domain == "vertex" and len(values) != vertices:
-            continue
-        attributes[name] = values
-        domains.pop(name, None)
-        if domain and domain != "vertex":
-            domains[name] = domain
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()) else {}
 
 
 # ---- positions ----
 
 
-class _Reader:
-    """Positions of all objects, frame by frame."""
-
-    def __init__(self, source: _Archive, parts: list[_Object], times: np.ndarray):
-        self._source, self._parts, self._times = source, parts, times
-        self._count = sum(part.count for part in parts)
-
-    def read(self, start: int, stop: int) -> np.ndarray:
-        """(stop - start, N, 3) float32. Raises ClipError."""
-        if self._source.archive is None:
-            raise ClipError("positions: the clip is closed")
-        out = np.empty((stop - start, self._count, 3), np.float32)
-        for row, frame in enumerate(range(start, stop)):
-            for part in self._parts:
-                try:
-                    out[row, part.first: part.first + part.count] = self._part(part, frame)
-                except BROKEN as error:
-                    if isinstance(error, ClipError):
-                        raise
-                    raise ClipError(f"positions: frame {frame} of {part.path} cannot be read: "
-                                    f"{' '.join(str(error).split())}") from None
-        return out
-
-    def _part(self, part: _Object, frame: int) -> np.ndarray:
-        if part.still is not None:
-            return part.still
-        points = _points(part, self._times[frame])
-        if len(points) != part.count:
-            raise ClipError(f"{part.path}: got {len(points)} points in frame {frame}, expected {part.count} as in the "
-                            "first frame")
-        matrix = _matrix(part, self._times[frame])
-        if not np.array_equal(matrix, np.eye(4)):
-            points = (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
-        if not next(part.tracks(), None):
-            part.still = points
-        return points
-
-
-def _points(part: _Object, time: float) -> np.ndarray:
-    found = [(np.array(part.points.getValue(part.track.sample(i)), np.float32), weight)
-             for i, weight in part.track.at(time)]
+def _points(obj: _Object, time: float) -> np.ndarray:
+    found = [(np.array(obj.points.getValue(obj.track.sample(i)), np.float32), weight)
+             for i, weight in obj.track.at(time)]
     counts = {len(points) for points, _ in found}
     if len(counts) != 1:
-        raise ClipError(f"{part.path}: got {max(counts)} points in a sample at {time:g} s, expected {part.count}")
+        raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")
     if len(found) == 1:
         return found[0][0].reshape(-1, 3)
     return sum(points.astype(np.float64) * weight for points, weight in found).astype(np.float32).reshape(-1, 3)
 
 
-def _matrix(part: _Object, time: float) -> np.ndarray:
+def _matrix(obj: _Object, time: float) -> np.ndarray:
     matrix = np.eye(4)
-    for xform in part.xforms:
+    for xform in obj.xforms:
         matrix = matrix @ xform.at(time)
     return matrix
 

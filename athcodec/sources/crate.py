@@ -1,5 +1,5 @@
-"""Looks at the frame of binary USD files (crates) before USD does: USD takes their counts as they are and asks for as
-much memory, which a damaged file can set to any number. It reads no values and decides nothing else.
+"""Checks the counts in binary USD files (crates) before USD reads them: USD allocates as much memory as they say, and
+in a damaged file they can say anything. It reads no values and decides nothing else.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _members(file: BinaryIO) -> list[tuple[int, int]]:
     """(start, size) of what a .usdz holds, which is stored without compression."""
     try:
         with zipfile.ZipFile(file) as archive:
-            entries = [(each.header_offset, each.file_size) for each in archive.infolist()]
+            entries = [(member.header_offset, member.file_size) for member in archive.infolist()]
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:
         raise ClipError(f"stage: got no .usdz: {error}") from None
     end, members = file.seek(0, 2), []
@@ -67,7 +67,7 @@ def _check(file: BinaryIO, start: int, size: int) -> None:
 
 
 def _numbers(file: BinaryIO, start: int, size: int, place: int, length: int) -> list[int]:
-    count = min(3, length // 8)  # what is empty is its count alone
+    count = min(3, length // 8)  # an empty section is its count alone
     numbers = struct.unpack(f"<{count}Q", _read(file, start, size, place, 8 * count))
     return [*numbers, 0, 0][:3]
 

@@ -15,31 +15,39 @@ import numpy as np
 
 from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Topology
-from athcodec.sources.frames import Frames
 from athcodec.sources.mesh import kind_of
 
 DISPLACEMENTS = ("displacement", "displacements", "disp", "u", "displ")
 
 
 class Steps(Protocol):
-    """What a format gives: times (T,); topology of the first step; and by step, read when it is asked for: points
-    (N, 2 or 3), the names of fields per point, and a field. check(step) raises ClipError where its cells are others
-    than in the first; fixed_points(): whether all steps have the points of the first by what the file says."""
+    """The steps of a result, as a format gives them, read when they are asked for. `topology` is that of the first."""
 
     topology: Topology
 
-    def points(self, step: int) -> np.ndarray: ...
-    def fields(self) -> Sequence[str]: ...
-    def field(self, step: int, name: str) -> np.ndarray: ...
-    def fixed_points(self) -> bool: ...
-    def check(self, step: int) -> None: ...
+    def points(self, step: int) -> np.ndarray:
+        """(N, 2) or (N, 3) points of the mesh."""
+
+    def fields(self) -> Sequence[str]:
+        """The names of the fields per point."""
+
+    def field(self, step: int, name: str) -> np.ndarray:
+        """(N, ...) values of a field."""
+
+    def fixed_points(self) -> bool:
+        """Whether all steps have the points of the first, as far as the file says."""
+
+    def check(self, step: int) -> None:
+        """Raises ClipError where the cells are others than in the first step."""
 
 
-def clip_of_steps(steps: Any, time: np.ndarray, metadata: dict[str, Any], name: str, options: ReadOptions,
+def clip_of_steps(steps: Steps, time: np.ndarray, metadata: dict[str, Any], name: str, options: ReadOptions,
                   static: dict[str, np.ndarray], resource: Any = None, unchanged: Any = None) -> MotionClip:
-    """static: data per point that do not change. Raises ClipError where nothing moves, or not in one way."""
+    """The clip of a result at (T,) times. static: data per point that do not change. Raises ClipError where nothing
+    moves, or it is not clear what does."""
     first = _padded(steps.points(0))
     moved_by = _displacement(steps, len(time), options)
     topology, count = steps.topology, len(first)

@@ -14,27 +14,30 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from athcodec.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.joining import join
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
-from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, integer
+from athcodec.sources.gltf_file import GltfFile
+from athcodec.sources.gltf_json import brief, entries, entry, integer
 from athcodec.sources.gltf_scene import Scene, key_rate, on_grid
+from athcodec.sources.opening import closing_on_failure, naming
 
 WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
 MOST_FRAMES = 1 << 20
-KINDS = ("points", "curves", "mesh")  # the last that a part has is what it is
+KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
 ANIMATION = "animation:"
+_BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
 
 
@@ -46,33 +49,18 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     clip's ranges. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
     needs a package, OSError where a file cannot be opened.
     """
-    try:
+    with naming(path):
         file = GltfFile(path)
-    except ClipError as error:
-        raise _named(path, error) from error
-    try:
-        with np.errstate(all="ignore"):
-            return _read(file, options)
-    except ClipError as error:
-        file.close()
-        raise _named(path, error) from error
-    except (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError) as error:
-        file.close()
-        raise ClipError(f"{fspath(path)}: got glTF that cannot be read: {str(error)[:100]}") from error
-    except BaseException:
-        file.close()
-        raise
-
-
-def _named(path: str | PathLike[str], error: ClipError) -> ClipError:
-    return ClipError(f"{fspath(path)}: {error}")
+    with naming(path, *_BROKEN), closing_on_failure(file), np.errstate(all="ignore"):
+        return _read(file, options)
 
 
 @dataclass(eq=False)
-class Part:
-    """Vertices that a node shows: `first` to `first + count` - 1 of the clip."""
+class GltfNode:
+    """A node that shows vertices: `first` to `first + count` - 1 of the clip. Where its mesh has several sets of
+    vertices, there is one of these for each."""
 
-    node: int
+    index: int
     name: str
     mesh: int
     skin: int | None
@@ -89,20 +77,23 @@ class Part:
     influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
     strongest: np.ndarray | None = None
 
+    @property
+    def vertices(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
 
 def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
     scenes = _scenes(file, options)
     scene = next(iter(scenes.values()))
-    parts = _chosen(scene, [each for each in options.only if not each.startswith(ANIMATION)])
-    for part in parts:
-        _load(part, scene)
-    motions = {name: _Motion(each, parts) for name, each in scenes.items()}
+    nodes = _chosen(scene, [name for name in options.only if not name.startswith(ANIMATION)])
+    for node in nodes:
+        _load(node, scene)
+    motions = {name: _Motion(take, nodes) for name, take in scenes.items()}
     motion = next(iter(motions.values()))
-    timings = {name: _sampling(each, options.fps) for name, each in motions.items()}
+    timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
     still = all(len(timing.times) == 1 for timing in timings.values())
-    attributes, branches = _attributes(file, parts, options.skip, motion, keep_normals=still)
-    faces, edges = _connections(file, parts)
-    before = file.stamp()
+    attributes, branches = _attributes(file, nodes, options.skip, motion, keep_normals=still)
+    faces, edges = _connections(file, nodes)
     rest = motion.read(None)[0] if options.rest == "auto" else None
     clips = {}
     for name, timing in timings.items():
@@ -111,13 +102,13 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             time=np.arange(len(timing.times)) / timing.fps,
             rest=rest if rest is not None and np.isfinite(rest).all() else None,
             rest_pose="mean" if options.rest == "mean" else "first",
-            edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, parts),
+            edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, nodes),
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
-            metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(parts)
+            metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(nodes)
             | ({} if options.takes else _played(scene)),
-            unchanged=lambda: file.stamp() == before, **branches,
+            unchanged=file.unchanged, **branches,
         )
-        rest = clips[name].rest.astype(clips[name].rest_dtype)  # of several, the same for all
+        rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]
 
 
@@ -130,7 +121,7 @@ def _positions(motion: _Motion, times: np.ndarray) -> Frames:
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
     """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
-    patterns = [each[len(ANIMATION):] for each in options.only if each.startswith(ANIMATION)]
+    patterns = [name[len(ANIMATION):] for name in options.only if name.startswith(ANIMATION)]
     if not options.takes:
         chosen = list(_animations(file, patterns, f"only: got {ANIMATION}").values()) if patterns else None
         return {"": Scene(file, chosen)}
@@ -141,29 +132,29 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
     return {name: Scene(file, [index]) for name, index in chosen.items()}
 
 
-def _chosen(scene: Scene, patterns: Sequence[str]) -> list[Part]:
-    """The parts whose nodes or meshes have such names, in the order of the nodes."""
+def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
+    """Those that show a mesh, where they or it have such a name, in the order of the scene."""
     file = scene.file
-    parts, seen = [], []
-    for node in scene.order:
-        index = scene.nodes[node].get("mesh")
-        if index is not None:
-            mesh = file.item("meshes", index)
-            called = [scene.name(node), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
+    nodes, seen = [], []
+    for index in scene.order:
+        mesh_index = scene.nodes[index].get("mesh")
+        if mesh_index is not None:
+            mesh = file.item("meshes", mesh_index)
+            called = [scene.name(index), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
             seen.extend(called)
-            if not patterns or any(fnmatch.fnmatchcase(name, each) for name in called for each in patterns):
-                parts.extend(_parts(scene, node, mesh, next(filter(None, called), f"mesh {index}")))
-    if not parts:
+            if not patterns or any(fnmatch.fnmatchcase(name, pattern) for name in called for pattern in patterns):
+                nodes.extend(_nodes(scene, index, mesh, next(filter(None, called), f"mesh {mesh_index}")))
+    if not nodes:
         names = brief(sorted({name for name in seen if name}))
         raise ClipError(f"only: got {', '.join(patterns)}, expected names such as {names}" if patterns and seen else
                         "meshes: got none in the scene, expected at least one")
     first = 0
-    for part in parts:
-        part.first = first
-        first += part.count
+    for node in nodes:
+        node.first = first
+        first += node.count
     if first > MOST_VERTICES:
         raise ClipError(f"meshes: got {first} vertices, expected at most {MOST_VERTICES}")
-    return parts
+    return nodes
 
 
 def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
@@ -189,31 +180,33 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
     return numbers
 
 
-def _parts(scene: Scene, node: int, mesh: dict, name: str) -> list[Part]:
+def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     """One per set of vertices: primitives that use the same accessors share theirs."""
-    if "EXT_mesh_gpu_instancing" in (scene.nodes[node].get("extensions") or {}):
-        raise ClipError(f"node {node}: got EXT_mesh_gpu_instancing, expected a node per instance")
-    parts: dict[Any, Part] = {}
+    if "EXT_mesh_gpu_instancing" in (scene.nodes[index].get("extensions") or {}):
+        raise ClipError(f"node {index}: got EXT_mesh_gpu_instancing, expected a node per instance")
+    nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
         attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
-        targets = [integer(each, "POSITION") if "POSITION" in each else None for each in entries(primitive, "targets")]
+        targets = [integer(target, "POSITION") if "POSITION" in target else None
+                   for target in entries(primitive, "targets")]
         if "POSITION" not in attributes:
             raise ClipError(f"mesh {name!r}: got a primitive without POSITION, expected one with it")
         _refuse_draco(scene.file, primitive, attributes["POSITION"])
         key = (tuple(sorted(attributes.items())), tuple(targets))
-        if key not in parts:
-            weights = scene.nodes[node].get("weights", mesh.get("weights")) or [0.0] * len(targets)
+        if key not in nodes:
+            weights = scene.nodes[index].get("weights", mesh.get("weights")) or [0.0] * len(targets)
             if not isinstance(weights, list) or len(weights) != len(targets):
                 raise ClipError(f"mesh {name!r}: got weights {brief(weights)}, expected {len(targets)}")
-            parts[key] = Part(node, name, scene.nodes[node]["mesh"], scene.nodes[node].get("skin"), attributes, targets,
-                              np.array(weights, np.float64), count=scene.file.count(attributes["POSITION"]))
-        part = parts[key]
+            nodes[key] = GltfNode(
+                index, name, scene.nodes[index]["mesh"], scene.nodes[index].get("skin"), attributes, targets,
+                np.array(weights, np.float64), count=scene.file.count(attributes["POSITION"]))
+        node = nodes[key]
         kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
-        part.kind = max(part.kind, kind, key=KINDS.index)
-        part.primitives.append(primitive)
-    found = list(parts.values())
-    for number, part in enumerate(found[1:], 1):
-        part.name = f"{name}.{number}"
+        node.kind = max(node.kind, kind, key=KINDS.index)
+        node.primitives.append(primitive)
+    found = list(nodes.values())
+    for number, node in enumerate(found[1:], 1):
+        node.name = f"{name}.{number}"
     return found
 
 
@@ -224,21 +217,21 @@ def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
                         "example with gltf-transform copy")
 
 
-def _load(part: Part, scene: Scene) -> None:
+def _load(node: GltfNode, scene: Scene) -> None:
     file = scene.file
-    part.base = _triples(file, part.attributes["POSITION"], part.count, "POSITION")
-    for target in part.targets:
-        if target is not None and file.count(target) != part.count:
-            raise ClipError(f"mesh {part.name!r}: got a morph target of {file.count(target)} vertices, expected "
-                            f"{part.count}")
-    if part.skin is None:
+    node.base = _triples(file, node.attributes["POSITION"], node.count, "POSITION")
+    for target in node.targets:
+        if target is not None and file.count(target) != node.count:
+            raise ClipError(f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected "
+                            f"{node.count}")
+    if node.skin is None:
         return
-    skin = file.item("skins", part.skin)
-    part.joints = [integer({"joint": each}, "joint") for each in skin.get("joints") or ()]
-    part.bind = _bind_matrices(file, skin, len(part.joints))
-    if "JOINTS_0" not in part.attributes or not part.joints:
-        raise ClipError(f"mesh {part.name!r}: got a skin without joints, expected JOINTS_0 and WEIGHTS_0")
-    _load_influences(part, file)
+    skin = file.item("skins", node.skin)
+    node.joints = [integer({"joint": joint}, "joint") for joint in skin.get("joints") or ()]
+    node.bind = _bind_matrices(file, skin, len(node.joints))
+    if "JOINTS_0" not in node.attributes or not node.joints:
+        raise ClipError(f"mesh {node.name!r}: got a skin without joints, expected JOINTS_0 and WEIGHTS_0")
+    _load_influences(node, file)
 
 
 def _triples(file: GltfFile, index: int, count: int, what: str) -> np.ndarray:
@@ -257,16 +250,16 @@ def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
     return values[:joint_count].reshape(-1, 4, 4).swapaxes(1, 2)
 
 
-def _load_influences(part: Part, file: GltfFile) -> None:
+def _load_influences(node: GltfNode, file: GltfFile) -> None:
     """Per joint its vertices and their weights, which add up to 1; where a file has none, the first joint counts."""
     vertex, joint, weight = [], [], []
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
-        if names[0] not in part.attributes or names[1] not in part.attributes:
+        if names[0] not in node.attributes or names[1] not in node.attributes:
             break
-        joints, weights = file.array(part.attributes[names[0]]), file.floats(part.attributes[names[1]])
-        if joints.shape != (part.count, 4) or joints.shape != weights.shape or joints.dtype.kind not in "iu":
-            raise ClipError(f"mesh {part.name!r}: got {names[0]} of shape {joints.shape}, expected ({part.count}, 4)")
+        joints, weights = file.array(node.attributes[names[0]]), file.floats(node.attributes[names[1]])
+        if joints.shape != (node.count, 4) or joints.shape != weights.shape or joints.dtype.kind not in "iu":
+            raise ClipError(f"mesh {node.name!r}: got {names[0]} of shape {joints.shape}, expected ({node.count}, 4)")
         rows, columns = np.nonzero(weights)
         vertex.append(rows)
         joint.append(joints[rows, columns].astype(np.int64))
@@ -274,86 +267,85 @@ def _load_influences(part: Part, file: GltfFile) -> None:
         if slot == 0:
             first = joints[:, 0].astype(np.int64)
     if not vertex:
-        raise ClipError(f"mesh {part.name!r}: got JOINTS_0 without WEIGHTS_0, expected both")
-    total = np.bincount(np.concatenate(vertex), np.concatenate(weight), part.count)
+        raise ClipError(f"mesh {node.name!r}: got JOINTS_0 without WEIGHTS_0, expected both")
+    total = np.bincount(np.concatenate(vertex), np.concatenate(weight), node.count)
     bare = np.flatnonzero(~(np.abs(total) > 1e-12))
     vertex, joint = np.concatenate([*vertex, bare]), np.concatenate([*joint, first[bare]])
     weight = np.concatenate([*weight, np.ones(len(bare))])
     total[bare] = 1.0
-    if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(part.joints):
-        raise ClipError(f"mesh {part.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
-                        f"joints below {len(part.joints)}")
-    pair, index = np.unique(joint * part.count + vertex, return_inverse=True)
+    if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(node.joints):
+        raise ClipError(f"mesh {node.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
+                        f"joints below {len(node.joints)}")
+    pair, index = np.unique(joint * node.count + vertex, return_inverse=True)
     weight = np.bincount(index, weight / total[vertex], len(pair))
-    joint, vertex = np.divmod(pair, part.count)
+    joint, vertex = np.divmod(pair, node.count)
     starts = np.flatnonzero(np.diff(joint, prepend=-1))
     stops = np.append(starts[1:], len(pair))
-    part.influences = [(int(joint[a]), vertex[a:b], weight[a:b]) for a, b in zip(starts, stops)]
+    node.influences = [(int(joint[a]), vertex[a:b], weight[a:b]) for a, b in zip(starts, stops)]
     order = np.lexsort((weight, vertex))
-    part.strongest = np.empty(part.count, np.int64)
-    part.strongest[vertex[order]] = joint[order]
+    node.strongest = np.empty(node.count, np.int64)
+    node.strongest[vertex[order]] = joint[order]
 
 
 # ---- how it moves ----
 
 
 class _Motion:
-    """Positions of all parts at any times."""
+    """Positions of all nodes at any times."""
 
-    def __init__(self, scene: Scene, parts: list[Part]):
-        self.scene, self._parts = scene, parts
-        self.count = parts[-1].first + parts[-1].count
-        moving = {joint for part in parts for joint in part.joints} | {p.node for p in parts if p.skin is None}
-        self.nodes = scene.ancestors(moving)
+    def __init__(self, scene: Scene, nodes: list[GltfNode]):
+        self.scene, self._nodes = scene, nodes
+        self.count = nodes[-1].first + nodes[-1].count
+        self.ancestors = scene.ancestors(_movers(nodes))
 
     def read(self, times: np.ndarray | None) -> np.ndarray:
         """(k, N, 3) float32; None: the pose without animation, k = 1."""
         out = np.empty((1 if times is None else len(times), self.count, 3), np.float32)
-        largest = max(part.count for part in self._parts)
-        step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.nodes)))
+        largest = max(node.count for node in self._nodes)
+        step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
         with np.errstate(all="ignore"):
             for start in range(0, len(out), step):
                 now = None if times is None else times[start : start + step]
-                matrices = self.scene.matrices(self.nodes, now)
-                for part in self._parts:
-                    rows = slice(part.first, part.first + part.count)
-                    out[start : start + step, rows] = self._positions(part, matrices, now)
+                matrices = self.scene.matrices(self.ancestors, now)
+                for node in self._nodes:
+                    rows = node.vertices
+                    out[start : start + step, rows] = self._positions(node, matrices, now)
         return out
 
-    def _positions(self, part: Part, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
-        local = self._morphed(part, times)
-        if part.skin is None:
-            matrix = matrices[part.node]
+    def _positions(self, node: GltfNode, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
+        local = self._morphed(node, times)
+        if node.skin is None:
+            matrix = matrices[node.index]
             return local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
-        return self._skinned(part, matrices, local)
+        return self._skinned(node, matrices, local)
 
-    def _morphed(self, part: Part, times: np.ndarray | None) -> np.ndarray:
+    def _morphed(self, node: GltfNode, times: np.ndarray | None) -> np.ndarray:
         """(k or 1, n, 3): only targets that count in a frame are read."""
-        if not part.targets:
-            return part.base[None].astype(np.float64)
-        weights = self.scene.weights(part.node, times, part.weights)
-        local = np.repeat(part.base[None].astype(np.float64), len(weights), axis=0)
+        if not node.targets:
+            return node.base[None].astype(np.float64)
+        weights = self.scene.weights(node.index, times, node.weights)
+        local = np.repeat(node.base[None].astype(np.float64), len(weights), axis=0)
         for column in np.flatnonzero((weights != 0).any(axis=0)):
-            if part.targets[column] is not None:
+            if node.targets[column] is not None:
                 rows = np.flatnonzero(weights[:, column])
-                moved = _triples(self.scene.file, part.targets[column], part.count, "morph target")
+                moved = _triples(self.scene.file, node.targets[column], node.count, "morph target")
                 local[rows] += weights[rows, column, None, None] * moved
         return local
 
-    def _skinned(self, part: Part, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
-        frames = max(len(local), *(len(matrices[joint]) for joint in part.joints))
-        out = np.zeros((frames, 3, part.count))
-        for joint, vertices, weights in part.influences:
-            matrix = (matrices[part.joints[joint]] @ part.bind[joint])[:, :3]
+    def _skinned(self, node: GltfNode, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
+        frames = max(len(local), *(len(matrices[joint]) for joint in node.joints))
+        out = np.zeros((frames, 3, node.count))
+        for joint, vertices, weights in node.influences:
+            matrix = (matrices[node.joints[joint]] @ node.bind[joint])[:, :3]
             points = np.ones((len(local), 4, len(vertices)))
             points[:, :3] = local[:, vertices].swapaxes(1, 2)
             points *= weights
             out[:, :, vertices] += _product(matrix, points)
         return out.swapaxes(1, 2)
 
-    def normal_matrix(self, part: Part) -> np.ndarray:
-        """(3, 3) that turns normals of an unskinned part into the world."""
-        matrix = self.scene.matrices(self.nodes, None)[part.node][0, :3, :3]
+    def normal_matrix(self, node: GltfNode) -> np.ndarray:
+        """(3, 3) that turns normals of an unskinned node into the world."""
+        matrix = self.scene.matrices(self.ancestors, None)[node.index][0, :3, :3]
         return np.linalg.pinv(matrix).T if np.isfinite(matrix).all() else np.eye(3)
 
 
@@ -432,8 +424,8 @@ def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
 # ---- what does not move ----
 
 
-def _names(parts: list[Part]) -> dict[str, Any]:
-    return {"part_names": [part.name for part in parts], "part_kinds": [part.kind for part in parts]}
+def _names(nodes: list[GltfNode]) -> dict[str, Any]:
+    return {"part_names": [node.name for node in nodes], "part_kinds": [node.kind for node in nodes]}
 
 
 def _played(scene: Scene) -> dict[str, Any]:
@@ -442,25 +434,25 @@ def _played(scene: Scene) -> dict[str, Any]:
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
 
 
-def _connections(file: GltfFile, parts: list[Part]) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _connections(file: GltfFile, nodes: list[GltfNode]) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Faces (F, 3) and edges (E, 2), int32."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
-    for part in parts:
-        for primitive in part.primitives:
+    for node in nodes:
+        for primitive in node.primitives:
             mode = integer(primitive, "mode", 4)
             if mode == 0:
                 continue
-            rows = _rows(_corners(file, primitive, part), mode)
-            found[rows.shape[1]].append((rows + part.first).astype(np.int32))
+            rows = _rows(_corners(file, primitive, node), mode)
+            found[rows.shape[1]].append((rows + node.first).astype(np.int32))
     return tuple(np.concatenate(found[size]) if found[size] else None for size in (3, 2))
 
 
-def _corners(file: GltfFile, primitive: dict, part: Part) -> np.ndarray:
+def _corners(file: GltfFile, primitive: dict, node: GltfNode) -> np.ndarray:
     if primitive.get("indices") is None:
-        return np.arange(part.count)
+        return np.arange(node.count)
     values = file.array(primitive["indices"])
-    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= part.count:
-        raise ClipError(f"mesh {part.name!r}: got indices up to {values.max()}, expected those of {part.count} "
+    if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= node.count:
+        raise ClipError(f"mesh {node.name!r}: got indices up to {values.max()}, expected those of {node.count} "
                         "vertices")
     return values[:, 0].astype(np.int64)
 
@@ -486,36 +478,36 @@ def _rows(corners: np.ndarray, mode: int) -> np.ndarray:
     return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]
 
 
-def _attributes(file: GltfFile, parts: list[Part], skip: Collection[str], motion: _Motion,
+def _attributes(file: GltfFile, nodes: list[GltfNode], skip: Collection[str], motion: _Motion,
                 keep_normals: bool) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Static arrays over all vertices; parts that lack one have 0, no number, or white. And branches, where the file
+    """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
-    keep_normals = keep_normals and not any(part.skin is not None or part.weights.any() for part in parts)
-    keys = dict.fromkeys(key for part in parts for key in part.attributes
+    keep_normals = keep_normals and not any(node.skin is not None or node.weights.any() for node in nodes)
+    keys = dict.fromkeys(key for node in nodes for key in node.attributes
                          if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL")
     found: dict[str, np.ndarray] = {}
     for key in keys:
         name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:])
         if name and name not in skip and name not in found:
-            found[name] = _attribute(file, parts, key, name, motion)
+            found[name] = _attribute(file, nodes, key, name, motion)
     branches = _branches(file, found)
     for name in RESERVED_NAMES & found.keys():
         found[f"{name}_"] = found.pop(name)
-    found["part_vertex_counts"] = np.array([part.count for part in parts], np.int32)
+    found["part_vertex_counts"] = np.array([node.count for node in nodes], np.int32)
     return found, branches
 
 
-def _attribute(file: GltfFile, parts: list[Part], key: str, name: str, motion: _Motion) -> np.ndarray:
+def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: _Motion) -> np.ndarray:
     pieces = {}
-    for number, part in enumerate(parts):
-        if key in part.attributes:
-            index = part.attributes[key]
+    for number, node in enumerate(nodes):
+        if key in node.attributes:
+            index = node.attributes[key]
             plain = key.startswith("_") and not file.item("accessors", index).get("normalized")
             values = file.array(index) if plain else file.floats(index).astype(np.float32)
-            if len(values) != part.count:
-                raise ClipError(f"mesh {part.name!r}: got {len(values)} entries of {key}, expected {part.count}")
+            if len(values) != node.count:
+                raise ClipError(f"mesh {node.name!r}: got {len(values)} entries of {key}, expected {node.count}")
             if key == "NORMAL" and values.shape[1] == 3:
-                turned = values @ motion.normal_matrix(part).T
+                turned = values @ motion.normal_matrix(node).T
                 length = np.linalg.norm(turned, axis=1, keepdims=True)
                 values = (turned / np.where(length > 0, length, 1)).astype(np.float32)
             pieces[number] = values
@@ -523,7 +515,7 @@ def _attribute(file: GltfFile, parts: list[Part], key: str, name: str, motion: _
     filler = FILLERS.get(name, np.nan if dtype.kind == "f" and key.startswith("_") else 0)
     out = np.full((motion.count, width), filler, dtype)
     for number, values in pieces.items():
-        out[parts[number].first : parts[number].first + len(values), : values.shape[1]] = values
+        out[nodes[number].first : nodes[number].first + len(values), : values.shape[1]] = values
     return out[:, 0] if width == 1 else out
 
 
@@ -531,34 +523,39 @@ def _branches(file: GltfFile, found: dict[str, np.ndarray]) -> dict[str, np.ndar
     """vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
     extras = file.json["asset"].get("extras")
     ours = extras.get("athcodec") if isinstance(extras, dict) else None
-    parent = ours.get("branch_parent") if isinstance(ours, dict) else None
-    if not isinstance(parent, list) or "vertex_branch" not in found or not all(type(each) is int for each in parent):
+    parent = ours.get("branch_parent") if isinstance(ours, dict) and "vertex_branch" in found else None
+    if not isinstance(parent, list) or any(type(number) is not int for number in parent):
         return {}
     names = [name for name in ("vertex_branch", "stem_index") if name in found]
     found_branches = {name: found.pop(name).astype(np.int64) for name in names}
     return found_branches | {"branch_parent": np.array(parent, np.int64)}
 
 
-def _skin(scene: Scene, parts: list[Part]) -> Skin | None:
+def _movers(nodes: list[GltfNode]) -> set[int]:
+    """Numbers of the joints that move vertices, and of the nodes without a skin."""
+    return {joint for node in nodes for joint in node.joints} | {node.index for node in nodes if node.skin is None}
+
+
+def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
     """The joints, or nodes, that vertices hang on; None where one node moves them all."""
-    movers = {joint for part in parts for joint in part.joints} | {p.node for p in parts if p.skin is None}
-    order = [node for node in scene.order if node in movers]
+    movers = _movers(nodes)
+    order = [joint for joint in scene.order if joint in movers]
     if len(order) < 2:
         return None
-    place = {node: number for number, node in enumerate(order)}
-    vertex_joint = np.full(parts[-1].first + parts[-1].count, -1, np.int32)
-    for part in parts:
-        rows = slice(part.first, part.first + part.count)
-        if part.skin is None:
-            vertex_joint[rows] = place[part.node]
+    place = {joint: number for number, joint in enumerate(order)}
+    vertex_joint = np.full(nodes[-1].first + nodes[-1].count, -1, np.int32)
+    for node in nodes:
+        rows = node.vertices
+        if node.skin is None:
+            vertex_joint[rows] = place[node.index]
         else:
-            vertex_joint[rows] = np.array([place[joint] for joint in part.joints])[part.strongest]
-    return Skin(np.array([_above(scene, node, place) for node in order], np.int32), vertex_joint,
-                tuple(scene.name(node) for node in order))
+            vertex_joint[rows] = np.array([place[joint] for joint in node.joints])[node.strongest]
+    return Skin(np.array([_above(scene, joint, place) for joint in order], np.int32), vertex_joint,
+                tuple(scene.name(joint) for joint in order))
 
 
-def _above(scene: Scene, node: int, place: dict[int, int]) -> int:
-    node = int(scene.parent[node])
-    while node >= 0 and node not in place:
-        node = int(scene.parent[node])
-    return place.get(node, -1)
+def _above(scene: Scene, joint: int, place: dict[int, int]) -> int:
+    joint = int(scene.parent[joint])
+    while joint >= 0 and joint not in place:
+        joint = int(scene.parent[joint])
+    return place.get(joint, -1)

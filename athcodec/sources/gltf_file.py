@@ -20,12 +20,15 @@ from urllib.parse import unquote
 import numpy as np
 
 from athcodec.errors import ClipError
+from athcodec.sources.gltf_json import brief, entries, entry, integer, looked_up
+from athcodec.sources.gltf_meshopt import unpack
+from athcodec.sources.opening import FileWatch, closing_on_failure
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KEPT_VIEWS = 8  # that have been decompressed
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-# What a reader of positions may ignore, or knows.
+# Extensions that a reader of positions may ignore, or that are read here.
 HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_", "EXT_lights_", "MSFT_texture_",
             "ADOBE_materials_", "KHR_mesh_quantization", "KHR_animation_pointer", *MESHOPT)
 
@@ -42,30 +45,24 @@ class GltfFile:
         self._files: list[BinaryIO] = []
         self._buffers: dict[int, _Bytes] = {}
         self._unpacked_views: dict[int, bytes] = {}
-        try:
+        self.unchanged = FileWatch()
+        with closing_on_failure(self):
             file = self._open(self.path)
             self.size = os.fstat(file.fileno()).st_size
             self._binary: _Bytes | None = None
             self.json = _parsed(self._read_json(file))
             self._check_version()
-        except BaseException:
-            self.close()
-            raise
 
     def _open(self, path: str) -> BinaryIO:
         if not os.path.isfile(path) and os.path.exists(path):
             raise ClipError(f"{path}: got a folder or a device, expected a file")
         self._files.append(open(path, "rb"))
+        self.unchanged.add(self._files[-1].fileno())
         return self._files[-1]
 
     def close(self) -> None:
         for file in self._files:
             file.close()
-
-    def stamp(self) -> list[tuple[int, int]]:
-        """Sizes and times of the files, which tell whether they have been written to."""
-        states = [os.fstat(file.fileno()) for file in self._files]
-        return [(state.st_size, state.st_mtime_ns) for state in states]
 
     # ---- structure ----
 
@@ -129,8 +126,8 @@ class GltfFile:
     def array(self, index: Any) -> np.ndarray:
         """Accessor `index` as (count, width) in its component type. Raises ClipError."""
         accessor, where = self.item("accessors", index), f"accessor {index}"
-        dtype = _looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
-        width = _looked_up(WIDTHS, accessor.get("type"), f"{where}: type")
+        dtype = looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
+        width = looked_up(WIDTHS, accessor.get("type"), f"{where}: type")
         count = integer(accessor, "count", low=1)
         if accessor.get("bufferView") is None:
             if count * width > max(self.size, 1 << 16):
@@ -167,7 +164,7 @@ class GltfFile:
     def _sparse(self, sparse: Mapping, values: np.ndarray, where: str) -> np.ndarray:
         count = integer(sparse, "count", low=1, stop=len(values) + 1)
         indices, changed = entry(sparse, "indices"), entry(sparse, "values")
-        dtype = np.dtype(_looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
+        dtype = np.dtype(looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
         rows = self._strided(indices, dtype, 1, count, f"{where}: sparse indices")[:, 0]
         if dtype.kind != "u" or int(rows.max()) >= len(values):
             raise ClipError(f"{where}: got sparse indices up to {rows.max()}, expected those of {len(values)} elements")
@@ -184,8 +181,6 @@ class GltfFile:
 
     def _unpacked(self, index: int, name: str) -> bytes:
         if index not in self._unpacked_views:
-            from athcodec.sources.gltf_meshopt import unpack  # most files do without
-
             packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
             raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
             if len(self._unpacked_views) >= KEPT_VIEWS:
@@ -222,8 +217,8 @@ class GltfFile:
         return found
 
     def _beside(self, uri: str) -> str:
-        """The file that a relative URI names. One that leads elsewhere is refused: a file from a stranger must not
-        read what else is on the disk."""
+        """The file that a relative URI names. One that leads elsewhere is refused: a file that is not trusted must
+        not read others on the disk."""
         name = unquote(uri)
         parts = name.replace("\\", "/").split("/")
         if ":" in parts[0] or name.startswith(("/", "\\")) or ".." in parts or "\0" in name:
@@ -253,63 +248,6 @@ class _FilePart(_Bytes):
         if len(data) < size:
             raise ClipError(f"buffer: got {len(data)} bytes at {offset}, expected {size}: the file is cut off")
         return data
-
-
-def entry(holder: Mapping, key: str) -> dict:
-    """The object `key` of another. Raises ClipError."""
-    value = holder.get(key)
-    if not isinstance(value, dict):
-        raise ClipError(f"{key}: got {brief(value)}, expected an object")
-    return value
-
-
-def entries(holder: Mapping, key: str) -> list[dict]:
-    """The array of objects `key`, empty where there is none. Raises ClipError."""
-    value = holder.get(key)
-    if value is None:
-        return []
-    if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
-        raise ClipError(f"{key}: got {brief(value)}, expected an array of objects")
-    return value
-
-
-def integer(holder: Mapping, key: str, default: int | None = None, low: int = 0, stop: int = 1 << 53) -> int:
-    """The whole number `key`, from `low` to `stop` - 1. Raises ClipError."""
-    value = holder.get(key, default)
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < stop:
-        raise ClipError(f"{key}: got {brief(value)}, expected a whole number from {low} to {stop - 1}")
-    return value
-
-
-def indices(holder: Mapping, key: str) -> list[int]:
-    """The array of whole numbers `key`, empty where there is none. Raises ClipError."""
-    value = holder.get(key)
-    if value is None:
-        return []
-    if not isinstance(value, list) or not all(type(each) is int and each >= 0 for each in value):
-        raise ClipError(f"{key}: got {brief(value)}, expected an array of indices")
-    return value
-
-
-def vector(holder: Mapping, key: str, default: list[float]) -> np.ndarray:
-    """The array of as many finite numbers as `default` has, float64. Raises ClipError."""
-    value = holder.get(key, default)
-    if not isinstance(value, list) or len(value) != len(default) or any(type(n) not in (int, float) for n in value):
-        raise ClipError(f"{key}: got {brief(value)}, expected {len(default)} numbers")
-    return np.array([float(number) for number in value])
-
-
-def brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _looked_up(table: Mapping, key: Any, what: str) -> Any:
-    if not isinstance(key, (int, str)) or key not in table:
-        raise ClipError(f"{what}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
-    return table[key]
 
 
 def _parsed(text: bytes) -> dict:

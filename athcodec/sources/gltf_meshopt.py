@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from athcodec.errors import ClipError, MissingExtra
-from athcodec.sources.gltf_file import integer
+from athcodec.sources.gltf_json import integer
 
 STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257, 4), "NONE": range(1, 257)}
-MOST_PER_BYTE = 2048  # no stream of the codec says more: what claims to is refused before memory is taken
+MOST_PER_BYTE = 2048  # bytes that the codec makes of one at most: more is refused before memory is allocated
 
 
 def unpack(raw: bytes, packed: Mapping) -> bytes:

@@ -12,7 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.sources.gltf_file import GltfFile, brief, entries, entry, indices, integer, vector
+from athcodec.sources.gltf_file import GltfFile
+from athcodec.sources.gltf_json import brief, entries, entry, indices, integer, vector
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
@@ -37,14 +38,14 @@ class Track:
         if self.interpolation == "STEP":
             return self.values[left].astype(np.float64)
         step = self.times[right] - self.times[left]
-        part = np.divide(times - self.times[left], step, out=np.zeros(len(times)), where=step > 0)
+        fraction = np.divide(times - self.times[left], step, out=np.zeros(len(times)), where=step > 0)
         is_spline = self.interpolation == "CUBICSPLINE"
         shape = (-1,) + (1,) * (self.values.ndim - 1 - is_spline)
-        part = np.clip(part, 0, 1).reshape(shape)
+        fraction = np.clip(fraction, 0, 1).reshape(shape)
         if is_spline:
-            return self._spline(left, right, step.reshape(shape), part)
+            return self._spline(left, right, step.reshape(shape), fraction)
         a, b = self.values[left].astype(np.float64), self.values[right].astype(np.float64)
-        return slerp(a, b, part) if self.is_rotation else a + (b - a) * part
+        return slerp(a, b, fraction) if self.is_rotation else a + (b - a) * fraction
 
     def _spline(self, left: np.ndarray, right: np.ndarray, step: np.ndarray, t: np.ndarray) -> np.ndarray:
         a, b = self.values[left, 1].astype(np.float64), self.values[right, 1].astype(np.float64)
@@ -54,20 +55,21 @@ class Track:
         return normalized(value) if self.is_rotation else value
 
 
-def slerp(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """From quaternions a to b (..., 4), the shorter way, by `part`."""
+def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """From quaternions a to b (..., 4), the shorter way, by `fraction`."""
     cosine = (a * b).sum(axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)
     near = sine < 1e-6
     safe = np.where(near, 1.0, sine)
-    first = np.where(near, 1 - part, np.sin((1 - part) * angle) / safe)
-    second = np.where(near, part, np.sin(part * angle) / safe)
+    first = np.where(near, 1 - fraction, np.sin((1 - fraction) * angle) / safe)
+    second = np.where(near, fraction, np.sin(fraction * angle) / safe)
     return a * first + b * second
 
 
 def normalized(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
     length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
 
@@ -97,6 +99,7 @@ class Scene:
         self._groups = self._grouped()
 
     def name(self, node: int) -> str:
+        """The name of a node, "" where it has none."""
         name = self.nodes[node].get("name")
         return name if isinstance(name, str) else ""
 
@@ -187,12 +190,12 @@ class Scene:
         if not np.isfinite(times).all() or (np.diff(times) < 0).any():
             raise ClipError(f"{where}: got key times that run backward or are not finite, expected ascending seconds")
         values = self.file.floats(integer(sampler, "output"))
-        each = 3 if interpolation == "CUBICSPLINE" else 1
-        width = len(TRS[path]) if path in TRS else values.size // (len(times) * each)
-        if width == 0 or values.size != len(times) * each * width:
+        values_per_key = 3 if interpolation == "CUBICSPLINE" else 1
+        width = len(TRS[path]) if path in TRS else values.size // (len(times) * values_per_key)
+        if width == 0 or values.size != len(times) * values_per_key * width:
             raise ClipError(f"{where}: got {values.size} numbers for {len(times)} keys, expected "
-                            f"{each * max(width, 1)} per key")
-        shape = (len(times), 3, width) if each == 3 else (len(times), width)
+                            f"{values_per_key * max(width, 1)} per key")
+        shape = (len(times), 3, width) if values_per_key == 3 else (len(times), width)
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
@@ -278,7 +281,7 @@ def on_grid(keys: np.ndarray, rate: float) -> bool:
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:
-    """The rate that a tool would have said."""
+    """The rate that a tool would have stated: whole, or of a drop-frame time code."""
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)

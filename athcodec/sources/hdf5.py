@@ -20,19 +20,18 @@ not followed.
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection
 from os import PathLike, fspath
 from typing import Any
 
 import h5py
 import numpy as np
 
-from athcodec.clip import RESERVED_NAMES, MotionClip, frame_rate
+from athcodec.clip import RESERVED_NAMES, MotionClip
 from athcodec.errors import ClipError
-from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import read_clip_metadata
 from athcodec.sources import ReadOptions
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.schema import clip_of_arrays
 
 CHUNK_CACHE_BYTES = 64 << 20
 MAX_ATTRIBUTE_BYTES = 1 << 30
@@ -47,14 +46,8 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be opened.
     """
     file = _open(path)
-    try:
+    with naming(path), closing_on_failure(file):
         return _read(file, options)
-    except ClipError as error:
-        file.close()
-        raise ClipError(f"{fspath(path)}: {error}") from error
-    except BaseException:
-        file.close()
-        raise
 
 
 def _open(path: str | PathLike[str]) -> h5py.File:
@@ -68,20 +61,8 @@ def _open(path: str | PathLike[str]) -> h5py.File:
         raise ClipError(f"{fspath(path)}: the HDF5 file cannot be opened: {error}") from error
 
 
-def _watch(file: h5py.File) -> Callable[[], bool]:
-    """Whether the file has kept its size and time. HDF5 itself reads zeros where a file has become shorter."""
-    descriptor = file.id.get_vfd_handle()
-
-    def stamp() -> tuple[int, int]:
-        now = os.fstat(descriptor)
-        return now.st_size, now.st_mtime_ns
-
-    before = stamp()
-    return lambda: stamp() == before
-
-
 def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
-    unchanged = _watch(file)
+    unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
     positions = _dataset(file, "positions")
     if positions is None:
         raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
@@ -89,22 +70,8 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     if isinstance(metadata.get("domains"), str):
         metadata["domains"] = _parsed("domains", metadata["domains"])
     attributes = _static_arrays(file, options.skip)
-    clip = MotionClip(
-        positions=positions,
-        time=_time(file, positions, metadata),
-        rest=_array(file, "rest") if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        edges=_array(file, "edges"),
-        faces=_array(file, "faces"),
-        attributes=attributes,
-        metadata=metadata,
-        resource=file,
-        unchanged=unchanged,
-        **_branches(file, positions, metadata, options.root),
-    )
-    _drop_derivable_order(clip)
-    read_clip_metadata(clip)
-    return clip
+    return clip_of_arrays(positions, lambda name: _array(file, name), attributes, metadata, options, resource=file,
+                          unchanged=unchanged)
 
 
 def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
@@ -146,48 +113,6 @@ def _static_arrays(file: h5py.File, skip: Collection[str]) -> dict[str, np.ndarr
 
     file.visititems(visit)
     return arrays
-
-
-def _time(file: h5py.File, positions: h5py.Dataset, metadata: dict[str, Any]) -> np.ndarray:
-    time = _array(file, "time")
-    if time is None:
-        return np.arange(positions.shape[0] if positions.shape else 0) / frame_rate(metadata)
-    return time
-
-
-def _branches(
-    file: h5py.File, positions: h5py.Dataset, metadata: dict[str, Any], root: int | Sequence[int] | None
-) -> dict[str, np.ndarray | None]:
-    vertex_branch, branch_parent = _array(file, "vertex_branch"), _array(file, "branch_parent")
-    if vertex_branch is not None and branch_parent is not None:
-        stem_index = _array(file, "stem_index")
-        return {"vertex_branch": vertex_branch, "branch_parent": branch_parent, "stem_index": stem_index}
-    if vertex_branch is not None or branch_parent is not None:
-        raise ClipError(
-            "branches: got one of vertex_branch and branch_parent, expected both, or neither and edges"
-        )
-    edges = _array(file, "edges")
-    if edges is None:
-        return {}
-    rest = _pose_for_roots(file, positions)
-    up_axis = metadata.get("up_axis", "y")
-    vertex_branch, branch_parent, stem_index = branches_from_edges(edges, len(rest), rest, root, up_axis)
-    return {"vertex_branch": vertex_branch, "branch_parent": branch_parent, "stem_index": stem_index}
-
-
-def _pose_for_roots(file: h5py.File, positions: h5py.Dataset) -> np.ndarray:
-    """The stored rest pose or first frame, checked as the clip will check them again."""
-    frame_count, vertex_count = positions.shape[:2] if positions.ndim == 3 else (0, 0)
-    time, one_branch, parent = np.arange(frame_count), np.zeros(vertex_count, np.int32), np.array([-1])
-    return MotionClip(positions, time, one_branch, parent, rest=_array(file, "rest")).rest
-
-
-def _drop_derivable_order(clip: MotionClip) -> None:
-    order = clip.attributes.get("branch_order")
-    if order is None or order.dtype.kind not in "iu":
-        return
-    if np.array_equal(order, branch_orders(clip.branch_parent)):
-        del clip.attributes["branch_order"]
 
 
 def _parsed(name: str, text: str) -> Any:

@@ -39,6 +39,7 @@ class Mesh:
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Corners per face (F,), and the vertex of each corner (C,); None where there are no faces."""
         return polygons(self.faces, self.attributes)
 
     def same_topology(self, other: Mesh) -> str:
@@ -112,6 +113,7 @@ class _Names:
     numbers: dict[str, int] = field(default_factory=dict)
 
     def switch(self, name: str) -> None:
+        """The faces that follow have this name."""
         if name not in self.numbers:
             self.numbers[name] = len(self.names)
             self.names.append(name)
@@ -134,6 +136,7 @@ class _Obj:
         self.point_objects: list[int] = []
 
     def line(self, line: bytes) -> None:
+        """Take the next line. Raises ClipError."""
         words = line.split()
         if not words:
             return
@@ -191,13 +194,14 @@ def _text(words: Sequence[bytes]) -> str:
 
 
 def obj_lines(data: bytes) -> list[bytes]:
-    """The lines of an OBJ file, without the breaks that a backslash takes back."""
+    """The lines of an OBJ file; those that a backslash continues are joined."""
     if b"\\" in data:
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     return data.splitlines()
 
 
 def parse_obj(data: bytes) -> Mesh:
+    """The mesh in the bytes of an OBJ file. Raises ClipError."""
     file = _Obj()
     for line in obj_lines(data):
         file.line(line)
@@ -324,6 +328,7 @@ class PlyElement:
 
     @property
     def lists(self) -> list[str]:
+        """The names of the properties that are lists."""
         return [name for name, _, counted_by in self.properties if counted_by]
 
     def row(self, order: str, lengths: dict[str, int]) -> np.dtype:
@@ -339,12 +344,15 @@ class PlyElement:
 
 @dataclass
 class PlyHeader:
+    """The elements of a PLY file in their order, and the length of the header in bytes."""
+
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
 
 
 def ply_header(data: bytes) -> PlyHeader:
+    """The header in the bytes of a PLY file. Raises ClipError."""
     end = data.find(b"end_header", 0, HEADER_BYTES)
     line_end = data.find(b"\n", end)
     if end < 0 or line_end < 0:
@@ -481,6 +489,7 @@ def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, np.nd
 
 
 def parse_ply(data: bytes) -> Mesh:
+    """The mesh in the bytes of a PLY file. Raises ClipError."""
     header = ply_header(data)
     source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length:])
     values: dict[str, dict[str, np.ndarray]] = {}

@@ -1,7 +1,7 @@
 """Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py) into a MotionClip.
 
 Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
-as they are asked for: forward without a detour, backward from the start again. Every other array is static and
+as they are asked for: going forward once, going backward from the start again. Every other array is static and
 survives by its name, strings as UTF-8 of fixed length; at most 1 GiB each. Metadata are an array `metadata` with JSON
 text, and the scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
 """
@@ -15,18 +15,18 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.clip import RESERVED_NAMES, MotionClip, check_finite, check_float_dtype, frame_rate
+from athcodec.clip import RESERVED_NAMES, MotionClip, check_float_dtype
 from athcodec.errors import ClipError
-from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.joining import read_clip_metadata
+from athcodec.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.frames import Frames
-from athcodec.sources.raw import raw_frames, read_exactly, watch
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.raw import raw_frames, read_exactly
+from athcodec.sources.schema import clip_of_arrays
 
 MAX_ARRAY_BYTES = 1 << 30
 SCALARS = ("fps", "start_frame", "unit", "up_axis")
@@ -41,18 +41,12 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the archive `path`. Raises ClipError where it is no archive or its arrays are no usable clip,
     OSError where it cannot be opened."""
     file = open(path, "rb", buffering=0)
-    try:
+    with naming(path, *_BROKEN), closing_on_failure(file):
         return _read(file, options)
-    except _BROKEN as error:
-        file.close()
-        raise ClipError(f"{fspath(path)}: {error}") from None
-    except BaseException:
-        file.close()
-        raise
 
 
 @contextmanager
-def _naming(name: str) -> Iterator[None]:
+def _naming_array(name: str) -> Iterator[None]:
     """Errors of the block say which array they are about."""
     try:
         yield
@@ -69,34 +63,21 @@ def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
                if info.filename.endswith(".npy")}
     if "positions" not in members:
         raise ClipError("positions: got no such array, expected (frames, vertices, 3)")
-    with _naming("positions"):
+    with _naming_array("positions"):
         positions = _Positions(file, archive, members.pop("positions")).frames()
     arrays = {name: _array(archive, name, info) for name, info in members.items()
               if name in RESERVED_NAMES or name not in options.skip}
     metadata = _metadata(arrays)
-    clip = MotionClip(
-        positions,
-        arrays.pop("time") if "time" in arrays else np.arange(len(positions)) / frame_rate(metadata),
-        rest=arrays.get("rest") if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        edges=arrays.get("edges"),
-        faces=arrays.get("faces"),
-        attributes={name: values for name, values in arrays.items() if name not in RESERVED_NAMES},
-        metadata=metadata, resource=file, unchanged=watch(file),
-        **_branches(arrays, positions, metadata, options),
-    )
-    order = clip.attributes.get("branch_order")
-    if order is not None and clip.has_branches and np.array_equal(order, branch_orders(clip.branch_parent)):
-        del clip.attributes["branch_order"]
-    read_clip_metadata(clip)
-    return clip
+    attributes = {name: values for name, values in arrays.items() if name not in RESERVED_NAMES}
+    return clip_of_arrays(positions, arrays.get, attributes, metadata, options, resource=file,
+                          unchanged=FileWatch(file.fileno()))
 
 
 def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.ndarray:
     if info.file_size > MAX_ARRAY_BYTES:
         raise ClipError(f"{name}: got {info.file_size} bytes, expected a static array of at most {MAX_ARRAY_BYTES}; or "
                         "skip it")
-    with _naming(name), archive.open(info) as member:
+    with _naming_array(name), archive.open(info) as member:
         values = np.lib.format.read_array(member, allow_pickle=False)
         if member.read(1):
             raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
@@ -104,7 +85,7 @@ def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.nda
 
 
 def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Taken out of the arrays."""
+    """The metadata, which are removed from the arrays."""
     metadata = {}
     for name in SCALARS:
         if name in arrays and arrays[name].ndim == 0 and arrays[name].dtype.kind in "biufUS":
@@ -122,21 +103,6 @@ def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 def _text(value: Any) -> Any:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-
-
-def _branches(arrays: dict[str, np.ndarray], positions: Any, metadata: dict[str, Any],
-              options: ReadOptions) -> dict[str, np.ndarray | None]:
-    found = {name: arrays.get(name) for name in ("vertex_branch", "branch_parent", "stem_index")}
-    known = [found[name] is not None for name in ("vertex_branch", "branch_parent")]
-    if any(known) or arrays.get("edges") is None:
-        return found if any(known) else {}
-    rest = arrays.get("rest")
-    if rest is None or np.shape(rest) != positions.shape[1:]:
-        rest = np.asarray(positions[0:1])[0]
-        check_finite(rest[None])
-    names = ("vertex_branch", "branch_parent", "stem_index")
-    up_axis = metadata.get("up_axis", "y")
-    return dict(zip(names, branches_from_edges(arrays["edges"], len(rest), rest, options.root, up_axis), strict=True))
 
 
 class _Positions:
@@ -186,12 +152,12 @@ class _Positions:
         if self._file.closed:
             raise ClipError("got a closed file, expected an open one")
         frame_bytes = self.shape[1] * 3 * self.dtype.itemsize
-        with _naming("positions"):
+        with _naming_array("positions"):
             if self._member is None or start < self._next:
                 self._member, self._next = self._archive.open(self._info), 0
                 self._skip(self._header_bytes)
             self._skip((start - self._next) * frame_bytes)
-            self._next = self.shape[0] + 1  # until it is known to be right
+            self._next = self.shape[0] + 1  # unknown until all of the frames have been read
             data = bytearray()
             while len(data) < (stop - start) * frame_bytes:
                 data += self._some((stop - start) * frame_bytes - len(data))

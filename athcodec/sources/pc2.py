@@ -21,7 +21,8 @@ from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions, read
 from athcodec.sources.mesh import Mesh, read_mesh
-from athcodec.sources.raw import raw_frames, read_exactly, watch
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
+from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
 
 MAGIC = b"POINTCACHE2\0"
@@ -63,19 +64,13 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
     """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
     positions, time and metadata."""
     file = open(path, "rb", buffering=0)
-    try:
+    with naming(path), closing_on_failure(file):
         fields = read_header(file, options)
         mesh = cached_mesh(path, options, fields["positions"].shape[1])
         metadata = mesh.metadata | fields.pop("metadata")
         return MotionClip(**fields, metadata=metadata, faces=mesh.faces, edges=mesh.edges, attributes=mesh.attributes,
                           rest_pose="mean" if options.rest == "mean" else "first", resource=file,
-                          unchanged=watch(file))
-    except ClipError as error:
-        file.close()
-        raise ClipError(f"{fspath(path)}: {error}") from None
-    except BaseException:
-        file.close()
-        raise
+                          unchanged=FileWatch(file.fileno()))
 
 
 def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: int) -> Mesh:

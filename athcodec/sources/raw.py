@@ -4,19 +4,17 @@ file which becomes shorter gives an error and not a crash. It knows no file form
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
 from typing import BinaryIO
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.sources.frames import Frames
+from athcodec.frames import Frames
 
 
 def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:
-    """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. Who calls has checked that
-    the file is long enough."""
+    """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has checked
+    that the file is long enough."""
     stored = np.dtype(dtype)
     frame_bytes = vertex_count * 3 * stored.itemsize
 
@@ -33,16 +31,6 @@ def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int,
         return block.astype(stored.newbyteorder("="), copy=False)
 
     return Frames(read, frame_count, vertex_count, stored.newbyteorder("="))
-
-
-def watch(file: BinaryIO) -> Callable[[], bool]:
-    """Whether an open file has kept its size and time since this was called."""
-    def stamp() -> tuple[int, int]:
-        now = os.fstat(file.fileno())
-        return now.st_size, now.st_mtime_ns
-
-    before = stamp()
-    return lambda: stamp() == before
 
 
 def read_exactly(file: BinaryIO, size: int, what: str) -> bytes:

@@ -1,9 +1,9 @@
 """Reads numbered OBJ or PLY files as the frames of one motion: tree_0001.obj, tree_0002.obj ...
 
 Any one of the files names the motion, and so does a pattern: tree_####.obj or tree_%04d.obj. The numbers are frames:
-where some are missing, time goes on all the same. Frames come options.fps a second, DEFAULT_FPS (30) without it. A file
-without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and all
-else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
+where some are missing, the others keep their times. Frames come options.fps a second, DEFAULT_FPS (30) without it. A
+file without a number is a motion of one frame. One file is in memory at a time; faces, edges, texture coordinates and
+all else that does not move come from the first. See mesh.py for what is read of a file. Exporters that split vertices
 (Blender's PLY does where texture coordinates are to be written) split those of all frames alike.
 """
 
@@ -20,9 +20,10 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
+from athcodec.frames import Frames
 from athcodec.sources import NUMBER_PATTERN, ReadOptions, is_pattern
-from athcodec.sources.frames import Frames
 from athcodec.sources.mesh import Mesh, obj_lines, obj_points, parse_mesh, ply_header, ply_points
+from athcodec.sources.opening import FileWatch, naming
 from athcodec.sources.timing import numbered_times
 
 _NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
@@ -39,7 +40,17 @@ class Numbering:
     width: int
     suffix: str
 
+    @classmethod
+    def of_pattern(cls, path: Path) -> Numbering | None:
+        """That of a name with # or %04d in it; None where there is none."""
+        found = NUMBER_PATTERN.fullmatch(path.name)
+        if found is None:
+            return None
+        prefix, marks, width, suffix = found.groups()
+        return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+
     def path(self, number: int) -> Path:
+        """The file of this number."""
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
     def files(self) -> dict[int, Path]:
@@ -56,10 +67,8 @@ class Numbering:
 def numbering_of(path: str | PathLike[str]) -> Numbering | None:
     """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
     path = Path(path)
-    pattern = NUMBER_PATTERN.fullmatch(path.name) if is_pattern(path) else None
-    if pattern:
-        prefix, marks, width, suffix = pattern.groups()
-        return Numbering(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
+    if is_pattern(path):
+        return Numbering.of_pattern(path)
     numbered = _NUMBERED.fullmatch(path.stem)
     if not numbered:
         return None
@@ -103,12 +112,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     mesh = reader.mesh
     mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
     attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
-    try:
+    with naming(path):
         return MotionClip(reader.frames, time, faces=mesh.faces, edges=mesh.edges, attributes=attributes,
                           metadata=mesh.metadata | metadata, rest_pose="mean" if options.rest == "mean" else "first",
                           unchanged=reader.unchanged)
-    except ClipError as error:
-        raise ClipError(f"{fspath(path)}: {error}") from None
 
 
 def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str]) -> list[str]:
@@ -122,27 +129,25 @@ def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str
 class FileFrames:
     """Frames of which each is a file of its own, read whole.
 
-    paths          in the order of time
-    parse          (bytes, path) -> Mesh
-    fast_reader    (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or
-                   None where it cannot tell that all else is as in the first
+    Parameters
+    ----------
+    paths : sequence of Path
+        In the order of time.
+    parse : callable
+        (bytes, path) -> Mesh.
+    fast_reader : callable
+        (bytes of the first file, its mesh) -> a function from the bytes of a further file to its points, or to None
+        where that cannot tell whether all else is as in the first.
     """
 
     def __init__(self, paths: Sequence[Path], parse: Callable[[bytes, Path], Mesh],
                  fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]]):
         self.paths, self._parse = list(paths), parse
-        self._stamps = [_stamp(path) for path in self.paths]
+        self.unchanged = FileWatch(*self.paths)
         data = self.paths[0].read_bytes()
         self.mesh = parse(data, self.paths[0])
         self._fast = fast_reader(data, self.mesh)
         self.frames = Frames(self._read, len(self.paths), len(self.mesh.points), self.mesh.points.dtype)
-
-    def unchanged(self) -> bool:
-        """Whether no file has been written to since this was made."""
-        try:
-            return [_stamp(path) for path in self.paths] == self._stamps
-        except OSError:
-            return False
 
     def _read(self, start: int, stop: int) -> np.ndarray:
         block = np.empty((stop - start, *self.frames.shape[1:]), self.frames.dtype)
@@ -157,7 +162,7 @@ class FileFrames:
         try:
             points = self._fast(data)
         except (ClipError, ValueError, IndexError, OverflowError):
-            points = None  # the careful way says what is wrong
+            points = None  # the full parser says what is wrong
         if points is not None and points.shape == self.mesh.points.shape:
             return points
         mesh = self._parse(data, path)
@@ -166,11 +171,6 @@ class FileFrames:
             raise ClipError(f"frame {frame}, {path.name}: {different}, unlike {self.paths[0].name}; topology that "
                             "changes cannot be coded")
         return mesh.points
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    now = os.stat(path)
-    return now.st_size, now.st_mtime_ns
 
 
 def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:

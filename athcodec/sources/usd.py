@@ -7,8 +7,8 @@ else the time codes that have samples; options.fps sets another rate. Static pri
 
 Points are float32 in USD and so they are here. The stage is opened as it is composed (layers, payloads, value clips);
 what a layer needs and cannot be found is one warning each. Point instancers, patches, tetrahedra, materials and
-velocities are not read. A stage is opened by its structure; positions are read frame by frame. Of a damaged binary file
-USD believes how long an array is, whatever that is: files that are not trusted are read under a limit of memory.
+velocities are not read. A stage is opened by its structure; positions are read frame by frame. USD trusts the
+lengths of arrays in a binary file even where it is damaged: read files that are not trusted under a limit of memory.
 """
 
 from __future__ import annotations
@@ -30,18 +30,16 @@ from athcodec.clip import MotionClip, Skin
 from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.crate import check_crates
-from athcodec.sources.frames import Frames
-from athcodec.sources.parts import (
+from athcodec.sources.opening import FileWatch, naming
+from athcodec.sources.scene_objects import (
     OWN,
     ArrayDescriptor,
-    Part,
+    SceneObject,
     Static,
-    edges,
-    faces,
-    fields,
-    joined,
-    names_and_kinds,
+    clip_of_objects,
+    frames_of_objects,
     own_metadata,
+    transformed,
 )
 from athcodec.units import METRES
 
@@ -58,17 +56,15 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     own. The rest pose is a static primvar `rest` where every prim has one. Raises ClipError, OSError.
     """
     path = fspath(path)
-    try:
+    with naming(path):
         check_crates(path)
         with quietly():
             return _clip(_Stage(path), options)
-    except ClipError as error:
-        raise ClipError(f"{path}: {error}") from None
 
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """Keeps what USD has to say off stderr; its errors become ClipError, one line each."""
+    """Keeps USD's messages off stderr; its errors become ClipErrors of one line."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -79,7 +75,7 @@ def quietly() -> Iterator[None]:
 
 
 def _one_line(error: Exception) -> str:
-    """What the first of USD's errors says, without its place in USD's source."""
+    """The message of the first of USD's errors, without its place in USD's source."""
     try:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     except UnicodeDecodeError:  # it quotes bytes of the file
@@ -100,76 +96,56 @@ class _Stage:
             raise ClipError("stage: cannot be opened")
         for error in self.stage.GetCompositionErrors():
             warnings.warn(f"{path}: {' '.join(str(error).split())}", stacklevel=4)
-        self._files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
-        self._stamps = self._now()
-
-    def _now(self) -> list[tuple[int, int] | None]:
-        def stamp(name: str) -> tuple[int, int] | None:
-            try:
-                found = os.stat(name)
-            except OSError:
-                return None
-            return found.st_size, found.st_mtime_ns
-
-        return [stamp(name) for name in self._files]
-
-    def unchanged(self) -> bool:
-        return self._now() == self._stamps
+        files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
+        self.unchanged = FileWatch(*files)
 
     def close(self) -> None:
         self.stage = None
 
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        if self.stage is None:
+            raise ClipError("positions: the clip is closed")
+        with quietly():
+            yield
+
 
 @dataclass
-class _Prim(Part):
+class _Prim(SceneObject):
     """A prim that is read, and how its points are found."""
 
     prim: Usd.Prim = None
     points: Usd.AttributeQuery = None
     skeleton: _Skeleton | None = None
-    moves: bool = False
-    still: np.ndarray | None = None  # the positions where nothing moves
+    moves: bool = False  # its transforms do, or a skeleton moves it
 
 
 def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     stage = source.stage
     layer = own_metadata(stage.GetRootLayer().customLayerData.get(OWN))
-    parts = _find_parts(stage, options.only)
-    skins = _bind_skeletons(stage, parts)
-    codes, rate = _time_codes(stage, parts, options.fps, layer.pop("irregular", False))
-    parts = _visible(parts, codes)
-    _measure(parts, codes)
-    metadata = layer | _metadata(stage, parts, codes, rate)
-    frames = _Reader(source, parts, codes)
-    attributes, domains = joined(parts, options.skip)
-    _own_attributes(stage, attributes, domains, options.skip)
-    if domains:
-        metadata["domains"] = domains
-    known = fields(attributes, domains)
-    rest, joints = known.pop("rest", None), known.pop("edges", None)
-    polygons = faces(parts, attributes)
-    clip = MotionClip(
-        positions=Frames(frames.read, len(codes), sum(part.count for part in parts)),
-        time=(codes - codes[0]) / stage.GetTimeCodesPerSecond(),
-        rest=rest if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        edges=edges(parts) if joints is None else joints,
-        faces=polygons,
-        attributes=attributes,
-        metadata=metadata,
-        resource=source,
-        unchanged=source.unchanged,
-        skin=_skin(parts, skins),
-        **known,
-    )
-    return clip
+    objects = _find_objects(stage, options.only)
+    skins = _bind_skeletons(stage, objects)
+    codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False))
+    objects = _visible(objects, codes)
+    _measure(objects, codes)
+    cache = UsdGeom.XformCache()
+
+    def sample(obj: _Prim, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        points, space = _points(obj, codes, frame), obj.prim if obj.skeleton is None else obj.skeleton.space
+        cache.SetTime(codes[frame])
+        return points, np.array(cache.GetLocalToWorldTransform(space))
+
+    frames = frames_of_objects(objects, len(codes), sample, lambda frame: _frame_name(codes, frame), source.reading)
+    return clip_of_objects(
+        objects, frames, (codes - codes[0]) / stage.GetTimeCodesPerSecond(), layer | _metadata(stage, codes, rate),
+        _kept_arrays(stage), options, resource=source, unchanged=source.unchanged, skin=_skin(objects, skins))
 
 
 # ---- prims ----
 
 
-def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
-    parts = []
+def _find_objects(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
+    objects = []
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
@@ -180,12 +156,12 @@ def _find_parts(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
             continue
         points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
         if points.HasAuthoredValue():
-            parts.append(_Prim(kind, prim.GetName(), str(prim.GetPath()), prim=prim, points=points))
-    if not parts:
+            objects.append(_Prim(kind, prim.GetName(), str(prim.GetPath()), prim=prim, points=points))
+    if not objects:
         what = f" named like {', '.join(only)}" if only else ""
         raise ClipError(f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or "
                         "Points")
-    return parts
+    return objects
 
 
 def _kind(prim: Usd.Prim) -> str | None:
@@ -206,61 +182,63 @@ def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
         prim = prim.GetParent()
 
 
-def _visible(parts: list[_Prim], codes: np.ndarray) -> list[_Prim]:
-    """Those that are seen at some time from the first frame to the last."""
+def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
+    """Those that are visible at some time from the first frame to the last."""
     def seen(prim: Usd.Prim) -> bool:
         times = {float(codes[0])}
-        for each in _lineage(prim):
-            attribute = UsdGeom.Imageable(each).GetVisibilityAttr() if each.IsA(UsdGeom.Imageable) else None
+        for ancestor in _lineage(prim):
+            attribute = UsdGeom.Imageable(ancestor).GetVisibilityAttr() if ancestor.IsA(UsdGeom.Imageable) else None
             times.update(t for t in (attribute.GetTimeSamples() if attribute else ()) if codes[0] <= t <= codes[-1])
         image = UsdGeom.Imageable(prim)
         return any(image.ComputeVisibility(time) != UsdGeom.Tokens.invisible for time in times)
 
-    left = [part for part in parts if seen(part.prim)]
+    left = [obj for obj in objects if seen(obj.prim)]
     if not left:
-        raise ClipError(f"prims: got {len(parts)} that are invisible, expected a visible one")
+        raise ClipError(f"prims: got {len(objects)} that are invisible, expected a visible one")
     return left
 
 
-def _measure(parts: list[_Prim], codes: np.ndarray) -> None:
-    """Fills in what the parts are at the first frame."""
+def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
+    """Fills in what the objects are at the first frame."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
-    for part in parts:
-        points = _points(part, codes, 0)
-        part.first, part.count = first, len(points)
-        first += part.count
-        part.moves = any(each.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(each).TransformMightBeTimeVarying()
-                         for each in _lineage(part.prim))
-        _topology(part, codes)
-        _statics(part, codes, np.array(cache.GetLocalToWorldTransform(part.prim)))
+    for obj in objects:
+        points = _points(obj, codes, 0)
+        obj.first, obj.count = first, len(points)
+        first += obj.count
+        obj.moves = obj.skeleton is not None or any(
+            prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
+            for prim in _lineage(obj.prim))
+        obj.is_still = not obj.moves and not obj.points.ValueMightBeTimeVarying()
+        _topology(obj, codes)
+        _statics(obj, codes, np.array(cache.GetLocalToWorldTransform(obj.prim)))
     if first == 0:
         raise ClipError("points: got none, expected at least one")
 
 
-def _topology(part: _Prim, codes: np.ndarray) -> None:
-    if part.kind == "mesh":
-        mesh = UsdGeom.Mesh(part.prim)
-        part.face_counts = _fixed(part, mesh.GetFaceVertexCountsAttr(), codes)
-        part.face_indices = _fixed(part, mesh.GetFaceVertexIndicesAttr(), codes)
-        _note(part, "orientation", mesh.GetOrientationAttr(), "rightHanded")
-    elif part.kind == "curves":
-        part.curve_counts = _fixed(part, UsdGeom.Curves(part.prim).GetCurveVertexCountsAttr(), codes)
-        if part.prim.IsA(UsdGeom.BasisCurves):
-            curves = UsdGeom.BasisCurves(part.prim)
-            _note(part, "type", curves.GetTypeAttr(), "linear")
-            _note(part, "wrap", curves.GetWrapAttr(), "nonperiodic")
-            if "type" in part.details:
-                _note(part, "basis", curves.GetBasisAttr(), "")
-    part.check()
+def _topology(obj: _Prim, codes: np.ndarray) -> None:
+    if obj.kind == "mesh":
+        mesh = UsdGeom.Mesh(obj.prim)
+        obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
+        obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
+        _note(obj, "orientation", mesh.GetOrientationAttr(), "rightHanded")
+    elif obj.kind == "curves":
+        obj.curve_counts = _fixed(obj, UsdGeom.Curves(obj.prim).GetCurveVertexCountsAttr(), codes)
+        if obj.prim.IsA(UsdGeom.BasisCurves):
+            curves = UsdGeom.BasisCurves(obj.prim)
+            _note(obj, "type", curves.GetTypeAttr(), "linear")
+            _note(obj, "wrap", curves.GetWrapAttr(), "nonperiodic")
+            if "type" in obj.details:
+                _note(obj, "basis", curves.GetBasisAttr(), "")
+    obj.check()
 
 
-def _note(part: _Prim, name: str, attribute: Usd.Attribute, usual: str) -> None:
+def _note(obj: _Prim, name: str, attribute: Usd.Attribute, usual: str) -> None:
     value = attribute.Get()
     if value and value != usual:
-        part.details[name] = str(value)
+        obj.details[name] = str(value)
 
 
-def _fixed(part: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
+def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
     """Integers that stay the same in every frame; ClipError where they change."""
     query = Usd.AttributeQuery(attribute)
     first = _array(query.Get(codes[0]), np.int32)
@@ -268,7 +246,7 @@ def _fixed(part: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarr
         for sample in query.GetTimeSamplesInInterval(_interval(codes)):
             if not np.array_equal(_array(query.Get(sample), np.int32), first):
                 frame = int(np.searchsorted(codes, sample - 1e-9))
-                raise ClipError(f"{part.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
+                raise ClipError(f"{obj.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
                                 f"(time code {sample:g}), expected the same vertices and faces in all")
     return first
 
@@ -284,14 +262,14 @@ def _array(value: Any, dtype: Any) -> np.ndarray:
 # ---- time ----
 
 
-def _time_codes(stage: Usd.Stage, parts: list[_Prim], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
+def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
     """Time codes to read, and frames per second."""
     own = stage.GetTimeCodesPerSecond()
     if not 0 < own < math.inf:
         raise ClipError(f"timeCodesPerSecond: got {own}, expected a positive number")
     start, end, samples = stage.GetStartTimeCode(), stage.GetEndTimeCode(), None
     if not stage.HasAuthoredTimeCodeRange() or not start <= end or irregular:
-        samples = _sampled(parts)
+        samples = _sampled(objects)
         if not fps:
             return (np.array(samples) if samples else np.zeros(1)), own
         start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
@@ -304,21 +282,21 @@ def _time_codes(stage: Usd.Stage, parts: list[_Prim], fps: float | None, irregul
     return start + np.arange(count) * step, fps or own
 
 
-def _sampled(parts: list[_Prim]) -> list[float]:
+def _sampled(objects: list[_Prim]) -> list[float]:
     found: set[float] = set()
-    for part in parts:
-        found.update(part.points.GetTimeSamples())
-        prims = [part.prim] if part.skeleton is None else [part.prim, part.skeleton.query.GetPrim()]
-        for prim in (each for one in prims for each in _lineage(one)):
+    for obj in objects:
+        found.update(obj.points.GetTimeSamples())
+        prims = [obj.prim] if obj.skeleton is None else [obj.prim, obj.skeleton.query.GetPrim()]
+        for prim in (ancestor for one in prims for ancestor in _lineage(one)):
             if prim.IsA(UsdGeom.Xformable):
                 found.update(UsdGeom.Xformable(prim).GetTimeSamples())
-        if part.skeleton is not None and part.skeleton.animation:
-            found.update(part.skeleton.animation.GetJointTransformTimeSamples())
-            found.update(part.skeleton.animation.GetBlendShapeWeightTimeSamples())
+        if obj.skeleton is not None and obj.skeleton.animation:
+            found.update(obj.skeleton.animation.GetJointTransformTimeSamples())
+            found.update(obj.skeleton.animation.GetBlendShapeWeightTimeSamples())
     return sorted(time for time in found if math.isfinite(time))
 
 
-def _metadata(stage: Usd.Stage, parts: list[_Prim], codes: np.ndarray, rate: float) -> dict[str, Any]:
+def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any]:
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
     metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
@@ -327,69 +305,51 @@ def _metadata(stage: Usd.Stage, parts: list[_Prim], codes: np.ndarray, rate: flo
         metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
         metadata["up_axis"] = str(UsdGeom.GetStageUpAxis(stage)).lower()
-    return metadata | names_and_kinds(parts)
+    return metadata
 
 
 # ---- what does not move ----
 
 
-def _statics(part: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
-    for primvar in UsdGeom.PrimvarsAPI(part.prim).FindPrimvarsWithInheritance():
+def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
+    for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if primvar.HasValue() and not primvar.ValueMightBeTimeVarying():
             values = primvar.ComputeFlattened(codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
-            _keep(part, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar.GetElementSize(),
+            _keep(obj, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar.GetElementSize(),
                   primvar.GetAttr())
-    _rename_first_uv(part)
-    normals = UsdGeom.PointBased(part.prim).GetNormalsAttr()
-    if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in part.statics:
-        _keep(part, "normals", normals.Get(codes[0]), UsdGeom.PointBased(part.prim).GetNormalsInterpolation())
-    _turn_normals(part, matrix)
-    if part.kind != "mesh":
-        _widths(part, codes, matrix)
-    rest = part.statics.get("rest")
+    _rename_first_uv(obj)
+    normals = UsdGeom.PointBased(obj.prim).GetNormalsAttr()
+    if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in obj.statics:
+        _keep(obj, "normals", normals.Get(codes[0]), UsdGeom.PointBased(obj.prim).GetNormalsInterpolation())
+    obj.turn_normals(matrix, obj.moves)
+    if obj.kind != "mesh":
+        _widths(obj, codes, matrix)
+    rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
-        part.statics["rest"] = Static(rest.domain, _moved(rest.values, matrix))
+        obj.statics["rest"] = Static(rest.domain, transformed(rest.values, matrix))
 
 
-def _rename_first_uv(part: _Prim) -> None:
+def _rename_first_uv(obj: _Prim) -> None:
     """Where no primvar is called st, the first texture coordinates are what a renderer takes."""
-    if "uv" in part.statics:
+    if "uv" in obj.statics:
         return
-    for primvar in UsdGeom.PrimvarsAPI(part.prim).GetPrimvars():
+    for primvar in UsdGeom.PrimvarsAPI(obj.prim).GetPrimvars():
         name = primvar.GetPrimvarName()
-        if primvar.GetTypeName().role == Sdf.ValueRoleNames.TextureCoordinate and name in part.statics:
-            part.statics = {("uv" if key == name else key): each for key, each in part.statics.items()}
+        if primvar.GetTypeName().role == Sdf.ValueRoleNames.TextureCoordinate and name in obj.statics:
+            obj.statics = {("uv" if key == name else key): static for key, static in obj.statics.items()}
             return
 
 
-def _turn_normals(part: _Prim, matrix: np.ndarray) -> None:
-    """Into world space; away where what they belong to turns."""
-    normals = part.statics.get("normals")
-    if normals is None or normals.values.shape[1:] != (3,):
-        return
-    if part.moves or part.skeleton is not None:
-        del part.statics["normals"]
-        return
-    if np.array_equal(matrix[:3, :3], np.eye(3)) or not np.linalg.det(matrix[:3, :3]):
-        return
-    turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
-    part.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
-
-
-def _widths(part: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
-    schema = (UsdGeom.Curves if part.kind == "curves" else UsdGeom.Points)(part.prim)
+def _widths(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
+    schema = (UsdGeom.Curves if obj.kind == "curves" else UsdGeom.Points)(obj.prim)
     widths = schema.GetWidthsAttr()
-    if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in part.statics:
-        _keep(part, "radius", widths.Get(codes[0]), schema.GetWidthsInterpolation())
-        if "radius" in part.statics:
-            scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-            radius = part.statics["radius"]
-            part.statics["radius"] = Static(radius.domain, (radius.values * scale).astype(radius.values.dtype))
+    if widths.HasAuthoredValue() and not widths.ValueMightBeTimeVarying() and "radius" not in obj.statics:
+        _keep(obj, "radius", widths.Get(codes[0]), schema.GetWidthsInterpolation())
+        obj.halve_widths(matrix)
 
 
-def _keep(part: _Prim, name: str, values: Any, interpolation: str, element_size: int = 1,
+def _keep(obj: _Prim, name: str, values: Any, interpolation: str, element_size: int = 1,
           attribute: Usd.Attribute | None = None) -> None:
     """Notes a static array where its rows fit the prim; strings and references to files are none."""
     values = _numbers(values)
@@ -398,7 +358,7 @@ def _keep(part: _Prim, name: str, values: Any, interpolation: str, element_size:
     if element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
-    part.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
+    obj.keep(name, DOMAINS.get(interpolation), _as_written(values, attribute))
 
 
 def _numbers(values: Any) -> np.ndarray | None:
@@ -434,26 +394,14 @@ WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8",
 # ---- what exporters/usd.py has written of a clip that USD has no place for ----
 
 
-def _own_attributes(stage: Usd.Stage, attributes: dict[str, np.ndarray], domains: dict[str, str], skip: Any) -> None:
+def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
     root = stage.GetDefaultPrim()
-    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
-        if not isinstance(attribute, Usd.Attribute):
-            continue
-        name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1:]
-        values, domain = _own_array(attribute), _said(attribute, "domain")
-        if values is None or name in skip or name in attributes or domain == "vertex" and len(values) != vertices:
-            continue
-        attributes[name] = values
-        if domain and domain != "vertex":
-            domains[name] = domain
-
-
-def _own_array(attribute: Usd.Attribute) -> np.ndarray | None:
-    values, dtype, shape = attribute.Get(), _said(attribute, "dtype"), _said(attribute, "shape")
-    if not isinstance(values, Vt.UCharArray) or dtype is None or shape is None:
-        return None
-    return ArrayDescriptor(dtype=dtype, shape=shape).array(np.array(values).tobytes())
+        values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
+        if isinstance(values, Vt.UCharArray):
+            name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1:]
+            texts = (_said(attribute, key) or "" for key in ("dtype", "shape", "domain"))
+            yield ArrayDescriptor(name, *texts), np.array(values).tobytes()
 
 
 # ---- skeletons ----
@@ -503,7 +451,7 @@ class _Skeleton:
         found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
         if not found or count == 0:
             return np.full(count, -1, np.int32)
-        joints, weights = (np.array(each).reshape(count, -1) for each in found)
+        joints, weights = (np.array(values).reshape(count, -1) for values in found)
         rows = np.arange(count), weights.argmax(axis=1)
         chosen = joints[rows]
         order = self.target.GetJointOrder()
@@ -514,8 +462,8 @@ class _Skeleton:
         return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
 
 
-def _bind_skeletons(stage: Usd.Stage, parts: list[_Prim]) -> list[UsdSkel.SkeletonQuery]:
-    by_path = {part.prim.GetPath(): part for part in parts}
+def _bind_skeletons(stage: Usd.Stage, objects: list[_Prim]) -> list[UsdSkel.SkeletonQuery]:
+    by_path = {obj.prim.GetPath(): obj for obj in objects}
     predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     queries = []
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), predicate):
@@ -527,13 +475,13 @@ def _bind_skeletons(stage: Usd.Stage, parts: list[_Prim]) -> list[UsdSkel.Skelet
             query = cache.GetSkelQuery(binding.GetSkeleton())
             queries.append((cache, query))  # the cache owns what the query refers to
             for target in binding.GetSkinningTargets():
-                part = by_path.get(target.GetPrim().GetPath())
-                if part is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
-                    part.skeleton = _Skeleton(query, target)
+                obj = by_path.get(target.GetPrim().GetPath())
+                if obj is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
+                    obj.skeleton = _Skeleton(query, target)
     return queries
 
 
-def _skin(parts: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
+def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
     """The joints of all skeletons, one after the other."""
     parents, names, first = [], [], {}
     for _, query in queries:
@@ -544,65 +492,28 @@ def _skin(parts: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) 
         own = np.array(query.GetTopology().GetParentIndices(), np.int32)
         parents.append(np.where(own < 0, -1, own + first[path]))
         names += [str(name) for name in query.GetJointOrder()]
-    if not names or not any(part.skeleton is not None and part.skeleton.skins for part in parts):
+    if not names or not any(obj.skeleton is not None and obj.skeleton.skins for obj in objects):
         return None
-    joints = np.full(sum(part.count for part in parts), -1, np.int32)
-    for part in parts:
-        if part.skeleton is not None:
-            own = part.skeleton.largest(part.count)
-            offset = first[part.skeleton.query.GetPrim().GetPath()]
-            joints[part.first: part.first + part.count] = np.where(own < 0, -1, own + offset)
+    joints = np.full(sum(obj.count for obj in objects), -1, np.int32)
+    for obj in objects:
+        if obj.skeleton is not None:
+            own = obj.skeleton.largest(obj.count)
+            offset = first[obj.skeleton.query.GetPrim().GetPath()]
+            joints[obj.first: obj.first + obj.count] = np.where(own < 0, -1, own + offset)
     return Skin(np.concatenate(parents).astype(np.int32), joints, names)
 
 
 # ---- positions ----
 
 
-class _Reader:
-    """Positions of all parts, frame by frame."""
-
-    def __init__(self, source: _Stage, parts: list[_Prim], codes: np.ndarray):
-        self._source, self._parts, self._codes = source, parts, codes
-        self._count = sum(part.count for part in parts)
-
-    def read(self, start: int, stop: int) -> np.ndarray:
-        """(stop - start, N, 3) float32. Raises ClipError."""
-        if self._source.stage is None:
-            raise ClipError("positions: the clip is closed")
-        out = np.empty((stop - start, self._count, 3), np.float32)
-        with quietly():
-            for row, frame in enumerate(range(start, stop)):
-                cache = UsdGeom.XformCache(self._codes[frame])
-                for part in self._parts:
-                    out[row, part.first: part.first + part.count] = self._part(part, frame, cache)
-        return out
-
-    def _part(self, part: _Prim, frame: int, cache: UsdGeom.XformCache) -> np.ndarray:
-        if part.still is not None:
-            return part.still
-        points = _points(part, self._codes, frame)
-        if len(points) != part.count:
-            raise ClipError(f"{part.path}: got {len(points)} points in frame {frame} (time code "
-                            f"{self._codes[frame]:g}), expected {part.count} as in the first frame")
-        space = part.prim if part.skeleton is None else part.skeleton.space
-        moved = _moved(points, np.array(cache.GetLocalToWorldTransform(space)))
-        if part.skeleton is None and not part.moves and not part.points.ValueMightBeTimeVarying():
-            part.still = moved
-        return moved
-
-
-def _points(part: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
-    points = part.points.Get(codes[frame])
+def _points(obj: _Prim, codes: np.ndarray, frame: int) -> np.ndarray:
+    points = obj.points.Get(codes[frame])
     if points is None:
-        raise ClipError(f"{part.path}: got no points in frame {frame} (time code {codes[frame]:g})")
-    if part.skeleton is not None:
-        points = part.skeleton.deform(points, float(codes[frame]))
+        raise ClipError(f"{obj.path}: got no points in {_frame_name(codes, frame)}")
+    if obj.skeleton is not None:
+        points = obj.skeleton.deform(points, float(codes[frame]))
     return np.array(points, np.float32).reshape(-1, 3)
 
 
-def _moved(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    if np.array_equal(matrix, np.eye(4)):
-        return points
-    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
-
-
+def _frame_name(codes: np.ndarray, frame: int) -> str:
+    return f"frame {frame} (time code {codes[frame]:g})"

@@ -12,7 +12,6 @@ from __future__ import annotations
 import base64
 import binascii
 import lzma
-import os
 import re
 import zlib
 from collections.abc import Callable, Sequence
@@ -28,6 +27,7 @@ from athcodec.errors import ClipError, MissingExtra
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
+from athcodec.sources.opening import FileWatch, naming
 from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import parse_xml
@@ -106,7 +106,7 @@ class _Steps:
 
     def __init__(self, files: Sequence[Path]):
         self._files = list(files)
-        self._stamps = [_stamp(path) for path in self._files]
+        self.unchanged = FileWatch(*self._files)
         self._now: tuple[int, _Grid] | None = None
         first = self._grid(0)
         self._cells = first.cells
@@ -118,13 +118,6 @@ class _Steps:
         self._static = {name: values for name, values in first.point_data.items()
                         if all(np.array_equal(other.point_data.get(name), values) for other in others)}
         self._fields = list(first.point_data)
-
-    def unchanged(self) -> bool:
-        """Whether no file has been written to since this was made."""
-        try:
-            return [_stamp(path) for path in self._files] == self._stamps
-        except OSError:
-            return False
 
     def static(self) -> dict[str, np.ndarray]:
         return self._static
@@ -154,11 +147,6 @@ class _Steps:
         return self._now[1]
 
 
-def _stamp(path: Path) -> tuple[int, int]:
-    now = os.stat(path)
-    return now.st_size, now.st_mtime_ns
-
-
 class _Grid:
     """points (N, 3), data per point and cell, and cells: types, and where their nodes start and stop in a list."""
 
@@ -169,13 +157,10 @@ class _Grid:
 
 
 def _read_grid(path: Path) -> _Grid:
-    try:
-        if path.suffix.lower() == ".vtk":
-            return _legacy_grid(path)
+    if path.suffix.lower() == ".vtk":
+        return _legacy_grid(path)
+    with naming(path, *_BROKEN):
         return _Vtu(path.read_bytes()).grid()
-    except _BROKEN as error:
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise ClipError(f"{path}: {text}") from None
 
 
 def _legacy_grid(path: Path) -> _Grid:
@@ -187,7 +172,7 @@ def _legacy_grid(path: Path) -> _Grid:
         mesh = vtk.read(path)
     except OSError:
         raise
-    except Exception as error:  # a library that trusts its files fails in any way
+    except Exception as error:  # meshio trusts its files: a damaged one may raise any exception
         text = " ".join(str(error).split()) or type(error).__name__
         raise ClipError(f"{path}: the VTK file cannot be read: {text[:200]}") from None
     counts = [np.full(len(block.data), np.shape(block.data)[1] if len(block.data) else 0) for block in mesh.cells]
@@ -322,7 +307,7 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
-    """The XML of a file, and the raw bytes appended to it, which are none; None where there are none."""
+    """The XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
     found = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
     if not found:
         return data, None

@@ -8,8 +8,7 @@ HDF5 are read when a frame is asked for. One array may have 1 GiB.
 
 from __future__ import annotations
 
-import os
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -22,6 +21,7 @@ from athcodec.errors import ClipError
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import NODES, Block, blocks_of, topology_of
 from athcodec.sources.fields import clip_of_steps
+from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 from athcodec.sources.timing import times_in_seconds, whole
 
 MAX_ARRAY_BYTES = 1 << 30
@@ -47,18 +47,10 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     """Open the clip in the XDMF file `path`. Raises ClipError where it or what it names is no usable series, OSError
     where the file cannot be opened."""
     data = Data(Path(path))
-    try:
+    with naming(path, *_XML_ERRORS), closing_on_failure(data):
         steps = _Steps(data, parse_xml(Path(path).read_bytes(), "Xdmf"), options)
         time, metadata = steps.times(options)
         return clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), data, data.unchanged)
-    except (ClipError, *_XML_ERRORS, OSError) as error:
-        data.close()
-        if isinstance(error, OSError) and error.filename is not None:
-            raise
-        raise ClipError(f"{fspath(path)}: {' '.join(str(error).split())}") from None
-    except BaseException:
-        data.close()
-        raise
 
 
 def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
@@ -67,7 +59,7 @@ def parse_xml(data: bytes, tag: str) -> ElementTree.Element:
         raise ClipError("got XML with entities of its own or in UTF-16, expected plain UTF-8")
     try:
         root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an encoding that nobody knows
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # LookupError: an unknown encoding
         raise ClipError(f"got no XML: {error}") from None
     if root.tag != tag:
         raise ClipError(f"got the XML of {root.tag[:40]!r}, expected {tag}")
@@ -80,18 +72,11 @@ class Data:
     def __init__(self, path: Path):
         self._folder = path.resolve().parent
         self._files: dict[Path, h5py.File] = {}
-        self._stamps: dict[Path, tuple[int, int]] = {path.resolve(): _stamp(path)}
+        self.unchanged = FileWatch(path.resolve())
 
     def close(self) -> None:
         for file in self._files.values():
             file.close()
-
-    def unchanged(self) -> bool:
-        """Whether no file has been written to since it was opened."""
-        try:
-            return all(_stamp(path) == stamp for path, stamp in self._stamps.items())
-        except OSError:
-            return False
 
     def read(self, item: ElementTree.Element | None) -> np.ndarray:
         """The array of a DataItem. Raises ClipError."""
@@ -165,7 +150,7 @@ class Data:
         path = self._folder / name
         if not name or not path.is_file():
             raise ClipError(f"DataItem: got the file {name[:80]!r}, which does not exist")
-        self._stamps.setdefault(path, _stamp(path))
+        self.unchanged.add(path)
         return path
 
 
@@ -174,11 +159,6 @@ def _open_hdf(path: Path) -> h5py.File:
         return h5py.File(path, "r")
     except OSError as error:
         raise ClipError(f"{path.name}: the HDF5 file cannot be opened: {error}") from None
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    now = os.stat(path)
-    return now.st_size, now.st_mtime_ns
 
 
 def _dtype(item: ElementTree.Element) -> np.dtype:
@@ -355,14 +335,14 @@ def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTr
     """The temporal collection (one with the wanted field, else the first) and its grids; a single grid without one."""
     series = [grid for grid in root.iter("Grid") if grid.get("GridType") == "Collection"
               and grid.get("CollectionType", "Spatial") == "Temporal"]
-    series = [each for each in series if each.findall("Grid")]
+    series = [collection for collection in series if collection.findall("Grid")]
     if not series:
         single = [grid for grid in root.iter("Grid") if grid.get("GridType", "Uniform") == "Uniform"]
         if len(single) != 1:
             raise ClipError(f"got {len(single)} grids and no temporal collection, expected a time series or one grid")
         return None, single
-    named = [each for each in series if field and each.find(f"Grid/Attribute[@Name='{field.replace(chr(39), '')}']")
-             is not None]
+    wanted = f"Grid/Attribute[@Name='{(field or '').replace(chr(39), '')}']"
+    named = [collection for collection in series if field and collection.find(wanted) is not None]
     chosen = (named or series)[0]
     grids = chosen.findall("Grid")
     pieces = [grid for grid in grids if grid.get("GridType", "Uniform") != "Uniform"]

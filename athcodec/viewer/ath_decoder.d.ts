@@ -8,7 +8,7 @@
  *     const file = AthFile.open(bytes);
  *     const { firstSegment, segmentCount } = file.clips[0];
  *     const last = firstSegment + segmentCount - 1, segments = [];
- *     const level = file.depthFor(distance, fov, height, 1, firstSegment, last);
+ *     const level = file.levelFor(distance, fov, height, 1, firstSegment, last);
  *     for (let i = firstSegment; i <= last; i++) segments.push(file.prepare(i, level));
  *     const xyz = file.positions(segments, file.frameAt(seconds, "loop", 0));
  *
@@ -240,7 +240,7 @@ export class AthFile {
   /** The coarsest level whose largest error, seen from `distance` (scene units) under a vertical field of
    * view of `fov` (radians) on a screen `height` pixels high, is at most `pixels` in the segments `first` to
    * `last` (default: all); the deepest where none is. */
-  depthFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number): number;
+  levelFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number): number;
 
   /** Decodes a segment at a level. Throws AthError: "MISSING", "BAD_CHECKSUM", "BAD_CHUNK", "NO_MEMORY". */
   prepare(segment: number, level: number): Segment;

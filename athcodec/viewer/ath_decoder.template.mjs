@@ -96,14 +96,14 @@ class Core {
       block.size -= size;
       if (block.size === 0) this.free.splice(i, 1);
     } else {
-      this.reach(at + size);
+      this.ensure(at + size);
       this.end += size;
     }
     this.sizes.set(at, size);
     return at;
   }
 
-  reach(end) {
+  ensure(end) {
     const missing = end - this.c.memory.buffer.byteLength;
     if (missing <= 0) return;
     try {
@@ -554,8 +554,8 @@ export class AthFile {
     });
   }
 
-  depthFor(distance, fov, height, pixels, first = 0, last = this.info.segmentCount - 1) {
-    return this.#c.ath_depth_for(this.#at, this.#segment(first), this.#segment(last), number(distance, "distance"),
+  levelFor(distance, fov, height, pixels, first = 0, last = this.info.segmentCount - 1) {
+    return this.#c.ath_level_for(this.#at, this.#segment(first), this.#segment(last), number(distance, "distance"),
       number(fov, "fov"), number(height, "height"), number(pixels, "pixels"));
   }
 

@@ -26,16 +26,19 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
+SMALL = ("container.c", "decode.c", "fault.c", "file.c", "plan.c")
+"""Run once per file: compiled for size, all else for speed."""
 FLAGS = [
     "-target", "wasm32-freestanding",
     "-mcpu=generic+bulk_memory+bulk_memory_opt+nontrapping_fptoint+sign_ext+simd128",
-    "-std=c11", "-O3", "-fno-unroll-loops", "-DATH_STATIC",  # unrolled it is larger, and no faster
+    "-std=c11", "-fno-unroll-loops", "-DATH_STATIC",  # unrolled it is larger, and no faster
     # the bits of positions are part of the format, as in core/CMakeLists.txt
     "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
     "-Wall", "-Wextra", "-Werror",
-    # Zig puts the stack below the data, where an overflow traps
-    "-nostdlib", "-s", "-Wl,--no-entry", f"-Wl,-z,stack-size={STACK_BYTES}",
+    "-nostdlib", "-s",
 ]
+# Zig puts the stack below the data, where an overflow traps
+LINKING = ["-Wl,--no-entry", f"-Wl,-z,stack-size={STACK_BYTES}"]
 
 PAYLOAD = re.compile(r'(const WASM = ")([^"]*)(";)')
 
@@ -70,13 +73,21 @@ def compile_decoder(template: str) -> bytes:
     """The decoder as a WebAssembly module."""
     check_compiler()
     wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
+    sources = [*decoder_sources(), VIEWER / "wasm.c"]
+    small = [path for path in sources if path.name in SMALL]
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, *wanted, "-I", str(CORE),
-                   *map(str, [*decoder_sources(), VIEWER / "wasm.c"]), "-o", "decoder.wasm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise BuildError(f"zig cc: got exit status {done.returncode}, expected 0:\n{done.stderr}")
+        for path in small:
+            _zig(folder, "-Os", "-c", str(path), "-o", f"{path.stem}.o")
+        _zig(folder, "-O3", *LINKING, *wanted, *(str(path) for path in sources if path not in small),
+             *(f"{path.stem}.o" for path in small), "-o", "decoder.wasm")
         return (Path(folder) / "decoder.wasm").read_bytes()
+
+
+def _zig(folder: str, *arguments: str) -> None:
+    command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE), *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise BuildError(f"zig cc: got exit status {done.returncode}, expected 0:\n{done.stderr}")
 
 
 def pack(template: str, wasm: bytes) -> str:

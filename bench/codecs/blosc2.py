@@ -11,13 +11,13 @@ from itertools import product
 
 import numpy as np
 
-from bench.codecs.peer import FLAT_LAYOUTS, Peer, all_of, each, from_zigzag, narrowest, zigzag
+from bench.codecs.program import FLAT_LAYOUTS, Program, decode_arrays, encode_arrays, from_zigzag, narrowest, zigzag
 
 FILTERS = ("SHUFFLE", "BITSHUFFLE", "BYTEDELTA")
 MANTISSA = 23
 
 
-class Blosc2(Peer):
+class Blosc2(Program):
     name, module, package = "Blosc2", "blosc2", "blosc2"
     forms = ("integers", "floats")
     strengths = tuple(range(MANTISSA + 1))
@@ -30,7 +30,7 @@ class Blosc2(Peer):
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:
         layout, filters, folded = choice
         numbers = narrowest(zigzag(values) if folded else values)
-        packed = each(lambda part: self._packed(part, filters, thorough), numbers, layout)
+        packed = encode_arrays(lambda part: self._packed(part, filters, thorough), numbers, layout)
         return bytes([numbers.itemsize]) + packed
 
     def decode_integers(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
@@ -41,7 +41,7 @@ class Blosc2(Peer):
     def encode_floats(self, values: np.ndarray, strength: float | None, choice, thorough: bool) -> bytes:
         layout, filters, _ = choice
         rounded = _rounded(values, MANTISSA if strength is None else int(strength))
-        return each(lambda part: self._packed(part, filters, thorough), rounded, layout)
+        return encode_arrays(lambda part: self._packed(part, filters, thorough), rounded, layout)
 
     def decode_floats(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         return self._unpacked(data, "f4", choice[0], shape)
@@ -59,7 +59,7 @@ class Blosc2(Peer):
 
     def _unpacked(self, data: bytes, dtype: str, layout: str, shape: tuple[int, int, int]) -> np.ndarray:
         decompress = self.load().decompress2
-        return all_of(lambda blob, part: np.frombuffer(decompress(blob, nthreads=1), dtype).reshape(part),
+        return decode_arrays(lambda blob, part: np.frombuffer(decompress(blob, nthreads=1), dtype).reshape(part),
                       data, layout, shape)
 
 

@@ -4,8 +4,8 @@ Vasa and Skala, "CoDDyAC: connectivity driven dynamic mesh compression", 3DTV-CO
 learned basis of trajectories; each vertex has few coefficients, predicted from those of its decoded
 neighbours, and the integer differences are coded. Here the neighbours are those of the branch hierarchy, in
 place of the parallelogram on a mesh: the vertex below, and its step from the one before that, in proportion
-to the distances in the coded pose. Both are weighted per component, by least squares that know of the
-quantisation noise (an addition, as are corrections and the dead zone). The basis is coded as in pca.py, not
+to the distances in the coded pose. Both are weighted per component, by least squares that account for
+the quantisation noise (an addition, as are corrections and the dead zone). The basis is coded as in pca.py, not
 by its own prediction (Vasa and Skala, "COBRA", 2009).
 """
 
@@ -14,19 +14,20 @@ from __future__ import annotations
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import (
-    DEAD_ZONES,
-    STEPS,
-    Trajectories,
+    GRID,
     fitted_to,
-    mean_motion,
+    grid_of,
     read_basis,
+    read_front,
+    significant,
     source_basis,
     write_basis,
+    write_front,
 )
-from bench.codecs.tree import VertexOrder, read_order, read_pose, vertex_order, write_order, write_pose
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
+from bench.codecs.tree import VertexOrder
 
 WEIGHT_STEPS = 32
 
@@ -35,62 +36,42 @@ class Coddyac(Baseline):
     title = "trajectory PCA + hierarchy (CoDDyAC)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "keep": Ladder.geometric(0.01, 2.5, 0.2),
-            "basis": Ladder.geometric(0.05, 4, 0.4),
-            "joint": Split((0, 1)),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.25),
-        }
+        return grid_of(
+            "step keep basis joint dead_zone pose",
+            keep=GRID["keep"].starting_at(0.2),
+            basis=GRID["basis"].starting_at(0.4),
+            pose=GRID["pose"].starting_at(0.25),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, "hierarchy")
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        trajectories = Trajectories(bool(settings["joint"]), writer.count(motion.shape[2]))
-        writer.count(settings["joint"])
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        rows = trajectories.rows(motion + (mean - pose)[:, :, None])
-        values, basis = source_basis(source, order, trajectories)
-        count = max(1, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
-        steps = (
-            settings["basis"]
-            * step
-            * np.sqrt(len(rows) / trajectories.frames)
-            / np.maximum(values[:count], 1e-30)
-        )
-        basis = write_basis(writer, basis[:count], steps, trajectories)
-        units = fitted_to(basis, rows).reshape(len(order.source), -1, count) / step
-        reach = _reach(order, pose)
-        weights = writer.table(_weights(units, order, reach))
+        order, trajectories, pose, motion, step = write_front(writer, source, bound, settings)
+        rows = trajectories.rows(motion)
+        spectrum = source_basis(source, order, trajectories)
+        basis = write_basis(writer, *significant(spectrum, rows, step, settings, trajectories, 1), trajectories)
+        units = fitted_to(basis, rows).reshape(len(order.source), -1, len(basis)) / step
+        step_ratio = _step_ratio(order, pose)
+        weights = writer.table(_weights(units, order, step_ratio))
         q = np.zeros(units.shape, np.int64)
 
         def add(vertices: np.ndarray, predicted: np.ndarray) -> np.ndarray:
             q[vertices] = quantised(units[vertices] - predicted, settings["dead_zone"])
             return q[vertices]
 
-        _predicted(order, reach, weights, units.shape, add)
-        writer.rows(trajectories.to_axes(q.reshape(-1, count)))
+        _predicted(order, step_ratio, weights, units.shape, add)
+        writer.rows(trajectories.to_axes(q.reshape(-1, len(basis))))
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose, step = read_pose(reader, order), reader.single()
+        order, trajectories, pose, step = read_front(reader)
         basis = read_basis(reader, trajectories)
         weights = reader.table()
         q = trajectories.from_axes(reader.rows(), len(basis)).reshape(len(order.source), -1, len(basis))
-        units = _predicted(order, _reach(order, pose), weights, q.shape, lambda vertices, _: q[vertices])
+        units = _predicted(order, _step_ratio(order, pose), weights, q.shape, lambda vertices, _: q[vertices])
         return trajectories.motion(units.reshape(-1, len(basis)) @ (basis * step)) + pose[:, :, None], order
 
 
-def _reach(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
-    """(N, 1, 1): how far a vertex is from the one before, over the distance of that from the one before it;
-    0: none.
-    """
+def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
+    """(N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
     before, before2 = order.before, order.before2
     own = np.linalg.norm(pose - pose[before], axis=1)
     last = np.linalg.norm(pose[before] - pose[before2], axis=1)
@@ -98,13 +79,13 @@ def _reach(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
     return np.where(before2 >= 0, np.minimum(ratio, 2), 0)[:, None, None]
 
 
-def _weights(units: np.ndarray, order: VertexOrder, reach: np.ndarray) -> np.ndarray:
-    """(2, K) integers: weights of the vertex before, and of its step, that foretell each component best."""
+def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
+    """(2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
     some = np.flatnonzero(order.before >= 0)
     own, near = units[some], units[order.before[some]]
-    step = reach[some] * (near - units[order.before2[some]])
+    step = step_ratio[some] * (near - units[order.before2[some]])
     noise = np.minimum(1 / 12, (units**2).mean(axis=(0, 1)))
-    along, r1, r2 = own.shape[0] * own.shape[1], reach[some].mean(), (reach[some] ** 2).mean()
+    along, r1, r2 = own.shape[0] * own.shape[1], step_ratio[some].mean(), (step_ratio[some] ** 2).mean()
     a = (near**2).sum(axis=(0, 1)) + noise * along
     b = (near * step).sum(axis=(0, 1)) + noise * along * r1
     c = (step**2).sum(axis=(0, 1)) + 2 * noise * along * r2
@@ -115,15 +96,15 @@ def _weights(units: np.ndarray, order: VertexOrder, reach: np.ndarray) -> np.nda
 
 
 def _predicted(
-    order: VertexOrder, reach: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
+    order: VertexOrder, step_ratio: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
 ) -> np.ndarray:
-    """Coefficients (N, W, K) in steps: what the weights foretell and `residual(vertices, predicted)`."""
+    """Coefficients (N, W, K) in steps: the weighted prediction plus `residual(vertices, predicted)`."""
     units = np.zeros(shape)
     near, along = weights / WEIGHT_STEPS
     for vertices in order.generations:
         before, before2 = order.before[vertices], order.before2[vertices]
         base = units[before]
-        predicted = near * base + (along * reach[vertices]) * (base - units[before2])
+        predicted = near * base + (along * step_ratio[vertices]) * (base - units[before2])
         predicted[before < 0] = 0
         units[vertices] = predicted + residual(vertices, predicted)
     return units

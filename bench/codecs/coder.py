@@ -1,9 +1,8 @@
-"""Entropy coders of the baselines: athcodec's own (coder.c, compiled here with the core's flags) and zstd
--19.
+"""Entropy coders of the baselines: athcodec's (coder.c, compiled here with the core's flags) and zstd -19.
 
 Both take the same arrays of integers: rows of three axes over frequency, and tables of anything else.
-`Writer` strings such arrays and a few numbers together, each with its own shape and length, and `Reader`
-takes them apart again, so that nothing reaches a decoder that was not counted. Hierarchy and corrections are
+`Writer` concatenates such arrays and a few numbers, each with its shape and length, and `Reader` parses them, so that a
+decoder gets nothing that was not counted. Hierarchy and corrections are
 coded as athcodec codes them, whatever the entropy coder. Integers of any size up to 64 bits are taken; those
 of 30 bits or more are split, which baselines never need.
 """
@@ -18,6 +17,7 @@ import shutil
 import struct
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from ctypes import c_double, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -36,7 +36,7 @@ LOW_BITS = 24
 
 
 class DamagedStream(Exception):
-    """Bytes that no writer of this module makes."""
+    """Bytes that are not a stream of this module."""
 
 
 # ---- coder.c ----
@@ -48,26 +48,24 @@ def compiler() -> list[str] | None:
     return found.split() if found else None
 
 
-@cache
-def library(writes: bool) -> ctypes.CDLL:
-    """coder.c for one direction; compiled once per process."""
+def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
+    """Compiles C with the options that CMakeLists.txt gives the core."""
     command = compiler()
     if command is None:
         raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
     flags = re.findall(r"^\s*(-f[\w=-]+)", (CORE / "CMakeLists.txt").read_text(), re.MULTILINE)
+    command += ["-std=c11", "-O3", *flags, f"-I{CORE}", *options]
+    subprocess.run([*command, "-o", target, *sources, "-lm"], check=True)
+
+
+@cache
+def library(writes: bool) -> ctypes.CDLL:
+    """coder.c for one direction; compiled once per process."""
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
-    options = [
-        "-std=c11",
-        "-O3",
-        *flags,
-        f"-I{CORE}",
-        "-shared",
-        "-fPIC",
-        *(["-DATH_ENCODING"] if writes else []),
-    ]
-    subprocess.run([*command, *options, "-o", file, Path(__file__).with_name("coder.c"), "-lm"], check=True)
+    options = ["-shared", "-fPIC", *(["-DATH_ENCODING"] if writes else [])]
+    compile_c(file, [Path(__file__).with_name("coder.c")], *options)
     loaded = ctypes.CDLL(str(file))
     arguments = {
         "bench_rows": [c_int32] * 3 + [c_void_p],
@@ -96,7 +94,7 @@ def _written(name: str, capacity: int, *arguments) -> bytes:
 def _read(name: str, data: bytes, *arguments) -> None:
     array = np.frombuffer(data, np.uint8) if data else np.zeros(1, np.uint8)
     if not getattr(library(False), name)(array.ctypes.data, len(data), *arguments):
-        raise DamagedStream(f"{name}: got {len(data)} bytes that are no such stream")
+        raise DamagedStream(f"{name}: got {len(data)} bytes that are not such a stream")
 
 
 # ---- entropy coders ----
@@ -125,7 +123,7 @@ class RangeCoder:
         return self
 
     def rows(self, rows: np.ndarray, unit: int) -> bytes:
-        """As motion coefficients, or as a table, whatever is smaller."""
+        """As motion coefficients or as a table, whichever is smaller."""
         streams = [self._motion_rows(rows, unit), self.table(rows.reshape(len(rows), -1))]
         smaller = int(len(streams[1]) < len(streams[0]))
         return bytes([smaller]) + streams[smaller]
@@ -162,10 +160,10 @@ class RangeCoder:
 
 
 class Zstd:
-    """zstd after a layout that serves it.
+    """zstd after a rearrangement of bytes.
 
-    Every line of numbers is in as few bytes as its largest one needs, plane by plane. Lines are vertices or
-    frequencies, whatever is smaller.
+    Every line of numbers has as many bytes per number as its largest one needs, plane by plane. Lines are vertices or
+    frequencies, whichever is smaller.
     """
 
     name = "zstd -19"
@@ -174,7 +172,7 @@ class Zstd:
         self.level = level
 
     def quick(self) -> Zstd:
-        """Fast enough for a search: what is smaller there is nearly always smaller at 19."""
+        """A fast level for the search; the order of sizes is nearly always that of level 19."""
         return Zstd(3)
 
     def rows(self, rows: np.ndarray, unit: int) -> bytes:
@@ -201,9 +199,7 @@ class Zstd:
 
 
 def _byte_lines(table: np.ndarray) -> bytes:
-    """Bytes per number of each line, then its numbers, signs in the lowest bit: all lowest bytes, then the
-    next.
-    """
+    """Bytes per number of each line, then its numbers, signs in the lowest bit: all lowest bytes, then the next."""
     folded = ((table.astype(np.int64) << 1) ^ (table.astype(np.int64) >> 63)).astype("<u4")
     largest = folded.max(axis=1, initial=0)
     widths = (largest > 0).astype(np.uint8) + (largest > 0xFF) + (largest > 0xFFFF) + (largest > 0xFFFFFF)
@@ -228,7 +224,7 @@ def _blocks(frames: int) -> range:
 
 
 def _join(streams: list[bytes]) -> bytes:
-    """Streams behind each other; all but the last with their length."""
+    """Concatenated streams; all but the last have their length in front."""
     return b"".join(varint(len(stream)) + stream for stream in streams[:-1]) + streams[-1]
 
 
@@ -263,13 +259,11 @@ def read_varint(data: bytes, at: int) -> tuple[int, int]:
             return value, at
 
 
-# ---- what an encoding consists of ----
+# ---- parts of an encoding ----
 
 
 class Writer:
-    """Parts of an encoding, in the order in which they are read. Each method gives back what a reader will
-    get.
-    """
+    """Parts of an encoding, in the order in which they are read. Each method returns what a reader will get."""
 
     def __init__(self, coder: EntropyCoder):
         self.coder = coder
@@ -285,7 +279,7 @@ class Writer:
         return b"".join(self.parts)
 
     def echo(self) -> Echo:
-        """A reader of what was written, without decoding it."""
+        """A reader of the written values, without decoding."""
         return Echo(self.values)
 
     def count(self, value: int) -> int:
@@ -302,7 +296,7 @@ class Writer:
         return self._add(head + coded, wide)
 
     def table(self, table: np.ndarray) -> np.ndarray:
-        """(R, C) integers of any kind; neighbours of like magnitude are best."""
+        """(R, C) integers of any kind; best if neighbours are of similar magnitude."""
         head = b"".join(map(varint, table.shape))
         coded, wide = self._integers(table, self.coder.table)
         return self._add(head + coded, wide)
@@ -400,10 +394,9 @@ class Reader:
 
 
 def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -> bytes:
-    """Brings every vertex of (N, 3, T) float32 positions within `limit` of `wanted`, float64.
+    """Corrects (N, 3, T) float32 positions in place, so that every vertex is within `limit` of `wanted`, float64.
 
-    In place, as athcodec does it. Segments of SEGMENT_FRAMES frames: the step, then per segment a length and
-    the stream.
+    As in athcodec, in segments of SEGMENT_FRAMES frames: the step, then a length and a stream for each segment.
     """
     starts = range(0, positions.shape[2], SEGMENT_FRAMES)
     factor = 1.0

@@ -13,7 +13,7 @@ import struct
 
 import numpy as np
 
-from bench.codecs.peer import CannotKeep, Peer, join, split
+from bench.codecs.program import CannotKeep, Program, join, split
 
 LEVELS = (10, 7)  # more effort by itself is not always smaller
 FLOAT_BITS = 24  # what a float32 coordinate holds exactly
@@ -21,7 +21,7 @@ INTEGER_BITS = 30  # wider ones are coded as two halves, since it refuses differ
 WIDE = 84  # frames or vertices in one point: 252 components
 
 
-class Draco(Peer):
+class Draco(Program):
     name, module, package = "Draco", "DracoPy", "DracoPy"
 
     def choices(self, form: str) -> list:

@@ -10,12 +10,12 @@ import struct
 
 import numpy as np
 
-from bench.codecs.peer import CannotKeep, Peer, all_of, each
+from bench.codecs.program import CannotKeep, Program, decode_arrays, encode_arrays
 
 MANTISSA, SINGLE, DOUBLE = 23, 9, 12  # bits of a float's mantissa; of sign and exponent
 
 
-class Fpzip(Peer):
+class Fpzip(Program):
     name, module, package = "fpzip", "fpzip", "fpzip"
     forms, lossless_forms = ("integers", "floats"), ("floats",)
     strengths = tuple(range(10, 33))
@@ -47,8 +47,8 @@ class Fpzip(Peer):
             except fpzip.FpzipError as error:
                 raise CannotKeep(f"fpzip: {error}") from error
 
-        return each(encode, values, choice)
+        return encode_arrays(encode, values, choice)
 
     def _decoded(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         fpzip = self.load()
-        return all_of(lambda blob, part: fpzip.decompress(blob).reshape(part), data, choice, shape)
+        return decode_arrays(lambda blob, part: fpzip.decompress(blob).reshape(part), data, choice, shape)

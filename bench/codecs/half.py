@@ -1,7 +1,7 @@
-"""float16, or integers of as many bits as the bound needs, and zstd at level 19: no codec at all.
+"""float16, or integers of as many bits as the bound needs, and zstd at level 19: without a codec.
 
 Halves keep a bound only where displacements are small against it; integers on its grid always do. Bytes are
-shuffled where that pays. Left out: an entropy coder of its own (see the baselines for those).
+shuffled where that is smaller. Left out: an entropy coder (see the baselines).
 """
 
 from __future__ import annotations
@@ -10,23 +10,23 @@ from itertools import product
 
 import numpy as np
 
-from bench.codecs.peer import (
+from bench.codecs.program import (
     FLAT_LAYOUTS,
     CannotKeep,
-    Peer,
+    Program,
+    arrays_of,
     deflate,
+    from_arrays,
     from_planes,
     from_zigzag,
     inflate,
     narrowest,
-    parts,
     planes,
-    whole,
     zigzag,
 )
 
 
-class Half(Peer):
+class Half(Program):
     name, module, package = "float16 or integers + zstd", "zstandard", "zstandard"
     forms = ("integers", "floats")
     strengths = (0,)  # a half is a half
@@ -54,11 +54,11 @@ class Half(Peer):
 
 def _packed(numbers: np.ndarray, choice, thorough: bool) -> bytes:
     layout, shuffled = choice
-    [row] = parts(numbers, layout)
+    [row] = arrays_of(numbers, layout)
     return deflate(planes(row.ravel()) if shuffled else row.tobytes(), 19 if thorough else 9)
 
 
 def _unpacked(data: bytes, dtype: str, choice, shape: tuple[int, int, int]) -> np.ndarray:
     layout, shuffled = choice
     raw = inflate(data)
-    return whole([from_planes(raw, dtype) if shuffled else np.frombuffer(raw, dtype)], layout, shape)
+    return from_arrays([from_planes(raw, dtype) if shuffled else np.frombuffer(raw, dtype)], layout, shape)

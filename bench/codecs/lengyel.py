@@ -1,4 +1,4 @@
-"""Baseline: one moving frame per part, and principal components of what it leaves.
+"""Baseline: one moving frame per part, and principal components of the residuals.
 
 Lengyel, "Compression of time-dependent geometry", I3D 1999: vertices are grouped, each
 group is moved by an affine or rigid map per frame, and the residuals are coded. Here parts are the stems of
@@ -15,8 +15,9 @@ import numpy as np
 
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
-from bench.codecs.pca import DEAD_ZONES, STEPS, Trajectories, cosines, principal, read_group, write_group
+from bench.codecs.pca import GRID, Trajectories, cosines, grid_of, principal, read_group, write_group
 from bench.codecs.tree import (
     VertexOrder,
     memo,
@@ -27,10 +28,9 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
-LEAST_EXTENT = 1e-3  # of the part's largest: what is flatter has no stretch of its own
-STILL = 1e-3  # pull towards no turn, which decides the twist of straight parts
+LEAST_EXTENT = 1e-3  # of the part's largest; flatter directions are not stretched
+REGULARISATION = 1e-3  # towards no rotation, which determines the twist of straight parts
 
 
 class Lengyel(Baseline):
@@ -38,22 +38,18 @@ class Lengyel(Baseline):
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         depths = tuple(range(min(3, int(source.hierarchy.branch_depth.max())) + 1))
-        return {
-            "rigid": Choice((0, 1)),
-            "joint": Choice((0, 1), 1),
-            "depth": Split(depths),
-            "step": STEPS,
-            "learned": Choice((0, 1)),
-            "keep_tracks": Ladder.geometric(0.01, 2.5, 0.1),
-            "tracks": Ladder.geometric(0.18, 2, 0.7),
-            "keep": Ladder.geometric(0.01, 40, 0.3),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "pose_of": Choice(("mean", "rest")),
-            "differences": Choice((0, 1, 2), 2),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.25),
-            "first": Choice(("tracks", "shapes")),
-        }
+        return grid_of(
+            "rigid joint depth step learned keep_tracks tracks keep basis pose_of differences dead_zone pose first",
+            rigid=Choice((0, 1)),
+            joint=Choice((0, 1), 1),
+            depth=Split(depths),
+            learned=Choice((0, 1)),
+            keep_tracks=GRID["keep"].starting_at(0.1),
+            tracks=Ladder.geometric(0.18, 2, 0.7),
+            keep=Ladder.geometric(0.01, 40, 0.3),
+            pose_of=Choice(("mean", "rest")),
+            pose=GRID["pose"].starting_at(0.25),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
         order = vertex_order(source, "hierarchy")
@@ -78,7 +74,7 @@ class Lengyel(Baseline):
         )
         residual = positions - place(_write_tracks(writer, exact, track_step, settings))
         step = writer.single(settings["step"] * bound)
-        # what another trial left at about this step is near enough, and saves most of the time
+        # the basis of another trial's residual at about this step is close enough, and saves most of the time
         near = (
             rigid,
             depth,
@@ -87,7 +83,7 @@ class Lengyel(Baseline):
             settings["learned"],
             round(2 * np.log2(track_step)),
         )
-        spectrum = memo(source, ("left", *near), lambda: principal(trajectories.rows(residual)))
+        spectrum = memo(source, ("residual", *near), lambda: principal(trajectories.rows(residual)))
         write_group(writer, residual, order, spectrum, step, settings, trajectories)
         return order
 
@@ -103,7 +99,7 @@ class Lengyel(Baseline):
 
 
 def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Settings) -> np.ndarray:
-    """Tracks (parts, k, 3, T) by cosines or by a learned basis in time; returns what a reader will have."""
+    """Tracks (parts, k, 3, T) by cosines or by a learned basis in time; returns what a reader will decode."""
     parts, count, _, frames = exact.shape
     writer.count(count)
     if writer.count(settings["learned"]):
@@ -193,7 +189,7 @@ class Parts:
         spread = np.stack([self.sum_of(around * self.around[:, i, None, None]) for i in range(3)], axis=2)
         spread = np.moveaxis(spread, 3, 1)  # (parts, T, 3, 3): where to, where from
         extent = self.sum_of((self.around**2).sum(axis=1))
-        spread = spread + STILL * np.maximum(extent, 1e-12)[:, None, None, None] * np.eye(3)
+        spread = spread + REGULARISATION * np.maximum(extent, 1e-12)[:, None, None, None] * np.eye(3)
         left, _, right = np.linalg.svd(spread)
         left[..., 2] *= np.linalg.det(left @ right)[..., None]
         turns = np.moveaxis(_rotation_vectors(left @ right), 1, 2)

@@ -1,5 +1,4 @@
-"""Baseline: positions on a grid, differences along time and from vertex to vertex, and an entropy coder. No
-model.
+"""Baseline: positions on a grid, differences in time and from vertex to vertex, and an entropy coder.
 
 The Lorenzo predictor of Ibarria and Rossignac ("Dynapack", SCA 2003) in all degrees: differences
 of degree 0 to 3 in time of differences of degree 0 to 2 along the order of vertices. The grid is searched
@@ -11,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.tree import (
     ORDERS,
@@ -22,11 +22,10 @@ from bench.codecs.tree import (
     vertex_order,
     write_order,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings
 
 
 def write_lorenzo(writer: Writer, q: np.ndarray, order: VertexOrder, in_time: int, along: int) -> None:
-    """Integers (N, 3, T); the first frame apart, since it is a pose."""
+    """Integers (N, 3, T); the first frame separately, since it is a pose."""
     residual = differences(q, order, along)
     if in_time == 0:
         writer.count(0)

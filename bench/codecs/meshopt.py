@@ -1,4 +1,4 @@
-"""meshoptimizer (Kapoulkine 2016 and later): its vertex codec, version 1, then zstd where it pays.
+"""meshoptimizer (Kapoulkine 2016 and later): its vertex codec, version 1, then zstd where that is smaller.
 
 Elements are vertices with one or many frames each, or frames with many vertices each: the codec takes
 differences of neighbouring elements, byte by byte. Integers are as narrow as they can be. Left out: its
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.codecs.peer import Peer, deflate, from_zigzag, inflate, join, narrowest, split, zigzag
+from bench.codecs.program import Program, deflate, from_zigzag, inflate, join, narrowest, split, zigzag
 
 STRIDE = 256  # the most bytes of one element
 
 
-class Meshopt(Peer):
+class Meshopt(Program):
     name, module, package = "meshoptimizer", "meshoptimizer", "meshoptimizer"
 
     def choices(self, form: str) -> list:

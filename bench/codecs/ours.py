@@ -1,4 +1,4 @@
-"""athcodec itself: a whole .ath file without attributes, at the default effort, and as small as it gets."""
+"""athcodec: a whole .ath file without attributes, at the default effort, and as small as possible."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Athcodec:
     """The file as users get it, with levels of detail.
 
     `single_depth`: thresholds that take the whole plant for one node, so that no branch has a level of its
-    own and all stems come with the last one. One map per frame, of the whole plant, is left.
+    own and all stems come with the last one. Only one map per frame, of the whole plant, remains.
     """
 
     kind = "athcodec"
@@ -58,9 +58,9 @@ class Athcodec:
 
 
 class LongSegments(Athcodec):
-    """With the longest segments that there are and the longest search, at the price of coarser seeking.
+    """With the longest segments and the longest search, at the cost of coarser seeking.
 
-    The others code a clip as a whole: for clips of up to 256 frames, so does this.
+    The others code a clip as a whole; for clips of up to 256 frames, so does this.
     """
 
     effort = "best"
@@ -72,7 +72,7 @@ class LongSegments(Athcodec):
 
 
 class LosslessAthcodec(Athcodec):
-    """With a level behind the others that gives every bit back."""
+    """With an additional lossless level."""
 
     lossless = True
 

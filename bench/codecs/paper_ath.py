@@ -15,6 +15,7 @@ import numpy as np
 from athcodec.ath import Ath, Thresholds, stem_maps, survey
 from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.lorenzo import read_lorenzo, write_lorenzo
 from bench.codecs.tree import (
@@ -27,7 +28,6 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 BITS = Split((12, 16, 20), 1)
 
@@ -148,7 +148,7 @@ class _Pieces:
 
 
 def _write_entries(writer: Writer, entries: np.ndarray, settings: Settings) -> np.ndarray:
-    """(T, pieces, k) as integers over their range; returns what a reader will have."""
+    """(T, pieces, k) as integers over their range; returns what a reader will decode."""
     low = writer.single(entries.min())
     step = writer.single(max(entries.max() - low, 1e-30) / (2 ** settings["bits"] - 2))
     q = np.rint((entries - low) / step).astype(np.int64)

@@ -9,12 +9,12 @@
 * Sattler, Sarlette and Klein, "Simple and efficient compression of animation sequences", SCA 2005:
   trajectories in clusters with a basis each (Lloyd's algorithm with the distance to a cluster's basis).
 
-Left out of all: rigid motion taken off before (a plant is rooted), and meshes' connectivity (the order of
-vertices does). The mean of each vertex is subtracted and coded. Of the two factors the larger has one step
-for all (what is uniform error in the positions); each component of the smaller one gets the precision that it
-needs. Basis vectors are coded as they are, or by the cosines of their own (for the smooth ones), whatever is
-smaller. None of the papers predicts coefficients from a neighbour's; here each component may be, by
-differences of the integers along the order of vertices, because that halves the sizes.
+Left out of all: removal of rigid motion (a plant is rooted), and meshes' connectivity (the order of vertices
+replaces it). The mean of each vertex is subtracted and coded. The larger of the two factors has a
+uniform step (uniform error in the positions); each component of the smaller one gets the precision that it needs. Basis
+vectors are coded as they are or by their cosine transform (for smooth ones), whichever is smaller. None of the papers
+predicts coefficients from a neighbour's; here each component may be, by differences of the integers along the order of
+vertices, because that halves the sizes.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from functools import cache
 import numpy as np
 
 from bench.codecs import Source
+from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.tree import (
     ORDERS,
@@ -39,11 +40,24 @@ from bench.codecs.tree import (
     write_order,
     write_pose,
 )
-from bench.codecs.tuned import Baseline, Choice, Ladder, Settings, Split, quantised
 
 COARSEST_BASIS = -2  # half octaves
-STEPS = Ladder.geometric(0.5, 12, 2.0, 4)
-DEAD_ZONES = Ladder((0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8), 2)
+GRID: dict[str, Ladder | Choice] = {
+    "step": Ladder.geometric(0.5, 12, 2.0, 4),
+    "keep": Ladder.geometric(0.01, 2.5, 0.15),
+    "basis": Ladder.geometric(0.05, 4, 0.7),
+    "joint": Split((0, 1)),
+    "differences": Choice((0, 1, 2), 2),
+    "first": Choice(("tracks", "shapes")),
+    "dead_zone": Ladder((0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8), 2),
+    "pose": Ladder.geometric(0.05, 2, 0.5),
+    "order": Choice(ORDERS, 1),
+}
+
+
+def grid_of(names: str, **own: Ladder | Choice) -> dict[str, Ladder | Choice]:
+    """Settings by name, in the order of the search: those of GRID, and the codec's own."""
+    return {name: own.get(name) or GRID[name] for name in names.split()}
 
 
 # ---- trajectories and bases ----
@@ -117,7 +131,7 @@ def source_basis(
 def write_basis(
     writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories, lpc: int = 0
 ) -> np.ndarray:
-    """Basis rows (K, length), each at about its step; returns what a reader will have."""
+    """Basis rows (K, length), each at about its step; returns what a reader will decode."""
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
@@ -213,6 +227,21 @@ def read_coefficients(reader: Reader, order: VertexOrder, trajectories: Trajecto
     return q.reshape(-1, len(degrees))
 
 
+def significant(
+    spectrum: tuple[np.ndarray, np.ndarray],
+    rows: np.ndarray,
+    step: float,
+    settings: Settings,
+    trajectories: Trajectories,
+    least: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The basis vectors that are worth their bytes, at least `least`, and the step of each."""
+    values, basis = spectrum
+    count = max(least, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
+    steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / np.maximum(values[:count], 1e-30)
+    return basis[:count], steps
+
+
 def write_group(
     writer: Writer,
     motion: np.ndarray,
@@ -225,15 +254,12 @@ def write_group(
 ) -> np.ndarray:
     """Motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
 
-    Returns what a reader will have.
+    Returns what a reader will decode.
     """
-    values, basis = spectrum
     rows = trajectories.rows(motion)
-    count = writer.count(int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
-    if count == 0:
+    basis, steps = significant(spectrum, rows, step, settings, trajectories)
+    if writer.count(len(basis)) == 0:
         return np.zeros_like(motion)
-    values, basis = values[:count], basis[:count]
-    steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / values
     if settings["first"] == "shapes":
         q = quantised(rows @ basis.T / step, settings["dead_zone"])
         shapes = q.astype(np.float64)
@@ -247,7 +273,7 @@ def write_group(
 
 
 def _inverse(normal: np.ndarray) -> np.ndarray:
-    """Of a matrix that least squares solve with; components that quantised to nothing stay out."""
+    """Of the normal matrix of least squares, regularised for components that are quantised to zero."""
     return np.linalg.inv(normal + max(1e-12 * np.trace(normal) / len(normal), 1e-30) * np.eye(len(normal)))
 
 
@@ -265,6 +291,28 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
     return trajectories.motion((coefficients * step) @ basis)
 
 
+# ---- the common front of an encoding ----
+
+
+def write_front(
+    writer: Writer, source: Source, bound: float, settings: Settings
+) -> tuple[VertexOrder, Trajectories, np.ndarray, np.ndarray, float]:
+    """Order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
+    order = vertex_order(source, settings.get("order", "hierarchy"))
+    write_order(writer, order)
+    mean, motion = mean_motion(source, order)
+    frames = writer.count(motion.shape[2])
+    trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
+    pose = write_pose(writer, order, mean, settings["pose"] * bound)
+    return order, trajectories, pose, motion + (mean - pose)[:, :, None], writer.single(settings["step"] * bound)
+
+
+def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, float]:
+    """Order, kind of trajectories, mean pose (N, 3) and step."""
+    order, frames = read_order(reader), reader.count()
+    return order, Trajectories(bool(reader.count()), frames), read_pose(reader, order), reader.single()
+
+
 # ---- the baselines ----
 
 
@@ -273,46 +321,19 @@ class GlobalPca(Baseline):
     degrees: tuple[int, ...] = (0,)  # of linear prediction
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "keep": Ladder.geometric(0.01, 2.5, 0.15),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "joint": Split((0, 1)),
-            "differences": Choice((0, 1, 2), 2),
-            "first": Choice(("tracks", "shapes")),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.5),
-            "lpc": Choice(self.degrees),
-            "order": Choice(ORDERS, 1),
-        }
+        return grid_of(
+            "step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees)
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, settings["order"])
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        frames = writer.count(motion.shape[2])
-        trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        motion = motion + (mean - pose)[:, :, None]
-        write_group(
-            writer,
-            motion,
-            order,
-            source_basis(source, order, trajectories),
-            step,
-            settings,
-            trajectories,
-            settings["lpc"],
-        )
+        order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
+        spectrum = source_basis(source, order, trajectories)
+        write_group(writer, motion, order, spectrum, step, settings, trajectories, settings["lpc"])
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose = read_pose(reader, order)
-        return read_group(reader, order, reader.single(), trajectories) + pose[:, :, None], order
+        order, trajectories, pose, step = read_front(reader)
+        return read_group(reader, order, step, trajectories) + pose[:, :, None], order
 
 
 class PredictedPca(GlobalPca):
@@ -326,32 +347,17 @@ class PredictedPca(GlobalPca):
 class ClusteredPca(Baseline):
     title = "clustered PCA (Sattler)"
     counts = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96)
-    rank = 8  # of the bases that the clusters are formed by
+    rank = 8  # of the bases that define the clusters
     turns = 8
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return {
-            "step": STEPS,
-            "clusters": Ladder(self.counts, 4),
-            "keep": Ladder.geometric(0.01, 2.5, 0.15),
-            "basis": Ladder.geometric(0.05, 4, 0.7),
-            "joint": Split((0, 1)),
-            "differences": Choice((0, 1, 2), 2),
-            "first": Choice(("tracks", "shapes")),
-            "dead_zone": DEAD_ZONES,
-            "pose": Ladder.geometric(0.05, 2, 0.5),
-            "order": Choice(ORDERS, 1),
-        }
+        return grid_of(
+            "step clusters keep basis joint differences first dead_zone pose order",
+            clusters=Ladder(self.counts, 4),
+        )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        order = vertex_order(source, settings["order"])
-        write_order(writer, order)
-        mean, motion = mean_motion(source, order)
-        trajectories = Trajectories(bool(settings["joint"]), writer.count(motion.shape[2]))
-        writer.count(settings["joint"])
-        pose = write_pose(writer, order, mean, settings["pose"] * bound)
-        step = writer.single(settings["step"] * bound)
-        motion = motion + (mean - pose)[:, :, None]
+        order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
         groups, spectra = self._clusters(source, order, settings["clusters"], trajectories)
         writer.count(len(spectra))
         writer.table(np.diff(groups, prepend=0)[:, None])
@@ -363,12 +369,9 @@ class ClusteredPca(Baseline):
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        order = read_order(reader)
-        frames = reader.count()
-        trajectories = Trajectories(bool(reader.count()), frames)
-        pose, step, count = read_pose(reader, order), reader.single(), reader.count()
-        groups = np.cumsum(reader.table()[:, 0])
-        positions = np.repeat(pose[:, :, None], frames, axis=2)
+        order, trajectories, pose, step = read_front(reader)
+        count, groups = reader.count(), np.cumsum(reader.table()[:, 0])
+        positions = np.repeat(pose[:, :, None], trajectories.frames, axis=2)
         for group in range(count):
             members = np.flatnonzero(groups == group)
             positions[members] += read_group(reader, VertexOrder(members), step, trajectories)
@@ -390,21 +393,21 @@ class ClusteredPca(Baseline):
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
     def _lloyd(self, rows: np.ndarray, count: int, rows_per_vertex: int, vertices: int) -> np.ndarray:
-        """Vertices by the basis that leaves the least of them; starts from runs of neighbours."""
+        """Clusters of vertices by the basis with the smallest residual; starts from runs of neighbours."""
         groups = np.arange(vertices) * count // vertices
         coefficients = (
             rows @ principal(rows)[1][:24].T
-        )  # what matters of the motion, small enough to iterate on
+        )  # the main part of the motion, small enough to iterate on
         for _ in range(self.turns):
-            left = np.full((count, vertices), np.inf)
+            residuals = np.full((count, vertices), np.inf)
             for group in range(count):
                 mine = coefficients[np.repeat(groups == group, rows_per_vertex)]
                 if len(mine):
                     basis = principal(mine)[1][: self.rank]
-                    rest = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
-                    left[group] = rest.reshape(vertices, -1).sum(axis=1)
-            moved = left.argmin(axis=0)
-            if np.array_equal(moved, groups):
+                    residual = (coefficients**2).sum(axis=1) - ((coefficients @ basis.T) ** 2).sum(axis=1)
+                    residuals[group] = residual.reshape(vertices, -1).sum(axis=1)
+            nearest = residuals.argmin(axis=0)
+            if np.array_equal(nearest, groups):
                 break
-            groups = moved
+            groups = nearest
         return np.unique(groups, return_inverse=True)[1]

@@ -1,7 +1,7 @@
-"""All programs that the benchmark compares with, each as it is installed from a package index.
+"""All programs that the benchmark compares with, each as installed from a package index.
 
-Nothing is imported here but NumPy and zstandard: what is not installed says so when it is asked
-(Codec.missing). `lossless()` are those that can give every bit back.
+Only NumPy and zstandard are imported here; Codec.missing reports a program that is not installed. `lossless()` are
+those with a lossless mode.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """SZ3 (Liang and others, IEEE Trans. Big Data 2023; pysz): prediction within an absolute error bound.
 
 Lorenzo and regression, interpolation, or its choice of both, in every layout. Its bound holds for single
-values; the one it gets is moved until the distances that it causes just keep theirs. Left out: its relative
+values; it is adjusted until the resulting distances just keep the bound. Left out: its relative
 and norm bounds.
 """
 
@@ -11,12 +11,12 @@ from itertools import product
 
 import numpy as np
 
-from bench.codecs.peer import LAYOUTS, Peer, all_of, each
+from bench.codecs.program import LAYOUTS, Program, decode_arrays, encode_arrays
 
 ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
 
 
-class Sz3(Peer):
+class Sz3(Program):
     name, module, package = "SZ3", "pysz", "pysz"
     forms = lossless_forms = ("floats",)
 
@@ -34,7 +34,7 @@ class Sz3(Peer):
             config.cmprAlgo = getattr(pysz.szAlgorithm, algorithm)
             return pysz.sz.compress(part, config)[0].tobytes()
 
-        return each(encode, values, layout)
+        return encode_arrays(encode, values, layout)
 
     def decode_floats(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         pysz = self.load()
@@ -42,4 +42,4 @@ class Sz3(Peer):
         def decode(blob: bytes, part: tuple[int, ...]) -> np.ndarray:
             return pysz.sz.decompress(np.frombuffer(blob, np.uint8), np.float32, part)[0]
 
-        return all_of(decode, data, choice[0], shape)
+        return decode_arrays(decode, data, choice[0], shape)

@@ -16,7 +16,7 @@ from athcodec.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.coder import Reader, Writer
 
-KEPT = 6  # what trials go back to, without filling the memory
+KEPT = 6  # cached values of each kind
 ORDERS = ("source", "hierarchy")
 
 
@@ -49,7 +49,7 @@ class VertexOrder:
 
     @cached_property
     def generations(self) -> list[np.ndarray]:
-        """Vertices by their number of ancestors: each after those that it is predicted from."""
+        """Vertices grouped by their number of ancestors: each follows those that it is predicted from."""
         ancestors = np.zeros(len(self.source), np.int64)
         for v, before in enumerate(self.before.tolist()):
             if before >= 0:
@@ -84,7 +84,7 @@ def read_order(reader: Reader) -> VertexOrder:
 
 
 def memo(source: Source, key: tuple, make):
-    """What `make` gives, kept with the source; of each kind, key[0], only the KEPT that were used last."""
+    """The value of `make`, cached with the source; of each kind, key[0], the KEPT last used ones."""
     kind = source.__dict__.setdefault("_known", {}).setdefault(key[0], {})
     kind[key] = kind.pop(key) if key in kind else make()
     if len(kind) > KEPT:
@@ -102,9 +102,7 @@ def ordered(source: Source, order: VertexOrder) -> np.ndarray:
 
 
 def differences(q: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
-    """What the vertices before do not foretell of integers (N, ...): as they were (degree 1), or gone on by
-    as much (2).
-    """
+    """Residuals of integers (N, ...) predicted from the vertices before: constant (degree 1) or linear (2)."""
     if degree == 0:
         return q
     expected = np.where(_shaped(order.before >= 0, q), q[order.before], 0)
@@ -114,7 +112,7 @@ def differences(q: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
 
 
 def sums(residual: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
-    """The integers whose differences these are."""
+    """The inverse of differences."""
     if degree == 0:
         return residual
     if order.hierarchy is None:
@@ -138,7 +136,7 @@ def _shaped(mask: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float) -> np.ndarray:
-    """A pose that does not move, (N, 3), at a step; returns what a reader will have."""
+    """A static pose, (N, 3), at a step; returns what a reader will get."""
     step = writer.single(step)
     q = np.rint(pose / step).astype(np.int64)
     costs = [np.log2(1 + np.abs(differences(q, order, degree))).sum() for degree in (0, 1, 2)]

@@ -1,8 +1,8 @@
-"""USD crates (Pixar 2016 and later; usd-core): what a .usdc file needs for the motion as time samples.
+"""USD crates (Pixar 2016 and later; usd-core): size of a .usdc file with the motion as time samples.
 
 Two entries. Points are what every USD program plays: float3, or half3 where halves keep the bound, as
-positions or as displacements. Integers are the best that the crate's own integer compression does on the grid
-of the bound, in attributes that only a reader made for them understands. Left out: value clips, which spread
+positions or as displacements. Integers use the crate's integer compression on the grid of the bound,
+in attributes that only a special reader understands. Left out: value clips, which spread
 the samples over files; faces.
 """
 
@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.codecs.peer import Peer, all_of, each
+from bench.codecs.program import Program, decode_arrays, encode_arrays
 
 PRIM, VALUES = "/motion", "points"
 
 
-class UsdPoints(Peer):
+class UsdPoints(Program):
     name, module, package = "USD crate, points", "pxr.Usd", "usd-core"
     forms = lossless_forms = ("floats",)
     strengths = (0,)  # there is nothing to set
@@ -37,7 +37,7 @@ class UsdPoints(Peer):
         return np.stack(_samples(data)).astype(np.float32)
 
 
-class UsdIntegers(Peer):
+class UsdIntegers(Program):
     name, module, package = "USD crate, integers", "pxr.Usd", "usd-core"
 
     def choices(self, form: str) -> list:
@@ -46,13 +46,13 @@ class UsdIntegers(Peer):
 
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:
         if not choice.startswith("frames"):
-            return each(lambda part: _crate([part.ravel()], "int"), values, choice)
+            return encode_arrays(lambda part: _crate([part.ravel()], "int"), values, choice)
         turned = values if choice.endswith("N,3") else values.transpose(0, 2, 1)
         return _crate(list(turned.reshape(len(values), -1)), "int")
 
     def decode_integers(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         if not choice.startswith("frames"):
-            return all_of(lambda blob, part: _samples(blob)[0].reshape(part), data, choice, shape)
+            return decode_arrays(lambda blob, part: _samples(blob)[0].reshape(part), data, choice, shape)
         frames, vertices, _ = shape
         rows = np.stack(_samples(data))
         if choice.endswith("N,3"):

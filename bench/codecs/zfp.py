@@ -11,10 +11,10 @@ import struct
 
 import numpy as np
 
-from bench.codecs.peer import Peer, all_of, each
+from bench.codecs.program import Program, decode_arrays, encode_arrays
 
 
-class Zfp(Peer):
+class Zfp(Program):
     name, module, package = "zfp", "zfpy", "zfpy"
     forms = lossless_forms = ("floats",)
 
@@ -22,11 +22,11 @@ class Zfp(Peer):
         zfpy = self.load()
         scale = np.float32(1 / strength) if strength else np.float32(1)
         tolerance = {"tolerance": 1.0} if strength else {}  # without one it is reversible
-        return struct.pack("<f", scale) + each(
+        return struct.pack("<f", scale) + encode_arrays(
             lambda part: zfpy.compress_numpy(part * scale, **tolerance), values, choice)
 
     def decode_floats(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         zfpy = self.load()
         (scale,) = struct.unpack_from("<f", data)
-        decoded = all_of(lambda blob, part: zfpy.decompress_numpy(blob), data[4:], choice, shape)
+        decoded = decode_arrays(lambda blob, part: zfpy.decompress_numpy(blob), data[4:], choice, shape)
         return decoded if scale == 1 else (decoded / np.float64(scale)).astype(np.float32)

@@ -32,8 +32,8 @@ class Wind:
     def at(self, points: np.ndarray, time: float) -> np.ndarray:
         """(..., 3) velocities in m/s at (..., 3) points in metres, y up."""
         gusts = self._gusts(np.asarray(points, np.float32).reshape(-1, 3), time)
-        share = np.clip(np.asarray(points)[..., 1:2] / self.height, 0.0, None) ** PROFILE_EXPONENT
-        return share * self.speed * DIRECTION + gusts.reshape(np.shape(points)).astype(np.float64)
+        profile = np.clip(np.asarray(points)[..., 1:2] / self.height, 0.0, None) ** PROFILE_EXPONENT
+        return profile * self.speed * DIRECTION + gusts.reshape(np.shape(points)).astype(np.float64)
 
     def _gusts(self, points: np.ndarray, time: float) -> np.ndarray:
         waves, phases, amplitudes = self._waves

@@ -1,7 +1,7 @@
-"""What `python -m spec.robustness` runs: one module per class of runs, each with `run(budget) -> list[Row]`.
+"""The classes of `python -m spec.robustness`: one module per class, each with `run(budget) -> list[Row]`.
 
 budget: seconds that the class may take. A module may also have `figures() -> dict[str, str]`, lines that the report
-prints under its rows. Nothing here knows how a class finds out what it counts.
+prints below its rows.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Row:
-    """One line of the report: how many inputs were tried, and how many of them went wrong in which way."""
+    """One line of the report: the number of inputs tried, and of faults by kind."""
 
     name: str
     tried: int

@@ -1,7 +1,6 @@
-"""Runs cases in a process of their own, so that a crash, a hang or a flood of memory is an outcome like any other.
+"""Runs cases in a separate process, so that crashes, hangs and excessive memory are detected.
 
-A class of cases is a list of arguments and a function that raises Wrong where one does not come out as it should. What
-a case may be is known to those who make them.
+A class of cases is a list of arguments and a function that raises Wrong for a wrong result.
 """
 
 from __future__ import annotations
@@ -21,30 +20,30 @@ from spec.robust import Row
 HANG_SECONDS = 120.0
 POLL_SECONDS = 0.2
 FREE_MEMORY = 64 << 20
-"""Growth of a process that is no fault of a case: caches of the allocator, modules imported late."""
+"""Allowed growth of a process besides that of a case: caches of the allocator, modules imported late."""
 _STATUS = Path("/proc/self/status")
 _PEAK_UNIT = 1 if sys.platform == "darwin" else 1024
 
 
 class Wrong(Exception):
-    """A case did not come out as it should."""
+    """The result of a case is wrong."""
 
 
 @dataclass(frozen=True)
 class Cases:
-    """Inputs of one class. attempt(data, argument) -> bytes of memory that it may take."""
+    """Inputs of one class. attempt(data, argument) -> bytes of memory that the case may take."""
 
     name: str
     files: dict[str, bytes]
     arguments: Sequence[tuple[str, object]]
-    """(name of a file, what is done to it)"""
+    """(name of a file, argument of attempt)"""
     attempt: Callable[[bytes, object], int]
     few: bool = False
-    """Whether all are tried, whatever the time."""
+    """Whether all are tried, regardless of time."""
 
 
 def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
-    """As many as the time allows, each once, in an order that is mixed but always the same."""
+    """Runs as many cases as time allows, in a fixed random order."""
     order = list(range(len(cases.arguments)))
     random.Random(0).shuffle(order)
     counts = dict.fromkeys(("crashes", "hangs", "over_limit", "wrong"), 0)
@@ -59,7 +58,7 @@ def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
 
 
 def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, hang: float) -> tuple[int, str, str]:
-    """Goes on from case `start`: where to go on next, and what the last one came to, if it went wrong."""
+    """Runs cases from number `start`: (the next number, kind of fault or "", message)."""
     context = multiprocessing.get_context("spawn")
     at, messages = context.Value("q", start), context.SimpleQueue()
     process = context.Process(target=_work, args=(cases, order, start, deadline, at, messages), daemon=True)
@@ -83,7 +82,7 @@ def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, 
 
 
 def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messages) -> None:
-    """In the process: until a case goes wrong, all are done or time is up."""
+    """In the separate process: runs cases until one fails, all are done or time is up."""
     for place in range(start, len(order)):
         if place > start and time.monotonic() > deadline:
             messages.put((place, "", ""))
@@ -96,7 +95,7 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
         except MemoryError as error:
             messages.put((place + 1, "over_limit", f"{name} {argument}: {error!r}"))
             return
-        except BaseException as error:  # pytest.fail raises none that is an Exception
+        except BaseException as error:  # pytest.fail does not raise an Exception
             messages.put((place + 1, "wrong", f"{name} {argument}: {error!r}"))
             return
         if _peak() - before > allowed + FREE_MEMORY:
@@ -106,7 +105,7 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
 
 
 def _peak() -> int:
-    """Bytes. Linux hands getrusage's peak on from the process that started this one; /proc does not."""
+    """Bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is not."""
     if _STATUS.exists():
         return int(re.search(r"VmHWM:\s+(\d+)", _STATUS.read_text())[1]) * 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT

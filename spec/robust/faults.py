@@ -1,10 +1,8 @@
-"""Faults while files are written, from outside: writers killed at random moments, disks that are full,
-sources that change.
+"""External faults while files are written: writers killed at random moments, full disks, sources that change.
 
-Everything runs as the command that users run, in processes of its own: `run` gives the rows of the table. A
-final name must hold nothing, what it held before, or a whole new file; the next writer to the same place must
-leave no temporary file; an error must be one line and exit code 1. The tests use the same functions with
-fewer rounds.
+All of it runs the command line program in separate processes; `run` returns the rows of the table. A target must not
+exist, be unchanged, or be a complete new file; the next writer to the same place must leave no temporary file; an error
+must be one line, with exit code 1. The tests use the same functions with fewer rounds.
 """
 
 from __future__ import annotations
@@ -28,14 +26,14 @@ import athcodec
 from athcodec.sources import sample_path
 from spec.robust import Row
 
-PATIENCE = 120.0  # seconds after which a command counts as hung
+TIMEOUT = 120.0  # seconds after which a command counts as hung
 ONE_LINE = re.compile(r"athcodec: error: [^\n]+\n")
 VERBS = ("encode", "decode", "decode --gzip", "truncate")
 
 
 @dataclass
 class Place:
-    """A folder with a source and its .ath file, and an empty one to write to."""
+    """A source and its .ath file, and an empty folder to write to."""
 
     source: Path
     encoded: Path
@@ -61,16 +59,16 @@ class Place:
 
 
 def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subprocess.Popen:
-    """The command, in a process on which `prepare` has been run."""
+    """Starts the command, in a process that runs `prepare` first."""
     return subprocess.Popen([sys.executable, "-m", "athcodec", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                             text=True, preexec_fn=prepare)
 
 
 def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
-    """(exit code, stderr) of a command; minus SIGKILL where it had to be stopped after PATIENCE."""
+    """(exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
     process = spawn(words, prepare)
     try:
-        _, err = process.communicate(timeout=PATIENCE)
+        _, err = process.communicate(timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         process.kill()
         _, err = process.communicate()
@@ -95,7 +93,7 @@ def is_whole(path: Path) -> bool:
 
 
 def kill_while_writing(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Kills a verb with SIGKILL, half of the time as soon as its part is there, else at any moment."""
+    """Kills a verb with SIGKILL, half of the time as soon as its part file exists, else at any moment."""
     rng, row = random.Random(seed), Row("killed while writing", 0)
     parts = cleaned = 0
     while row.tried < rounds and time.monotonic() < until:
@@ -118,7 +116,7 @@ def kill_while_writing(place: Place, rounds: int, seed: int, until: float = floa
 
 
 def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None, rng: random.Random) -> bool:
-    """Whether the target is, after the kill, absent or as before, or whole."""
+    """Whether the target is, after the kill, absent, unchanged or complete."""
     process = spawn(place.words(verb, target))
     if rng.random() < 0.5:
         while process.poll() is None and not place.left_over(target):
@@ -134,7 +132,7 @@ def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None,
 
 
 def _next_run(place: Place, target: Path) -> None:
-    """Whatever writes to the same place next, in this process, for it is quick."""
+    """The next writer to the same place; in this process, to be fast."""
     if target.suffix == ".ath":
         athcodec.truncate(place.encoded, target, 1)
     else:
@@ -146,8 +144,7 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: float = float("inf")) -> Row:
-    """Verbs that may write files of so many bytes only (RLIMIT_FSIZE): the write that goes beyond fails with
-    EFBIG."""
+    """Verbs under a limit on file sizes (RLIMIT_FSIZE): the write that exceeds it fails with EFBIG."""
     row = Row("no room to write", 0, note="RLIMIT_FSIZE, the error is EFBIG")
     for size in sizes:
         for verb in verbs:
@@ -158,22 +155,21 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 
 
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
-    """One line, exit code 1, the older file as it was and no other; or, where there was room after all, a
-    whole one."""
+    """Checks for one line, exit code 1 and an unchanged older file; or a complete file, if it fitted."""
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
     target.write_bytes(b"older")
     code, err = finished(place.words(verb, target), prepare)
     row.tried += 1
     row.hangs += code == -signal.SIGKILL
     row.crashes += code < 0 and code != -signal.SIGKILL
-    row.wrong += not (code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older"
-                      or code == 0 and is_whole(target)) or bool(place.left_over(target))
+    refused = code == 1 and ONE_LINE.fullmatch(err) and target.read_bytes() == b"older"
+    row.wrong += not (refused or (code == 0 and is_whole(target))) or bool(place.left_over(target))
     target.unlink()
 
 
 def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
-    """Verbs on a real file system that is full (a tmpfs in a mount namespace of its own): ENOSPC. Where the
-    system lets nobody make one, nothing is tried and the note says so."""
+    """Verbs on a full file system (a tmpfs in a mount namespace): ENOSPC. If the system allows no mount namespace,
+    nothing is tried, as stated in the note."""
     row = Row("disk full", 0)
     if subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode != 0:
         row.note = "not tried: the system allows no mount namespace here"
@@ -185,22 +181,22 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
             script = ('mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; '
                       'exit $code')
             done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
-                                  capture_output=True, text=True, timeout=PATIENCE)
+                                  capture_output=True, text=True, timeout=TIMEOUT)
             refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
             row.tried += 1
             row.crashes += done.returncode > 1
-            row.wrong += not (refused or done.returncode == 0 and done.stdout == f"{target.name}\n")
+            row.wrong += not (refused or (done.returncode == 0 and done.stdout == f"{target.name}\n"))
     row.note = "tmpfs, the error is ENOSPC"
     return row
 
 
-# ---- not allowed ----
+# ---- permissions ----
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 
 def obey_permissions() -> None:
-    """For the program that is started next: the modes of files bind it even where the superuser runs it."""
+    """Makes file modes effective for the next program, even if the superuser runs it."""
     ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
 
 
@@ -226,8 +222,8 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
 
 
 def change_source(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Cuts or overwrites the source at a random moment of an encode: a file within its bound of what the
-    source was, or one line; nothing else."""
+    """Truncates or overwrites the source at a random moment of an encode: the result must be a file within the bound
+    of the original source, or one line."""
     rng, row, accepted = random.Random(seed), Row("source changes while it is read", 0), 0
     original = place.source.read_bytes()
     target = place.folder / "target.ath"
@@ -236,7 +232,7 @@ def change_source(place: Place, rounds: int, seed: int, until: float = float("in
         time.sleep(rng.uniform(0.2, 1.2))
         _damage(place.source, rng)
         try:
-            _, err = process.communicate(timeout=PATIENCE)
+            _, err = process.communicate(timeout=TIMEOUT)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
@@ -244,7 +240,7 @@ def change_source(place: Place, rounds: int, seed: int, until: float = float("in
         place.source.write_bytes(original)
         row.tried += 1
         row.crashes += process.returncode < 0
-        if process.returncode == 0:  # it had read all it needed
+        if process.returncode == 0:  # the source had been read completely
             accepted += 1
             code, _ = finished(["verify", str(target), "--against", str(place.source)])
             row.wrong += code != 0
@@ -267,7 +263,7 @@ def _damage(path: Path, rng: random.Random) -> None:
 
 
 def run(budget: float) -> list[Row]:
-    """All of it: 200 kills and what else there is, within about `budget` seconds."""
+    """All faults, 200 kills among them, within about `budget` seconds."""
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         place = Place.make(Path(folder))

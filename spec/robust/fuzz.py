@@ -1,7 +1,7 @@
-"""The fuzz targets of tests/fuzz, each for a share of the time, and the lines of the decoder that their inputs reach.
+"""The fuzz targets of tests/fuzz, each for an equal part of the time, and the decoder's lines covered by their inputs.
 
-C targets run under AddressSanitizer and UndefinedBehaviorSanitizer with libFuzzer, from a corpus that grows from run to
-run; the round trip is Python's. Where there is no clang, every seed is tried once.
+C targets run under AddressSanitizer and UndefinedBehaviorSanitizer with libFuzzer, from a corpus that grows with every
+run; the round trip is in Python. Without clang, every seed is tried once.
 """
 
 from __future__ import annotations
@@ -66,6 +66,6 @@ def figures() -> dict[str, str]:
     hours = ", ".join(f"{target} {hours:.2f}" for target, hours in _hours().items())
     lines = {"hours with this corpus": hours or "none"}
     files = coverage.measure()
-    for each in files or []:
-        lines[each.name] = f"{100 * each.share:.1f} % of {each.lines} lines"
+    for file in files or []:
+        lines[file.name] = f"{100 * file.share:.1f} % of {file.lines} lines"
     return lines

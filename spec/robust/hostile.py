@@ -1,8 +1,8 @@
-"""Files that are cut short, too long, damaged, or made to do harm: each is refused in one line or plays within limits.
+"""Truncated, too long, corrupted and malicious files: each is refused in one line or plays within limits.
 
-Every prefix, every bit and every field of every small valid file, as far as the time goes; with the checksums as they
-are, damage has to be refused, with checksums repaired it may play as something else. Files made to be slow cost a
-decoder no more per byte than others do. Runs through the Python package, in processes of their own.
+Every prefix, every bit and every field of every small valid file, as far as time allows. With unchanged checksums,
+corruption must be refused; with repaired checksums a file may play as something else. Files made to be slow may cost a
+decoder no more per byte than others. All run through the Python package, in separate processes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from spec.robust import Row, _cases
 from spec.robust._cases import Cases, Wrong
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests"))  # what the tests have for making files and using all of one
+sys.path.append(str(ROOT / "tests"))  # for making files and reading them completely
 
 import hostile_files  # noqa: E402
 from files import with_checksum  # noqa: E402
@@ -43,7 +43,7 @@ def valid_files() -> dict[str, bytes]:
     return seeds.valid_files() | {name: data for name, data in vectors.items() if len(data) <= seeds.LARGEST}
 
 
-# ---- what a case may come to ----
+# ---- allowed results ----
 
 
 def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **options) -> None:
@@ -57,13 +57,13 @@ def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **op
 
 
 def within_limits(data: bytes) -> int:
-    """Uses the file in every way; the memory that this may take."""
+    """Reads the file in every way; returns the memory that this may take."""
     use(data, limits=LIMITS)
     return 2 * LIMITS.memory_bytes + _whole_clip(data)
 
 
 def _whole_clip(data: bytes) -> int:
-    """Bytes of all positions, which `use` asks for as doubles."""
+    """Bytes of all positions, which `use` reads as float64."""
     try:
         header = AthFile(BytesIO(data), limits=LIMITS).header
     except FormatError:
@@ -71,7 +71,7 @@ def _whole_clip(data: bytes) -> int:
     return 2 * 24 * header.vertex_count * header.frame_count
 
 
-# ---- cut short, too long ----
+# ---- truncated, too long ----
 
 
 @cache
@@ -98,7 +98,7 @@ def prefix_as_a_stream(data: bytes, size: int) -> int:
             decoder.positions()
         except Truncated:
             return 0
-        raise Wrong(f"{size} bytes: got level 0, which is not there")
+        raise Wrong(f"{size} bytes: got level 0, which is incomplete")
     if decoder.deepest != deepest or not np.array_equal(decoder.positions(), _played(data)[deepest], equal_nan=True):
         raise Wrong(f"{size} bytes: got level {decoder.deepest}; expected level {deepest} as in the whole file")
     return 0
@@ -112,7 +112,7 @@ def too_long(data: bytes, more: bytes) -> int:
     return 0
 
 
-# ---- damage ----
+# ---- corruption ----
 
 
 def flipped_bit(data: bytes, bit: int) -> int:
@@ -121,7 +121,7 @@ def flipped_bit(data: bytes, bit: int) -> int:
 
 
 def checked_bits(data: bytes) -> list[int]:
-    """All but those of unknown chunks, whose bytes no decoder reads."""
+    """All bits but those of unknown chunks, which no decoder reads."""
     file = AthFile(BytesIO(data))
     known = [range(chunk.offset, chunk.offset + chunk.length) for chunk in file.chunks]
     front = range(_tables_end(data))
@@ -134,7 +134,7 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 
 def repaired(data: bytes) -> bytes:
-    """Checksums and File_Length that fit, as far as the tables can be read."""
+    """The file with correct checksums and File_Length, as far as the tables can be read."""
     at, (count,) = _tables_end(data), struct.unpack_from("<I", data, 24)
     if at > len(data):
         return data
@@ -183,15 +183,15 @@ def header_changes(data: bytes) -> list[tuple]:
 
 
 def table_changes(data: bytes) -> list[tuple]:
-    """Lying lengths and places: every entry of the chunk table at its extremes, under a checksum that fits."""
+    """Wrong lengths and positions: every field of the chunk table at its extremes, with a correct checksum."""
     (count,) = struct.unpack_from("<I", data, 24)
     entries = range(ct._HEADER.size, ct._HEADER.size + ct._CHUNK.size * count, ct._CHUNK.size)
     return [(entry + at, code, value, True) for entry in entries for at, code in struct_fields(ct._CHUNK)[:5]
             for value in (0, 1, 256 ** struct.calcsize(code) - 2, 256 ** struct.calcsize(code) - 1)]
 
 
-def spoilt(data: bytes, seed: int) -> int:
-    """Fields of the front changed so that they mostly still fit each other, or contents of chunks."""
+def corrupted(data: bytes, seed: int) -> int:
+    """Changed fields of the front that are mostly consistent with each other, or changed contents of chunks."""
     rng = np.random.default_rng(seed)
     if seed % 2:
         return within_limits(spoilt_front(rng, data))
@@ -206,15 +206,15 @@ def spoilt(data: bytes, seed: int) -> int:
 # ---- made to be slow ----
 
 MOST_PER_BYTE = 75.0
-"""How much more a byte may cost than one of the sample. 100 ns on a machine that decodes it at 1.3 ns a byte."""
+"""Allowed cost of a byte over that of the sample: 100 ns on a machine that decodes the sample at 1.3 ns a byte."""
 CHUNK_BYTES = 256
-"""What Python keeps of a chunk."""
+"""Python's memory for a chunk."""
 MOST_GROWTH = 3.2
-"""Of the time, where everything in a file is doubled."""
+"""Allowed growth of the time when everything in a file is doubled."""
 
 
 def seconds_and_bytes(data: bytes) -> tuple[float, int]:
-    """Of decoding all; bytes read, given out, and of the decoder's own memory, which the file's counts ask for."""
+    """Seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts determine."""
     start = time.perf_counter()
     decoder = athcodec.open(BytesIO(data))
     given = sum(block.nbytes for _, block in decoder.blocks())
@@ -231,7 +231,7 @@ def _sample_per_byte() -> float:
 
 
 def slow_file(_: bytes, name: str) -> int:
-    """What else the machine does can only add to a time: one that is too long is taken again, and the least counts."""
+    """Other load on the machine can only add to a time: a time that is too long is measured again; the least counts."""
     files = [hostile_files.SLOW[name](scale) for scale in (1, 2)]
     least, fault = [float("inf")] * 2, ""
     for _ in range(8):
@@ -252,7 +252,7 @@ def _too_slow(once: float, twice: float, size: int) -> str:
     return f"got {growth:.1f} times the time for twice the file" if growth > MOST_GROWTH else ""
 
 
-def flood(_: bytes, name: str) -> int:
+def announces_too_much(_: bytes, name: str) -> int:
     """Small files that announce much: refused, or played within the limits."""
     return within_limits(hostile_files.LYING[name]())
 
@@ -261,39 +261,40 @@ def flood(_: bytes, name: str) -> int:
 
 
 def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
-    """(share of the time, cases)"""
+    """(weight of the time, cases)"""
     small = {name: data for name, data in files.items() if len(data) <= SMALL}
 
-    def each(of: dict[str, bytes], arguments) -> list[tuple[str, object]]:
+    def cases_of(of: dict[str, bytes], arguments) -> list[tuple[str, object]]:
         return [(name, argument) for name, data in of.items() for argument in arguments(data)]
 
     def made(names) -> list[tuple[str, object]]:
         return [("least", name) for name in names]
 
     return [
-        (0.5, Cases("a byte or more too many", files, each(files, lambda _: [b"\0", b"more", bytes(4096)]), too_long)),
-        (1, Cases("prefixes, opened strictly", files, each(files, lambda d: range(len(d))), prefix_strictly)),
-        (1, Cases("prefixes, as a stream", files, each(files, lambda d: range(len(d))), prefix_as_a_stream)),
-        (1.5, Cases("fields of the header at their extremes", small, each(small, header_changes), header_field)),
-        (1, Cases("entries of the chunk table at their extremes", small, each(small, table_changes), header_field)),
-        (1.5, Cases("flipped bits", small, each(small, checked_bits), flipped_bit)),
-        (2, Cases("flipped bits, checksums repaired", small, each(small, lambda d: range(8 * len(d))),
+        (0.5, Cases("a byte or more too many", files, cases_of(files, lambda _: [b"\0", b"more", bytes(4096)]),
+                    too_long)),
+        (1, Cases("prefixes, opened strictly", files, cases_of(files, lambda d: range(len(d))), prefix_strictly)),
+        (1, Cases("prefixes, as a stream", files, cases_of(files, lambda d: range(len(d))), prefix_as_a_stream)),
+        (1.5, Cases("fields of the header at their extremes", small, cases_of(small, header_changes), header_field)),
+        (1, Cases("entries of the chunk table at their extremes", small, cases_of(small, table_changes), header_field)),
+        (1.5, Cases("flipped bits", small, cases_of(small, checked_bits), flipped_bit)),
+        (2, Cases("flipped bits, checksums repaired", small, cases_of(small, lambda d: range(8 * len(d))),
                   flipped_bit_repaired)),
-        (1.5, Cases("spoilt fronts and chunks, checksums repaired", small, each(small, lambda _: range(10_000)),
-                    spoilt)),
-        (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), flood, few=True)),
+        (1.5, Cases("corrupted fronts and chunks, checksums repaired", small, cases_of(small, lambda _: range(10_000)),
+                    corrupted)),
+        (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), announces_too_much, few=True)),
         (2, Cases("files made to be slow", files, made(hostile_files.SLOW), slow_file, few=True)),
     ]
 
 
 def run(budget: float) -> list[Row]:
     classes = _classes(valid_files())
-    unit = budget / sum(share for share, _ in classes)
-    return [_cases.run(cases, unit * share) for share, cases in classes]
+    unit = budget / sum(weight for weight, _ in classes)
+    return [_cases.run(cases, unit * weight) for weight, cases in classes]
 
 
 def figures() -> dict[str, str]:
-    """What slow files cost, measured once more in this process."""
+    """The cost of slow files, measured again in this process."""
     lines = {}
     for name, make in hostile_files.SLOW.items():
         taken, size = seconds_and_bytes(make(2))

@@ -1,9 +1,8 @@
-"""The decoder under load: many threads, thousands of seeks, a thousand open files, and memory that runs out.
+"""The decoder under load: many threads, thousands of seeks, a thousand open files, and exhausted memory.
 
-What needs a process of its own (memory is measured, allocations fail, ThreadSanitizer watches the C core)
-runs in one: `python -m spec.robust.load JOB ...` prints one JSON object. `run` gives the rows of the table;
-the tests use the same functions with fewer rounds. Figures of memory are those of the whole process, after a
-warm-up.
+Jobs that measure memory or make allocations fail run in separate processes: `python -m spec.robust.load JOB ...` prints
+one JSON object. The C core is tested with ThreadSanitizer. `run` returns the rows of the table; the tests use the same
+functions with fewer rounds. Memory is that of the whole process, after a warm-up.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from spec.robust import Row
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "athcodec" / "core"
-PATIENCE = 300.0  # seconds after which a process counts as hung
+TIMEOUT = 300.0  # seconds after which a process counts as hung
 RACE_FOUND = 66  # ThreadSanitizer's exit code
-GET_HANDLER = 305  # PyDataMem_GetHandler's place in NumPy's table of functions
+GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
 
 
 # ---- processes ----
@@ -47,7 +46,7 @@ def job(name: str, *words: object) -> tuple[int, dict]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
         done = subprocess.run([sys.executable, "-m", "spec.robust.load", name, *map(str, words)], env=environment,
-                              capture_output=True, text=True, timeout=PATIENCE)
+                              capture_output=True, text=True, timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         return -1, {"error": "hung"}
     result = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
@@ -55,7 +54,7 @@ def job(name: str, *words: object) -> tuple[int, dict]:
 
 
 def compilers() -> list[str]:
-    """What may know ThreadSanitizer; clang first, whose programs start and run faster with it."""
+    """Compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
     found = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
     if not found:
         raise RuntimeError("C compiler: found none of clang, gcc and cc; expected one, or its name in CC")
@@ -63,7 +62,7 @@ def compilers() -> list[str]:
 
 
 def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
-    """A program or library from C, by the first compiler that can."""
+    """A program or library in C, by the first compiler that succeeds."""
     target = folder / sources[0].stem
     problems = ""
     for compiler in compilers():
@@ -92,7 +91,7 @@ def race(program: Path, *words: object) -> tuple[int, str, dict]:
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
         done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True,
-                              timeout=PATIENCE)
+                              timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         return -1, "hung", {}
     return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
@@ -108,8 +107,7 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
 
 
 def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
-    """Threads on one decoder for each file and on decoders of their own, against what one thread alone
-    sees."""
+    """Threads on shared and on separate decoders of each file, compared with a single thread."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
     expected = [[decoder.positions(level=level) for level in range(decoder.level_count)] for decoder in shared]
@@ -134,7 +132,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
 
 def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
-    """Whether a frame or a few, of any level, are what they should be."""
+    """Whether a random frame, or some frames, of a random level are as expected."""
     level, frame = rng.randrange(decoder.level_count), rng.randrange(decoder.frame_count)
     if rng.random() < 0.2:
         frames = slice(frame, frame + 10)
@@ -146,7 +144,7 @@ def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Ran
 
 
 def resident_bytes() -> int:
-    """Of this process; where the system does not say, the most it ever had."""
+    """Resident memory of this process; its peak if the system does not report it."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
@@ -179,14 +177,14 @@ def seeks(path: Path, count: int) -> Row:
     return row
 
 
-ALLOWED_GROWTH = 1 << 20  # bytes: what an allocator may keep; a segment lost at each seek is a hundred times that
+ALLOWED_GROWTH = 1 << 20  # bytes that an allocator may keep; leaking a segment at each seek takes a hundred times that
 
 
 # ---- many at once ----
 
 
 def open_many(path: str, count: int) -> dict:
-    """So many decoders at once, each shown once before and after others are closed, in any order."""
+    """Opens many decoders at once and reads from each, before and after others are closed in random order."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = count + 100
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -196,14 +194,15 @@ def open_many(path: str, count: int) -> dict:
         expected = [decoder.positions(level=level) for level in range(decoder.level_count)]
     decoders = [athcodec.open(path) for _ in range(count)]
     wrong = sum(not _same(decoder, expected, rng) for decoder in decoders)
-    each = (resident_bytes() - before) / count
+    bytes_per_decoder = (resident_bytes() - before) / count
     rng.shuffle(decoders)
     while decoders:
         decoders.pop().close()
         for decoder in decoders[: 1 if len(decoders) % 10 else 5]:
             wrong += not _same(decoder, expected, rng)
     gc.collect()
-    return {"decoders": count, "wrong": wrong, "bytes_each": each, "files_left": _open_files() - files}
+    return {"decoders": count, "wrong": wrong, "bytes_per_decoder": bytes_per_decoder,
+            "files_left": _open_files() - files}
 
 
 def _open_files() -> int:
@@ -214,15 +213,15 @@ def many(path: Path, count: int) -> Row:
     code, result = job("many", path, count)
     row = Row("decoders open at once", result.get("decoders", 0), crashes=int(code != 0), wrong=result.get("wrong", 0))
     row.wrong += result.get("files_left", 0)
-    row.note = f"{result.get('bytes_each', 0) / 1000:.0f} kB each, closed in any order"
+    row.note = f"{result.get('bytes_per_decoder', 0) / 1000:.0f} kB each, closed in any order"
     return row
 
 
-# ---- memory that runs out ----
+# ---- failing allocations ----
 
 
-class Scarce:
-    """scarce.c between NumPy and the memory of all arrays of this process, for good."""
+class FailingAllocator:
+    """Replaces NumPy's allocator of arrays in this process, permanently, by that of scarce.c."""
 
     def __init__(self, folder: Path):
         self._library = ctypes.CDLL(str(compiled(folder, [HERE / "scarce.c"], "-fPIC", "-shared")))
@@ -236,11 +235,11 @@ class Scarce:
             raise RuntimeError("NumPy: got another kind of memory handler, expected version 1")
 
     def fail(self, n: int) -> None:
-        """The n-th array from now on gets no memory."""
+        """The n-th allocation from now on fails."""
         self._library.scarce_arm(n)
 
-    def end(self) -> bool:
-        """Whether it came to that; from now on all get what they ask for."""
+    def stop(self) -> bool:
+        """Stops failing; whether the allocation has failed."""
         return bool(self._library.scarce_arm(0))
 
 
@@ -248,7 +247,7 @@ Call = Callable[[], object]
 
 
 def _calls(path: str, out: str) -> dict[str, Call]:
-    """What is tested, as calls that begin with nothing of their own in memory."""
+    """The tested calls, which keep nothing in memory between each other."""
 
     def opened(use: Callable[[athcodec.Decoder], object]) -> Call:
         def call() -> object:
@@ -275,25 +274,24 @@ def _calls(path: str, out: str) -> dict[str, Call]:
 
 
 def run_out_of_memory(path: str, seconds: float) -> dict:
-    """Each call with its n-th array failing, for n from 1 until the call needs no more. What it may do is
-    succeed, or raise MemoryError or an error of athcodec's, and leave no file; a decoder that was open must
-    go on as before."""
+    """Each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or raise
+    MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
     wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
         folder = Path(name)
-        memory, out = Scarce(folder), folder / "out" / "out.ath"
+        memory, out = FailingAllocator(folder), folder / "out" / "out.ath"
         out.parent.mkdir()
         expected = lasting.positions()
         calls = _calls(path, str(out)) | {
             "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]}
         for which, call in calls.items():
-            call()  # what is made once is there from now on
+            call()  # fills caches
             files, n, fired, error = _open_files(), 1, True, None
             while fired and time.monotonic() < until:
                 out.unlink(missing_ok=True)
                 memory.fail(n)
                 error = _error_of(call)
-                fired = memory.end()
+                fired = memory.stop()
                 tried[which] = n - (not fired)
                 raised += error is not None
                 if not isinstance(error, (MemoryError, AthError, type(None))):
@@ -306,22 +304,22 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
             if _open_files() != files:
                 wrong.append(f"{which}: {_open_files() - files} files stay open")
             if not np.array_equal(lasting.positions(), expected):
-                wrong.append(f"{which}: the open decoder shows something else")
+                wrong.append(f"{which}: the open decoder returns other positions")
     return {"tried": tried, "raised": raised, "wrong": wrong}
 
 
 def _error_of(call: Call) -> BaseException | None:
     try:
         call()
-    except BaseException as error:  # which are right is for others to judge
+    except BaseException as error:  # judged by the caller
         return error.with_traceback(None)
     return None
 
 
-def scarce(path: Path, seconds: float = 300.0) -> Row:
-    """Every array of every call failing once."""
-    code, result = job("scarce", path, seconds)
-    row = Row("the n-th array gets no memory", sum(result.get("tried", {}).values()), crashes=int(code != 0))
+def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
+    """Every allocation of an array in every call fails once."""
+    code, result = job("allocations", path, seconds)
+    row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
     row.note = "; ".join([f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised",
                           *result.get("wrong", [])[:3], *result.get("error", "").strip().splitlines()[-1:]])
@@ -329,13 +327,12 @@ def scarce(path: Path, seconds: float = 300.0) -> Row:
 
 
 def in_little_space(path: str, megabytes: float) -> dict:
-    """One decode with so much address space more than there is now (RLIMIT_AS): the frames, or an error that
-    says so."""
+    """Decodes with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
     with athcodec.open(path) as decoder:
         expected = decoder.positions(0)
         room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
         resource.setrlimit(resource.RLIMIT_AS, (room, resource.RLIM_INFINITY))
-        error = _error_of(lambda: [each.copy() for _, each in decoder.blocks()] + [decoder.positions()])
+        error = _error_of(lambda: [block.copy() for _, block in decoder.blocks()] + [decoder.positions()])
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         same = np.array_equal(decoder.positions(0), expected)
         return {"error_name": type(error).__name__ if error else "", "same": same}
@@ -356,8 +353,7 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Limits.memory_bytes from nothing to enough: LimitExceeded before anything large is allocated, or the
-    right frames."""
+    """Limits.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()
@@ -377,13 +373,13 @@ def budgets(path: Path) -> Row:
 JOBS: dict[str, Callable[..., dict]] = {
     "seeks": lambda path, count: seek_at_random(path, int(count)),
     "many": lambda path, count: open_many(path, int(count)),
-    "scarce": lambda path, seconds: run_out_of_memory(path, float(seconds)),
+    "allocations": lambda path, seconds: run_out_of_memory(path, float(seconds)),
     "space": lambda path, megabytes: in_little_space(path, float(megabytes)),
 }
 
 
 def run(budget: float) -> list[Row]:
-    """All of it, within about `budget` seconds."""
+    """All runs, within about `budget` seconds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = [folder / "short.ath", folder / "long.ath"]
@@ -397,7 +393,7 @@ def run(budget: float) -> list[Row]:
             seeks(files[0], 10_000),
             many(files[0], 1_000),
             budgets(files[0]),
-            scarce(files[1], budget / 3),
+            failing_allocations(files[1], budget / 3),
             little_space(files[1], [*range(0, 8), *range(8, 40, 4)], time.monotonic() + budget / 3),
         ]
 

@@ -127,7 +127,7 @@ static void ask(user *u, int32_t argument)
         REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
     double largest, rms;
     ath_level_error(u->file, level, argument & 2 ? segment : 0, segment, &largest, &rms);
-    level = ath_depth_for(u->file, argument & 4 ? segment : 0, segment, argument, 0.02 * argument, 1080.0, 1.0);
+    level = ath_level_for(u->file, argument & 4 ? segment : 0, segment, argument, 0.02 * argument, 1080.0, 1.0);
     REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
     for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i, NULL);
     int32_t last = u->info.vertex_count - 1;

@@ -117,7 +117,9 @@ def build(target: str, used: Compiler, sanitizer: str = "address", folder: Path 
             unfinished.rename(objects[-1])
     program = parts / target
     if not program.exists():
-        _run([used.path, *flags, *objects, engine, "-o", program])
+        unfinished = program.with_suffix(f".{os.getpid()}")
+        _run([used.path, *flags, *objects, engine, "-o", unfinished])
+        unfinished.rename(program)
     return program
 
 
@@ -136,14 +138,16 @@ def _number(pattern: str, log: str) -> int:
     return int(found[-1]) if found else 0
 
 
-def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0) -> Outcome:
-    """Mutates for some time, from the seeds and what the corpus has, which grows."""
+def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0,
+         runs: int = -1) -> Outcome:
+    """Mutates for some time, or so many inputs, from the seeds and what the corpus has, which grows."""
     start = BUILD / "seeds" / target
     seeds.write_inputs(target, start)
     for folder in (corpus, finds):
         folder.mkdir(parents=True, exist_ok=True)
     before = set(finds.iterdir())
-    command = [program, corpus, start, f"-max_total_time={max(1, round(seconds))}", f"-timeout={TIMEOUT}",
+    command = [program, corpus, start, f"-max_total_time={max(1, round(seconds))}", f"-runs={runs}",
+               f"-timeout={TIMEOUT}",
                f"-rss_limit_mb={RSS_MB}", f"-malloc_limit_mb={MALLOC_MB}", f"-max_len={seeds.LARGEST}", f"-seed={seed}",
                f"-dict={HERE / 'ath.dict'}", f"-artifact_prefix={finds}/{target}-", "-print_final_stats=1", "-reload=0"]
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

@@ -50,7 +50,7 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
         try:
             summary = write_object(context, context.active_object, self.filepath, self.space == "WORLD",
                                    self.effort, self.attributes, **self._bound())
-        except Exception as error:  # told in one line
+        except Exception as error:  # reported in one line
             self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
             return {"CANCELLED"}
         self.report({"INFO"}, f"{summary.bytes:,} bytes, {summary.ratio:.1f} times smaller")
@@ -201,7 +201,8 @@ def _skin(obj, vertex_count: int):
     """The armature that moves the object, for finding its branches."""
     from athcodec.clip import Skin
 
-    armature = next((each.object for each in obj.modifiers if each.type == "ARMATURE" and each.object), None)
+    armatures = (modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")
+    armature = next(filter(None, armatures), None)
     if armature is None or len(obj.data.vertices) != vertex_count:
         return None
     bones = list(armature.data.bones)  # parents first
@@ -210,7 +211,7 @@ def _skin(obj, vertex_count: int):
     joints = [places.get(group.name, -1) for group in obj.vertex_groups]
     of_vertex = np.full(vertex_count, -1, np.int32)
     for vertex in obj.data.vertices:
-        weights = [(each.weight, joints[each.group]) for each in vertex.groups if joints[each.group] >= 0]
+        weights = [(group.weight, joints[group.group]) for group in vertex.groups if joints[group.group] >= 0]
         if weights:
             of_vertex[vertex.index] = max(weights)[1]
     if any(parent >= i for i, parent in enumerate(parents)):

@@ -15,7 +15,7 @@ from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringPrope
 from bpy_extras.io_utils import ImportHelper
 
 from . import player
-from .settings import DEEPEST
+from .player import DEEPEST
 
 DOMAINS = {"vertex": "POINT", "corner": "CORNER", "face": "FACE"}
 KINDS = {("f", ()): "FLOAT", ("f", (2,)): "FLOAT2", ("f", (3,)): "FLOAT_VECTOR", ("f", (4,)): "FLOAT_COLOR",
@@ -47,16 +47,16 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
                                description="Keep the path relative to the .blend, where that has been saved")
 
     def execute(self, context):
-        names = [each.name for each in self.files if each.name]
+        names = [file.name for file in self.files if file.name]
         paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
         for path in paths:
             try:
                 obj = add_object(context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip)
-            except Exception as error:  # of the file, told in one line
+            except Exception as error:  # of the file, reported in one line
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
-            for each in context.selected_objects:
-                each.select_set(False)
+            for selected in context.selected_objects:
+                selected.select_set(False)
             obj.select_set(True)
             context.view_layer.objects.active = obj
         return {"FINISHED"}
@@ -187,12 +187,12 @@ CLASSES = (IMPORT_OT_ath, IO_FH_ath)
 
 
 def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
     bpy.types.TOPBAR_MT_file_import.append(_menu)
 
 
 def unregister() -> None:
     bpy.types.TOPBAR_MT_file_import.remove(_menu)
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -10,10 +10,9 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from .settings import DEEPEST
-
+DEEPEST = -1  # the level of an object that shows the deepest one in its file
 _decoders: dict = {}  # path: (its size and time, the decoder, decoders of its clips by name)
-_problems: dict = {}  # name of an object: what keeps it from playing
+_problems: dict = {}  # name of an object: the error that keeps it from playing
 _moved: dict = {}  # name of an object: its path before the .blend was saved
 _busy = False
 
@@ -92,7 +91,7 @@ def positions_at(decoder, place: float, level: int) -> np.ndarray:
 
 
 def show(obj, scene) -> None:
-    """Put the scene's frame into an object; what goes wrong is kept for the panel and told once."""
+    """Put the scene's frame into an object; what goes wrong is kept for the panel and printed once."""
     if _busy or obj.type != "MESH" or not obj.ath.filepath or obj.mode == "EDIT":
         return
     try:

@@ -5,18 +5,15 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-DEEPEST = -1
+from . import player
+from .player import DEEPEST
 
 
 def _show(self, context) -> None:
-    from . import player
-
     player.show(self.id_data, context.scene)
 
 
 def _clip_names(self, context, text) -> list[str]:
-    from . import player
-
     return player.clip_names(self.id_data)
 
 

@@ -131,8 +131,8 @@ static void close_file(player *p)
 
 static void choose_level(player *p, double distance)
 {
-    int32_t at_least = ath_depth_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, PIXELS);
-    int32_t at_most = ath_depth_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN,
+    int32_t at_least = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, PIXELS);
+    int32_t at_most = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN,
                                     COMFORTABLE);
     if (p->level < at_least) p->level = at_least;
     if (p->level > at_most) p->level = at_most;

@@ -137,7 +137,7 @@ function arrange(first = null) {
   }
   const [ath] = opened;
   plants = [first ?? new Plant(ath)];
-  if (compare.value === "depths") plants = [new Plant(ath, ath.motion.clone()), ...plants];
+  if (compare.value === "levels") plants = [new Plant(ath, ath.motion.clone()), ...plants];
   if (compare.value === "file" && opened[1]) plants.push(new Plant(opened[1]));
   for (const plant of plants) {
     if (plant.show !== show.value) plant.setShow(show.value);
@@ -153,12 +153,12 @@ function arrange(first = null) {
     scene: stage.scene([plant.root]), before: (width, height) => plant.prepare(width, height),
   })));
   place();
-  depthControls();
-  setDepth(depth.value ?? "auto");
+  levelControls();
+  setLevel(level.value ?? "auto");
   clipControls();
   setLoop(state.loop);
   describe();
-  $("compare-depth-row").hidden = compare.value !== "depths";
+  $("compare-level-row").hidden = compare.value !== "levels";
   labels();
   if (state.forest) forestOn();
 }
@@ -172,7 +172,7 @@ function pictured(plant) {
 // When the first picture was drawn, and the first that differs from it.
 function markFirst() {
   const { motion } = plants.at(-1);
-  if (motion.depth < 0 || counters.firstMotion) return;
+  if (motion.level < 0 || counters.firstMotion) return;
   const now = { ms: performance.now() - counters.started, bytes: motion.bytesFetched, frame: motion.frame };
   counters.firstPicture ??= now;
   if (motion.frame !== counters.firstPicture.frame) counters.firstMotion = now;
@@ -208,9 +208,9 @@ function frameView() {
   stage.fog(stage.camera.position.distanceTo(stage.controls.target) * 0.7, 3.2 * reach + 4 * most);
 }
 
-// ---- depth, colour, what is shown ----
+// ---- level, colour, what is shown ----
 
-const depth = new Choice($("depth-choice"), (value) => setDepth(value));
+const level = new Choice($("level-choice"), (value) => setLevel(value));
 const colour = new Choice($("colour"), (value) => {
   for (const plant of plants) plant.setColour(value);
   $("scale").hidden = value !== "distance";
@@ -237,34 +237,34 @@ show.set("mesh");
 compare.set("off");
 $("scale").querySelector("i").style.background = heatGradient;
 
-function depthControls() {
-  const most = Math.max(...plants.map(({ motion }) => motion.depthCount)) - 1;
+function levelControls() {
+  const most = Math.max(...plants.map(({ motion }) => motion.levelCount)) - 1;
   const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
-  if (values.length <= 9) depth.fill(values, ["Auto", ...values.slice(1)]);
-  else depth.fill(["auto"], ["Automatic"]);
-  for (const id of ["depth", "compare-depth"]) $(id).max = most;
-  $("compare-depth").value = Math.min(1, most);
-  $("depth").value = most;
+  if (values.length <= 9) level.fill(values, ["Auto", ...values.slice(1)]);
+  else level.fill(["auto"], ["Automatic"]);
+  for (const id of ["level", "compare-level"]) $(id).max = most;
+  $("compare-level").value = Math.min(1, most);
+  $("level").value = most;
 }
 
-function setDepth(value) {
-  depth.set(value);
+function setLevel(value) {
+  level.set(value);
   const main = plants.at(-1);
   for (const plant of plants) {
-    const left = plants.length > 1 && plant !== main && compare.value === "depths";
-    plant.motion.setDepth(left ? Number($("compare-depth").value) : value === "auto" ? "auto" : Number(value));
+    const left = plants.length > 1 && plant !== main && compare.value === "levels";
+    plant.motion.setLevel(left ? Number($("compare-level").value) : value === "auto" ? "auto" : Number(value));
   }
-  $("compare-depth-value").value = $("compare-depth").value;
-  if (value !== "auto") $("depth").value = value;
+  $("compare-level-value").value = $("compare-level").value;
+  if (value !== "auto") $("level").value = value;
   state.dirty = true;
 }
 
-$("depth").addEventListener("input", () => setDepth($("depth").value));
-$("compare-depth").addEventListener("input", () => setDepth(depth.value));
+$("level").addEventListener("input", () => setLevel($("level").value));
+$("compare-level").addEventListener("input", () => setLevel(level.value));
 
 function labels() {
-  const names = plants.length < 2 ? [] : plants.map(({ ath, motion }) => (compare.value === "file" ? `${ath.fileName}, depth ${motion.depth}`
-    : `Depth ${Math.max(motion.depth, 0)} · ${rateText(motion.bitRate())}`));
+  const names = plants.length < 2 ? [] : plants.map(({ ath, motion }) => (compare.value === "file" ? `${ath.fileName}, level ${motion.level}`
+    : `Level ${Math.max(motion.level, 0)} · ${rateText(motion.bitRate())}`));
   const text = names.join("|");
   if (labels.text === text) return;
   labels.text = text;
@@ -308,7 +308,7 @@ function forestMaterial(lines, level) {
   return material;
 }
 
-// Bark, leaves or the file's own colours; by depth where nodes are told apart.
+// Bark, leaves or the file's own colours; by level where nodes are told apart.
 function tintForest(material, lines, level) {
   const plain = colour.value === "plain", stored = lines || plants[0].ath.geometry.hasAttribute("color");
   if (material.vertexColors !== (plain && stored)) material.needsUpdate = true;
@@ -317,7 +317,7 @@ function tintForest(material, lines, level) {
 }
 
 function colourForest() {
-  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.depth));
+  state.forest?.children.forEach((drawn) => tintForest(drawn.material, drawn.isLineSegments, drawn.userData.level));
 }
 
 function forestOn() {
@@ -327,12 +327,12 @@ function forestOn() {
   const forest = new ATHForest(plant.ath, { geometry: plant.forestGeometry(), material: forestMaterial });
   state.forest = forest;
   forest.levelOfDetail = $("forest-lod").checked;
-  forest.addEventListener("depth", () => { state.dirty = true; });
+  forest.addEventListener("level", () => { state.dirty = true; });
   plant.root.add(forest);
   setLoop(state.loop);
   plantForest();
   for (const child of plant.root.children) if (child !== forest) child.visible = false;
-  plant.motion.setDepth(plant.motion.depthCount - 1); // near instances show all of it
+  plant.motion.setLevel(plant.motion.levelCount - 1); // near instances show all of it
 }
 
 function plantForest() {
@@ -346,7 +346,7 @@ function forestOff() {
   state.forest.dispose();
   state.forest = null;
   plants[0].setShow(show.value);
-  setDepth(depth.value);
+  setLevel(level.value);
   setLoop(state.loop);
   place();
 }
@@ -379,7 +379,7 @@ forestNumbers();
 
 function forestBars() {
   const { counts, culled } = state.forest, most = Math.max(1, ...counts, culled);
-  const all = [...counts.map((count, level) => [`Depth ${level}`, count]), ["Unseen", culled]];
+  const all = [...counts.map((count, level) => [`Level ${level}`, count]), ["Unseen", culled]];
   if ($("forest-bars").children.length !== all.length)
     $("forest-bars").replaceChildren(...all.map(() => {
       const row = document.createElement("div");
@@ -526,28 +526,28 @@ function tell() {
   const main = plants.at(-1), { motion, ath } = main, { unit } = ath.metadata, share = motion.bytesFetched / motion.bytesTotal;
   $("progress").firstElementChild.style.width = `${100 * Math.min(1, share)}%`;
   $("progress").setAttribute("aria-valuenow", String(Math.round(100 * Math.min(1, share))));
-  const shown = Math.max(motion.depth, 0), error = motion.error(shown).max;
+  const shown = Math.max(motion.level, 0), error = motion.error(shown).max;
   rows($("facts"), [
     ["Fetched", `${bytesText(motion.bytesFetched)} of ${bytesText(motion.bytesTotal)}`],
     ["This view", `${rateText(motion.bitRate(shown))}`],
-    ["Depth", `${shown} of ${motion.depthCount - 1}`],
+    ["Level", `${shown} of ${motion.levelCount - 1}`],
     ["Within", lengthText(error, unit)],
     ...(motion.clip.loop ? [["Loop seam", lengthText(motion.seamError(shown), unit)]] : []),
     ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
     ["Frames", `${counters.fps.toFixed(0)} per second`],
     ["Vertices", countText(state.forest ? state.forest.vertices : plants.reduce((sum, plant) => sum + plant.vertices, 0))],
   ]);
-  $("depth-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
-    : motion.depth < motion.target ? `Depth ${motion.target} is still on its way` : `No vertex is further off than ${lengthText(error, unit)}`;
-  if (motion.automatic) $("depth").value = motion.target;
-  $("scale-title").textContent = "Distance from the full depth";
+  $("level-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
+    : motion.level < motion.target ? `Level ${motion.target} is still on its way` : `No vertex is further off than ${lengthText(error, unit)}`;
+  if (motion.automatic) $("level").value = motion.target;
+  $("scale-title").textContent = "Distance from the deepest level";
   $("scale-middle").textContent = lengthText(main.heatMost / 4, unit);
   $("scale-high").textContent = lengthText(main.heatMost, unit);
   $("time").max = limit();
   const time = motion.switching === "waiting" ? 0 : Math.min(state.time, limit());
   if (document.activeElement !== $("time") || state.playing) $("time").value = time;
   $("clock").value = `${time.toFixed(2)} s`;
-  paintReady($("ready"), [...motion.readyDepths], motion.depthCount);
+  paintReady($("ready"), [...motion.readyLevels], motion.levelCount);
   labels();
   if (state.forest) forestBars();
 }
@@ -609,17 +609,17 @@ function changeSpeed(by) {
   state.speed = Number($("speed").value);
 }
 
-function changeDepth(by) {
-  const { motion } = plants.at(-1), from = motion.automatic ? motion.target : Number(depth.value);
-  setDepth(String(Math.max(0, Math.min(motion.depthCount - 1, from + by))));
+function changeLevel(by) {
+  const { motion } = plants.at(-1), from = motion.automatic ? motion.target : Number(level.value);
+  setLevel(String(Math.max(0, Math.min(motion.levelCount - 1, from + by))));
 }
 
 const KEYS = {
   " ": () => setPlaying(!state.playing), ArrowLeft: (event) => step(event.shiftKey ? -10 : -1), ArrowRight: (event) => step(event.shiftKey ? 10 : 1),
   Home: () => seek(0), End: () => { setPlaying(false); seek(plants[0].motion.clip.duration); },
   ",": () => changeSpeed(-1), ".": () => changeSpeed(1), l: () => $("loop").click(), n: (event) => nextClip(event.shiftKey ? -1 : 1),
-  "-": () => changeDepth(-1), "+": () => changeDepth(1), "=": () => changeDepth(1), a: () => setDepth("auto"),
-  c: () => colour.next(), s: () => show.next(), d: () => compare.pick(compare.value === "off" ? "depths" : "off"),
+  "-": () => changeLevel(-1), "+": () => changeLevel(1), "=": () => changeLevel(1), a: () => setLevel("auto"),
+  c: () => colour.next(), s: () => show.next(), d: () => compare.pick(compare.value === "off" ? "levels" : "off"),
   f: () => forestSwitch(!state.forest), r: () => { stage.moved = false; frameView(); }, p: picture, h: togglePanel, "?": () => $("keys").showModal(),
 };
 
@@ -637,14 +637,14 @@ requestAnimationFrame(tick);
 
 /** For scripts and tests. */
 globalThis.athcodecViewer = {
-  counters, state, stage, open, seek, setPlaying, setDepth, playClip, forestSwitch, frameView,
+  counters, state, stage, open, seek, setPlaying, setLevel, playClip, forestSwitch, frameView,
   get plants() { return plants; },
   get motion() { return plants.at(-1)?.motion; },
   async shown(seconds, level) {
     setPlaying(false);
     const { motion } = plants.at(-1);
     await motion.show(motion.start + seconds, level);
-    return { depth: motion.depth, frame: motion.frame };
+    return { level: motion.level, frame: motion.frame };
   },
   decoded: async (seconds, level) => {
     const { motion } = plants.at(-1);

@@ -46,9 +46,9 @@ export class Plant {
     this.#orders = branch.map((b) => depth[b]);
     this.onArrays = () => this.#arrays();
     ath.addEventListener("arrays", this.onArrays);
-    this.onDepth = () => { if (this.colour === "node") this.#numberNodes(); };
+    this.onLevel = () => { if (this.colour === "node") this.#numberNodes(); };
     this.onFrame = () => { if (this.colour === "distance") this.paint(); };
-    motion.addEventListener("depth", this.onDepth);
+    motion.addEventListener("level", this.onLevel);
     motion.addEventListener("frame", this.onFrame);
     this.#build();
   }
@@ -150,7 +150,7 @@ export class Plant {
   }
 
   async #numberNodes() {
-    if (this.motion.depth < 0) return;
+    if (this.motion.level < 0) return;
     this.#node = await this.motion.nodeNumbers();
     this.paint();
   }
@@ -168,7 +168,7 @@ export class Plant {
     }
     if (colour === "distance") {
       const { distances } = motion;
-      this.heatMost = Math.max(...this.beside.map((plant) => (plant.motion.depth < 0 ? 0 : plant.motion.error(plant.motion.depth).max)));
+      this.heatMost = Math.max(...this.beside.map((plant) => (plant.motion.level < 0 ? 0 : plant.motion.error(plant.motion.level).max)));
       return (vertex) => heat(distances && this.heatMost ? Math.sqrt(distances[vertex] / this.heatMost) : 0);
     }
     return this.#barks();
@@ -206,7 +206,7 @@ export class Plant {
 
   dispose() {
     this.ath.removeEventListener("arrays", this.onArrays);
-    this.motion.removeEventListener("depth", this.onDepth);
+    this.motion.removeEventListener("level", this.onLevel);
     this.motion.removeEventListener("frame", this.onFrame);
     this.#clear();
   }

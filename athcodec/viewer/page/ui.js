@@ -81,11 +81,11 @@ export function rows(list, entries) {
 }
 
 /** What is here over time: the deeper, the stronger. */
-export function paintReady(element, levels, depthCount) {
+export function paintReady(element, levels, levelCount) {
   const stops = [];
   levels.forEach((level, i) => {
     if (i > 0 && level === levels[i - 1]) return;
-    const shade = level < 0 ? "transparent" : `color-mix(in srgb, var(--accent) ${Math.round(20 + 80 * ((level + 1) / depthCount) ** 1.5)}%, transparent)`;
+    const shade = level < 0 ? "transparent" : `color-mix(in srgb, var(--accent) ${Math.round(20 + 80 * ((level + 1) / levelCount) ** 1.5)}%, transparent)`;
     let end = i;
     while (end < levels.length && levels[end] === level) end++;
     stops.push(`${shade} ${(100 * i) / levels.length}% ${(100 * end) / levels.length}%`);

@@ -1,5 +1,5 @@
-// Many instances of one plant, each with a place, size, turn, clip and time of its own, drawn at the depth that its
-// distance asks for: a few draw calls per frame and clip. The motion of a clip at a depth lies in one texture for all
+// Many instances of one plant, each with a place, size, turn, clip and time of its own, drawn at the level that its
+// distance asks for: a few draw calls per frame and clip. The motion of a clip at a level lies in one texture for all
 // instances of it.
 
 import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBufferGeometry, LineBasicMaterial, LineSegments,
@@ -9,7 +9,7 @@ import { dataTexture, roundOf } from "./ATHMotion.js";
 import { clustered, gather } from "./geometry.js";
 import { injectMotion, motionUniforms } from "./shader.js";
 
-const MOST_TEXELS = 4 << 20; // of one depth: 64 MiB; longer clips are played at fewer frames a second
+const MOST_TEXELS = 4 << 20; // of one level: 64 MiB; longer clips are played at fewer frames a second
 const TALLEST = 4096;        // rows of a texture that every device has
 const CELL = 1.5;            // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;           // from one geometry to the next
@@ -23,7 +23,7 @@ const breath = () => new Promise((done) => { setTimeout(done); });
 export class ATHForest extends Group {
   levelOfDetail = true;
   pixels = 1;
-  counts = [];     // instances drawn, by depth
+  counts = [];     // instances drawn, by level
   vertices = 0;    // drawn, all instances
   culled = 0;
 
@@ -32,15 +32,15 @@ export class ATHForest extends Group {
                         // rows, perRow}
   #shown = [];          // those that the motion's clip was drawn with last
   #baking = new Set();
-  #baked = new Map();   // of every clip: depths
+  #baked = new Map();   // of every clip: levels
   #motions = new Map(); // of clips that only instances play: what has them fetched
   #places = new Float32Array(0);
   #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
   #material;
   #geometry;
 
-  /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, depth): makes the material of a
-   * depth (default: like ath.object's). */
+  /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, level): makes the material of a
+   * level (default: like ath.object's). */
   constructor(ath, { geometry = ath.geometry ?? ath.lines, material = plainMaterial } = {}) {
     super();
     this.#ath = ath;
@@ -53,7 +53,7 @@ export class ATHForest extends Group {
     return this.#places.length / 4;
   }
 
-  /** Depths of the motion's clip that can be drawn. */
+  /** Levels of the motion's clip that can be drawn. */
   get baked() {
     return this.#baked.get(this.#ath.motion.clip.index) ?? [];
   }
@@ -62,7 +62,7 @@ export class ATHForest extends Group {
   setInstances(instances) {
     const { motion } = this.#ath;
     for (const { clip } of instances) if (clip !== undefined && !this.#motions.has(clip))
-      this.#motions.set(clip, motion.clone().play(clip).setDepth(motion.depthCount - 1));
+      this.#motions.set(clip, motion.clone().play(clip).setLevel(motion.levelCount - 1));
     const numberOf = (clip) => this.#motions.get(clip)?.clip.index ?? MOTIONS;
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
     this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) =>
@@ -74,13 +74,13 @@ export class ATHForest extends Group {
     return [...this.#bins.values()].flat();
   }
 
-  /** Gets all depths ready to be drawn that are here, of all clips that instances play: once per frame. */
+  /** Gets all levels ready to be drawn that are here, of all clips that instances play: once per frame. */
   bakeReady() {
     for (const motion of [this.#ath.motion, ...this.#motions.values()])
-      for (let level = 0; level <= motion.readyDepth; level++) this.#bake(level, motion.clip);
+      for (let level = 0; level <= motion.readyLevel; level++) this.#bake(level, motion.clip);
   }
 
-  /** Gets a depth ready to be drawn; all bytes of it have to be here. */
+  /** Gets a level ready to be drawn; all bytes of it have to be here. */
   bake(level) {
     return this.#bake(level, this.#ath.motion.clip);
   }
@@ -102,12 +102,12 @@ export class ATHForest extends Group {
     uniforms.athStride.value = exactCount > 0 ? (known.texels - 3 * nodeCount) / exactCount : 1;
     await this.#draw(level, clip, known, { uniforms, rows: baked.rows, perRow: roundOf(clip) / baked.rows || 1 });
     this.#baked.set(clip.index, [...this.#baked.get(clip.index) ?? [], level]);
-    this.dispatchEvent({ type: "depth", level });
+    this.dispatchEvent({ type: "level", level });
   }
 
-  // Geometries of a depth: the finest for where its error is a pixel, coarser ones up to where the depth before takes over.
+  // Geometries of a level: the finest for where its error is a pixel, coarser ones up to where the level before takes over.
   async #draw(level, clip, known, played) {
-    const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.depthCount - 1;
+    const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.levelCount - 1;
     const least = clip.errors[level].max, most = level > 0 ? clip.errors[level - 1].max : sphere.radius / 4;
     const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
     node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
@@ -132,7 +132,7 @@ export class ATHForest extends Group {
       if (name !== "athPart") geometry.setAttribute(name, attribute);
     geometry.setAttribute("athPart", new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    Object.assign(drawn.userData, { depth: played.level, clip: clip.index });
+    Object.assign(drawn.userData, { level: played.level, clip: clip.index });
     drawn.frustumCulled = false; // instances are, one by one
     const bin = { ...played, drawn, size: source.length, filled: 0 };
     this.#makeRoom(bin);
@@ -177,7 +177,7 @@ export class ATHForest extends Group {
       const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
       if (own.length > 0) this.#put(i, own[this.levelOfDetail ? this.#choose(own, tolerance) : 0], seconds);
     }
-    this.counts = new Array(this.#ath.motion.depthCount).fill(0);
+    this.counts = new Array(this.#ath.motion.levelCount).fill(0);
     this.vertices = 0;
     for (const bin of bins) this.#show(bin);
   }

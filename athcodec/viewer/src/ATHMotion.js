@@ -1,4 +1,4 @@
-// The motion of one loaded plant: what time and depth it shows, what of it is here, and how it gets into a material.
+// The motion of one loaded plant: what time and level it shows, what of it is here, and how it gets into a material.
 // Decoding is the worker's; this holds the textures that the vertex shaders read.
 
 import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, InstancedBufferAttribute,
@@ -24,7 +24,7 @@ export function roundOf({ duration, frameCount }) {
 
 const SHAPES = 0x13; // chunks that serve all segments
 
-/** Events: "frame" (a new picture is shown), "depth" (another depth is), "clip" (another clip is), "progress" (bytes
+/** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
  * came), "ready" (what can be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
 export class ATHMotion extends EventDispatcher {
   clip;               // that plays, one of `clips`
@@ -32,11 +32,11 @@ export class ATHMotion extends EventDispatcher {
   start = 0;          // the time of the clip's first frame
   wrap;               // "marked", "clamp", "loop", "pingpong"
   frame = 0;          // of the picture that is shown; -1: of none yet
-  depth = -1;
+  level = -1;
   held = false;
   automatic = true;
-  target = 0;         // the depth that is asked for
-  pixels = 1;         // error on the screen that automatic depth allows
+  target = 0;         // the level that is asked for
+  pixels = 1;         // error on the screen that automatic level allows
   heat = false;       // whether pictures come with `distances`
   distances = null;   // per vertex, from the deepest position that is here
   mode = "matrices";
@@ -46,8 +46,8 @@ export class ATHMotion extends EventDispatcher {
   #channel;
   #id;
   #geometries = new Set();
-  #parts = new Map();     // depth: {parts, texels}
-  #perVertex = new Map(); // depth: athPart in source order
+  #parts = new Map();     // level: {parts, texels}
+  #perVertex = new Map(); // level: athPart in source order
   #textures = new Map();
   #spare = null;
   #asked = null;          // what the worker was asked last, "" while it is at work
@@ -98,7 +98,7 @@ export class ATHMotion extends EventDispatcher {
     return this.#old && (this.#old.begun ? "fading" : "waiting");
   }
 
-  get depthCount() {
+  get levelCount() {
     return this.info.levelCount;
   }
 
@@ -119,36 +119,36 @@ export class ATHMotion extends EventDispatcher {
     return this.#channel.state.requests;
   }
 
-  /** Bytes of the clip's motion up to a depth. */
-  motionBytes(depth) {
+  /** Bytes of the clip's motion up to a level. */
+  motionBytes(level) {
     const { firstSegment, segmentCount } = this.clip;
-    const needed = ({ level, kind, segment }) => level <= depth
-      && (kind === SHAPES || (segment >= firstSegment && segment < firstSegment + segmentCount));
-    return this.#channel.chunks.reduce((sum, chunk) => sum + (needed(chunk) ? chunk.length : 0), 0);
+    const needed = this.#channel.chunks.filter((chunk) => chunk.level <= level
+      && (chunk.kind === SHAPES || (chunk.segment >= firstSegment && chunk.segment < firstSegment + segmentCount)));
+    return needed.reduce((sum, { length }) => sum + length, 0);
   }
 
-  /** Bits per second of motion at a depth. */
-  bitRate(depth = Math.max(this.depth, 0)) {
-    return this.clip.duration > 0 ? 8 * this.motionBytes(depth) / this.clip.duration : 0;
+  /** Bits per second of motion at a level. */
+  bitRate(level = Math.max(this.level, 0)) {
+    return this.clip.duration > 0 ? 8 * this.motionBytes(level) / this.clip.duration : 0;
   }
 
-  /** Largest and root-mean-square error of a depth in the clip: {max, rms}. */
-  error(depth) {
-    return this.clip.errors[depth];
+  /** Largest and root-mean-square error of a level in the clip: {max, rms}. */
+  error(level) {
+    return this.clip.errors[level];
   }
 
-  /** How far off the step from a loop's last frame to its first is at a depth, at most; 0 where the clip is none. */
-  seamError(depth) {
-    return this.clip.seams[depth];
+  /** How far off the step from a loop's last frame to its first is at a level, at most; 0 where the clip is none. */
+  seamError(level) {
+    return this.clip.seams[level];
   }
 
-  /** The parts of the clip that can be shown at `depth`, in seconds from its first frame: [{start, end}]. */
-  ready(depth) {
+  /** The parts of the clip that can be shown at `level`, in seconds from its first frame: [{start, end}]. */
+  ready(level) {
     const { times, segments } = this.#channel, { firstFrame, frameCount, firstSegment } = this.clip, found = [];
     const last = firstFrame + frameCount - 1;
     const at = (segment) => times[Math.min(segments[segment], last)] - times[firstFrame];
-    this.readyDepths.forEach((level, i) => {
-      if (level < depth) return;
+    this.readyLevels.forEach((ready, i) => {
+      if (ready < level) return;
       const start = at(firstSegment + i), end = at(firstSegment + i + 1);
       if (found.at(-1)?.end === start) found.at(-1).end = end;
       else found.push({ start, end });
@@ -156,19 +156,19 @@ export class ATHMotion extends EventDispatcher {
     return found;
   }
 
-  /** The deepest depth that each segment of the clip can be shown at; -1: none. */
-  get readyDepths() {
+  /** The deepest level that each segment of the clip can be shown at; -1: none. */
+  get readyLevels() {
     const { firstSegment, segmentCount } = this.clip;
     return this.#channel.state.ready.subarray(firstSegment, firstSegment + segmentCount);
   }
 
-  /** The deepest depth that every part of the clip can be shown at; -1: none. */
-  get readyDepth() {
-    return Math.min(...this.readyDepths);
+  /** The deepest level that every part of the clip can be shown at; -1: none. */
+  get readyLevel() {
+    return Math.min(...this.readyLevels);
   }
 
   get complete() {
-    return this.readyDepth === this.depthCount - 1;
+    return this.readyLevel === this.levelCount - 1;
   }
 
   // ---- what is shown ----
@@ -190,7 +190,7 @@ export class ATHMotion extends EventDispatcher {
   play(clip, { fade = 0, at = 0 } = {}) {
     const next = this.clips.find(({ index, name }) => clip === index || clip === name);
     if (!next) throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
-    if (this.depth >= 0) this.#old = { ...this.#mostlyShown(), at, fade, passed: 0, begun: false };
+    if (this.level >= 0) this.#old = { ...this.#mostlyShown(), at, fade, passed: 0, begun: false };
     Object.assign(this, { clip: next, start: this.time - at });
     this.#ask();
     return this;
@@ -205,10 +205,10 @@ export class ATHMotion extends EventDispatcher {
     if (this.#old.begun && this.#old.passed >= this.#old.fade) this.#old = null;
   }
 
-  /** A depth from 0 on, or "auto": update() then chooses it by the error on the screen. */
-  setDepth(depth) {
-    this.automatic = depth === "auto";
-    if (!this.automatic) this.target = MathUtils.clamp(depth, 0, this.depthCount - 1);
+  /** A level from 0 on, or "auto": update() then chooses it by the error on the screen. */
+  setLevel(level) {
+    this.automatic = level === "auto";
+    if (!this.automatic) this.target = MathUtils.clamp(level, 0, this.levelCount - 1);
     this.#ask();
     return this;
   }
@@ -220,8 +220,8 @@ export class ATHMotion extends EventDispatcher {
     return this;
   }
 
-  /** The coarsest depth whose largest error is at most `pixels` on a screen `height` pixels high. */
-  depthFor(camera, height, matrixWorld = null, pixels = this.pixels) {
+  /** The coarsest level whose largest error is at most `pixels` on a screen `height` pixels high. */
+  levelFor(camera, height, matrixWorld = null, pixels = this.pixels) {
     const sphere = this.#channel.sphere;
     centre.copy(sphere.center);
     let size = 1;
@@ -232,26 +232,26 @@ export class ATHMotion extends EventDispatcher {
     const distance = Math.max(centre.distanceTo(scale.setFromMatrixPosition(camera.matrixWorld)) - sphere.radius * size, 1e-9);
     const perUnit = camera.isOrthographicCamera ? height * camera.zoom / (camera.top - camera.bottom)
       : height / (2 * Math.tan(MathUtils.degToRad(camera.fov) / 2) / camera.zoom * distance);
-    for (let depth = 0; depth < this.depthCount; depth++)
-      if (this.error(depth).max * size * perUnit <= pixels) return depth;
-    return this.depthCount - 1;
+    for (let level = 0; level < this.levelCount; level++)
+      if (this.error(level).max * size * perUnit <= pixels) return level;
+    return this.levelCount - 1;
   }
 
-  /** Automatic depth for a camera; once per frame, before setTime(). */
+  /** Automatic level for a camera; once per frame, before setTime(). */
   update(camera, height, object = null) {
-    if (this.automatic) this.target = this.depthFor(camera, height, object?.matrixWorld ?? null);
+    if (this.automatic) this.target = this.levelFor(camera, height, object?.matrixWorld ?? null);
     return this;
   }
 
-  /** The clip at `seconds` and `depth`, decoded there and then: resolves when it is shown. Rejects where bytes of it
+  /** The clip at `seconds` and `level`, decoded there and then: resolves when it is shown. Rejects where bytes of it
    * are missing. */
-  show(seconds, depth = this.target) {
-    return this.#exactly(seconds, { level: depth, heat: this.heat, positions: this.mode === "positions" });
+  show(seconds, level = this.target) {
+    return this.#exactly(seconds, { level, heat: this.heat, positions: this.mode === "positions" });
   }
 
-  /** All vertices at `seconds` and `depth` in source order, 3 numbers each, whatever is shown. */
-  async positions(seconds, depth = this.target) {
-    const picture = await this.#exactly(seconds, { level: depth, positions: true, aside: true });
+  /** All vertices at `seconds` and `level` in source order, 3 numbers each, whatever is shown. */
+  async positions(seconds, level = this.target) {
+    const picture = await this.#exactly(seconds, { level, positions: true, aside: true });
     return picture.data;
   }
 
@@ -313,22 +313,22 @@ export class ATHMotion extends EventDispatcher {
     if (!answer && this.#stale) this.#ask();
   }
 
-  async #learn(depth) {
-    if (!this.#parts.has(depth)) this.#parts.set(depth, await this.#channel.parts(depth));
+  async #learn(level) {
+    if (!this.#parts.has(level)) this.#parts.set(level, await this.#channel.parts(level));
   }
 
   #take({ shown, frame, data, heat, ms, held, clip, exactly }) {
-    const changed = shown !== this.depth;
-    Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, depth: shown });
+    const changed = shown !== this.level;
+    Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, level: shown });
     if (this.mode === "positions") this.#write(data);
     else this.#upload(shown, data);
     if (changed) {
       for (const geometry of this.#geometries) this.#setParts(geometry);
-      this.dispatchEvent({ type: "depth", depth: shown });
+      this.dispatchEvent({ type: "level", level: shown });
     }
     if (this.switching === "waiting" && clip === this.clip.index) this.#begin(this.#old);
     if (exactly) this.#old = null;
-    this.dispatchEvent({ type: "frame", frame, depth: shown });
+    this.dispatchEvent({ type: "frame", frame, level: shown });
   }
 
   // The clip that plays is seen for the first time.
@@ -339,18 +339,18 @@ export class ATHMotion extends EventDispatcher {
     this.dispatchEvent({ type: "clip", clip: this.clip });
   }
 
-  #upload(depth, data) {
-    const old = this.#textures.get(depth);
+  #upload(level, data) {
+    const old = this.#textures.get(level);
     if (old && old.image.data.length === data.length) {
       this.#spare = old.image.data.buffer;
       old.image.data = data;
       old.needsUpdate = true;
     } else {
       old?.dispose();
-      this.#textures.set(depth, dataTexture(data));
+      this.#textures.set(level, dataTexture(data));
     }
-    const { texels, parts: { nodeCount, exactCount } } = this.#parts.get(depth);
-    this.uniforms.athData.value = this.#textures.get(depth);
+    const { texels, parts: { nodeCount, exactCount } } = this.#parts.get(level);
+    this.uniforms.athData.value = this.#textures.get(level);
     this.uniforms.athStride.value = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
   }
 
@@ -367,7 +367,7 @@ export class ATHMotion extends EventDispatcher {
   /** What the shader makes of the texture that it reads now: 3 numbers per vertex, in source order. */
   uploaded() {
     const data = this.uniforms.athData.value.image.data, { rest } = this.#channel, out = new Float32Array(rest.length);
-    this.#partOfVertices(this.depth).forEach((part, vertex) => {
+    this.#partOfVertices(this.level).forEach((part, vertex) => {
       const at = 4 * (Math.abs(part) - 1), [x, y, z] = rest.subarray(3 * vertex, 3 * vertex + 3);
       for (let k = 0; k < 3; k++)
         out[3 * vertex + k] = part < 0 ? data[at + k]
@@ -404,25 +404,25 @@ export class ATHMotion extends EventDispatcher {
 
   #setPart(geometry, name, source) {
     const there = geometry.getAttribute(name), array = there?.array ?? new Float32Array(source.length);
-    const parts = this.depth >= 0 ? this.#partOfVertices(this.depth) : null;
+    const parts = this.level >= 0 ? this.#partOfVertices(this.level) : null;
     if (parts) for (let i = 0; i < source.length; i++) array[i] = parts[source[i]];
     if (there) there.needsUpdate = true;
     else geometry.setAttribute(name, new (geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute)(array, 1));
   }
 
   // athPart of every vertex in source order: 1 + first texel of its node's matrix, or minus that of its position.
-  #partOfVertices(depth) {
-    if (!this.#perVertex.has(depth)) this.#perVertex.set(depth, this.#channel.partOfVertices(this.#parts.get(depth)));
-    return this.#perVertex.get(depth);
+  #partOfVertices(level) {
+    if (!this.#perVertex.has(level)) this.#perVertex.set(level, this.#channel.partOfVertices(this.#parts.get(level)));
+    return this.#perVertex.get(level);
   }
 
-  /** Per vertex in source order, the branch (file order) whose node moves it at a depth; its own where it moves alone. */
-  async nodeNumbers(depth = this.depth) {
-    await this.#learn(depth);
-    return this.#channel.nodeNumbers(this.#parts.get(depth));
+  /** Per vertex in source order, the branch (file order) whose node moves it at a level; its own where it moves alone. */
+  async nodeNumbers(level = this.level) {
+    await this.#learn(level);
+    return this.#channel.nodeNumbers(this.#parts.get(level));
   }
 
-  /** A second view of the same file, with a clip, a time and a depth of its own. */
+  /** A second view of the same file, with a clip, a time and a level of its own. */
   clone() {
     return this.#channel.view(this.clip);
   }

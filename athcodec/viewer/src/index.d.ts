@@ -13,9 +13,9 @@
  *
  * A file holds one clip or several of one plant: `ath.motion.clips`, `ath.motion.play("storm", { fade: 0.5 })`.
  *
- * Files are fetched by HTTP ranges, depth by depth and ahead of the time that is shown, as deep as is asked for, and only
+ * Files are fetched by HTTP ranges, level by level and ahead of the time that is shown, as deep as is asked for, and only
  * the clips that play; from a server without ranges in one download, which plays while it grows. Workers decode (ath_worker.js, beside the module).
- * Depths, levels and errors are those of the file; positions are in its units, `metadata.unit`, and its axes,
+ * Levels and errors are those of the file; positions are in its units, `metadata.unit`, and its axes,
  * `metadata.up_axis`; nothing is scaled or turned. Materials work with WebGLRenderer; for others see setMode().
  */
 
@@ -109,9 +109,9 @@ export interface ATHClip {
 
 export interface ATHMotionEvents {
   /** A new picture is in the textures. */
-  frame: { frame: number; depth: number };
-  /** Another depth is shown. */
-  depth: { depth: number };
+  frame: { frame: number; level: number };
+  /** Another level is shown. */
+  level: { level: number };
   /** A clip that play() asked for begins: it is shown, or fades in. */
   clip: { clip: ATHClip };
   /** Bytes came. */
@@ -141,7 +141,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   readonly switching: "waiting" | "fading" | null;
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
-  readonly depthCount: number;
+  readonly levelCount: number;
 
   /** Seconds, as asked for; those of the clip's first frame. */
   readonly time: number;
@@ -153,22 +153,22 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Whether the clip repeats from its first frame, by that. */
   readonly loops: boolean;
   setTime(seconds: number): this;
-  /** A depth, or "auto": the coarsest whose largest error is at most `pixels` on the screen, by update(). What is not
-   * here or not decoded yet is shown at the deepest depth that is. */
-  setDepth(depth: number | "auto"): this;
+  /** A level, or "auto": the coarsest whose largest error is at most `pixels` on the screen, by update(). What is not
+   * here or not decoded yet is shown at the deepest level that is. */
+  setLevel(level: number | "auto"): this;
   pixels: number;
-  /** Chooses the automatic depth: once per frame, before setTime(). height: of the picture in pixels. */
+  /** Chooses the automatic level: once per frame, before setTime(). height: of the picture in pixels. */
   update(camera: Camera, height: number, object?: Object3D): this;
-  depthFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
-  /** Decodes this very time and depth and shows it. Rejects where bytes are missing or damaged. */
-  show(seconds: number, depth?: number): Promise<unknown>;
+  levelFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
+  /** Decodes this very time and level and shows it. Rejects where bytes are missing or damaged. */
+  show(seconds: number, level?: number): Promise<unknown>;
   /** All vertices in source order, 3 numbers each; what is shown stays. Rejects like show(). */
-  positions(seconds: number, depth?: number): Promise<Float32Array>;
+  positions(seconds: number, level?: number): Promise<Float32Array>;
 
-  /** The depth and frame of the file (with a fraction) that are shown; depth -1: none yet. */
-  readonly depth: number;
+  /** The level and frame of the file (with a fraction) that are shown; level -1: none yet. */
+  readonly level: number;
   readonly frame: number;
-  /** The depth that is wanted. */
+  /** The level that is wanted. */
   readonly target: number;
   readonly automatic: boolean;
   /** Whether the nearer frame is shown in place of a blend, its neighbour not being decoded yet. */
@@ -179,11 +179,11 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   heat: boolean;
   readonly distances: Float32Array | null;
 
-  /** What of the clip can be shown at a depth, in seconds from its first frame. */
-  ready(depth: number): { start: number; end: number }[];
-  /** The deepest depth that is here for each segment of the clip, and for all of it; -1: none. */
-  readonly readyDepths: Int8Array;
-  readonly readyDepth: number;
+  /** What of the clip can be shown at a level, in seconds from its first frame. */
+  ready(level: number): { start: number; end: number }[];
+  /** The deepest level that is here for each segment of the clip, and for all of it; -1: none. */
+  readonly readyLevels: Int8Array;
+  readonly readyLevel: number;
   /** Whether all of the clip is here. */
   readonly complete: boolean;
   /** The last of the events "stopped" and "damaged", of which one may have come before there was a listener. */
@@ -191,14 +191,14 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   readonly bytesFetched: number;
   readonly bytesTotal: number;
   readonly requests: number;
-  /** Of the clip: bytes up to a depth; bits per second; error, in the file's units; how far off the step from a loop's
+  /** Of the clip: bytes up to a level; bits per second; error, in the file's units; how far off the step from a loop's
    * last frame to its first is, at most. */
-  motionBytes(depth: number): number;
-  bitRate(depth?: number): number;
-  error(depth: number): { max: number; rms: number };
-  seamError(depth: number): number;
-  /** Per vertex in source order, the branch whose node moves it at a depth; its own where it moves alone. */
-  nodeNumbers(depth?: number): Promise<Int32Array>;
+  motionBytes(level: number): number;
+  bitRate(level?: number): number;
+  error(level: number): { max: number; rms: number };
+  seamError(level: number): number;
+  /** Per vertex in source order, the branch whose node moves it at a level; its own where it moves alone. */
+  nodeNumbers(level?: number): Promise<Int32Array>;
   refresh(): void;
   /** What the vertex shader makes of the texture, computed here. */
   uploaded(): Float32Array;
@@ -209,7 +209,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   attach<T extends BufferGeometry>(geometry: T): T;
   detach(geometry: BufferGeometry): void;
   readonly uniforms: Record<"athData" | "athStride" | "athForest", IUniform>;
-  /** A second motion of the same file, with a clip, a time and a depth of its own. */
+  /** A second motion of the same file, with a clip, a time and a level of its own. */
   clone(): ATHMotion;
   dispose(): void;
 }
@@ -226,27 +226,27 @@ export interface ATHInstance {
   clip?: string | number;
 }
 
-/** Instances of one file, each drawn at the depth that its distance asks for. One whose clip is not here yet plays the
- * motion's. Event: "depth", when one can be drawn. */
+/** Instances of one file, each drawn at the level that its distance asks for. One whose clip is not here yet plays the
+ * motion's. Event: "level", when one can be drawn. */
 export class ATHForest extends Group {
   constructor(ath: ATH, options?: {
     geometry?: BufferGeometry;
-    material?: (isLines: boolean, depth: number) => Material;
+    material?: (isLines: boolean, level: number) => Material;
   });
   setInstances(instances: ATHInstance[]): void;
   /** Gets ready what is here of all clips that instances play: once per frame, until it is done. */
   bakeReady(): void;
-  /** Gets a depth of the motion's clip ready, all of whose bytes are here (motion.readyDepth). */
-  bake(depth: number): Promise<void>;
-  /** Chooses depths and what is in view: once per frame. */
+  /** Gets a level of the motion's clip ready, all of whose bytes are here (motion.readyLevel). */
+  bake(level: number): Promise<void>;
+  /** Chooses levels and what is in view: once per frame. */
   update(camera: Camera, height: number, seconds: number): void;
   levelOfDetail: boolean;
   /** Error on the screen that is allowed, in pixels. */
   pixels: number;
   readonly count: number;
-  /** Depths of the motion's clip that can be drawn. */
+  /** Levels of the motion's clip that can be drawn. */
   readonly baked: number[];
-  /** Instances drawn, by depth; those out of view; vertices drawn. */
+  /** Instances drawn, by level; those out of view; vertices drawn. */
   readonly counts: number[];
   readonly culled: number;
   readonly vertices: number;

@@ -1,4 +1,4 @@
-// One file in a worker: fetches what the views need of the clips that they play, depth by depth and ahead of the playhead
+// One file in a worker: fetches what the views need of the clips that they play, level by level and ahead of the playhead
 // first; decodes it in short steps between the pictures that are asked for; packs pictures for the GPU. The page is told
 // by `post`.
 
@@ -379,16 +379,16 @@ export class Session {
   #around(frame) {
     const { firstFrame, frameCount } = this.#clipAt(frame), low = Math.floor(frame);
     const high = frame > low ? firstFrame + (low + 1 - firstFrame) % frameCount : low;
-    return [...new Set([low, high].map((each) => this.#file.segmentOf(each)))];
+    return [...new Set([low, high].map((place) => this.#file.segmentOf(place)))];
   }
 
   // What shows `frame`, {frame, level, segments}: at the deepest level that is decoded or, where nothing is, at the
   // coarsest.
   #show(frame, level) {
     const indices = this.#around(frame);
-    for (let each = level; each >= 0; each--) {
-      const segments = indices.map((index) => this.#segment(index, each));
-      if (segments[0]) return { frame, level: each, segments };
+    for (let shown = level; shown >= 0; shown--) {
+      const segments = indices.map((index) => this.#segment(index, shown));
+      if (segments[0]) return { frame, level: shown, segments };
     }
     return this.#coarser(frame, 0);
   }
@@ -400,7 +400,7 @@ export class Session {
 
   // The same where it can be; null where it cannot.
   #coarser(frame, level) {
-    const [index, next] = this.#around(frame).map((each) => (this.#readyLevel(each) < level ? -1 : each));
+    const [index, next] = this.#around(frame).map((segment) => (this.#readyLevel(segment) < level ? -1 : segment));
     if (index < 0) return null;
     try {
       return { frame, level, segments: [this.#now(index, level), next >= 0 ? this.#segment(next, level) : null] };
@@ -425,7 +425,7 @@ export class Session {
     const shown = this.#show(frame, level), before = old.share > 0 ? this.#show(old.frame, level) : null;
     if (!shown || !before) return shown ?? before;
     const both = Math.min(shown.level, before.level);
-    const [a, b] = [shown, before].map((each) => (each.level === both ? each : this.#coarser(each.frame, both)));
+    const [a, b] = [shown, before].map((picture) => (picture.level === both ? picture : this.#coarser(picture.frame, both)));
     return a && b ? { ...a, old: b, share: old.share } : shown;
   }
 
@@ -459,8 +459,8 @@ export class Session {
     }
     const answer = { type: "picture", view, id, shown: shown.level, frame: shown.frame, exactly };
     answer.clip = this.#file.clips.indexOf(this.#clipAt(shown.frame));
-    answer.data = this.#faded(shown, positions ? (each) => this.#file.positions(each.segments, each.frame)
-      : (each) => this.#pack(each, each === shown ? buffer : null));
+    answer.data = this.#faded(shown, positions ? ({ segments, frame }) => this.#file.positions(segments, frame)
+      : (part) => this.#pack(part, part === shown ? buffer : null));
     answer.held = this.#file.held;
     if (heat) answer.heat = this.#distances(shown);
     answer.ms = performance.now() - start;

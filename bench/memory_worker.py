@@ -1,7 +1,7 @@
-"""A process of its own for memory.py: encodes a clip and prints its peak memory, or writes a longer clip.
+"""The worker process of memory.py: encodes a clip and prints its peak memory, or writes a longer clip.
 
-    python -m bench.peak encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES
-    python -m bench.peak repeat CLIP.h5 OUT.h5 TIMES
+    python -m bench.memory_worker encode CLIP.h5 OUT.ath REL_ERROR SEGMENT_FRAMES
+    python -m bench.memory_worker repeat CLIP.h5 OUT.h5 TIMES
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ def encode(source: str, target: str, rel_error: float, segment_frames: int) -> d
 
 
 def repeat(source: str, target: str, times: int) -> dict[str, int]:
-    """The clip `times` times over, gzip-compressed."""
+    """Writes the clip repeated `times` times, gzip-compressed."""
     with athcodec.read_hdf5(source) as clip:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])
         with Hdf5Writer(target, time=time, vertex_branch=clip.vertex_branch, branch_parent=clip.branch_parent,
-                        rest=clip.rest.astype(clip.rest_dtype), dtype=clip.dtype, stem_index=clip.stem_index,
+                        rest=clip.source_rest, dtype=clip.dtype, stem_index=clip.stem_index,
                         edges=clip.edges, metadata=clip.metadata, gzip=True) as writer:
             for _ in range(times):
                 for _, frames in clip.blocks():

@@ -1,4 +1,4 @@
-"""A web server at the end of a slow line: the viewer's page and files in memory, at a rate that all answers share."""
+"""A web server with a limited transfer rate, shared by all responses: the viewer's page, and files in memory."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import athcodec
 
 WEB = Path(athcodec.__file__).parent / "viewer" / "web"
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
-PIECE = 1460  # bytes of a packet
+PACKET = 1460  # bytes
 
 
-class Line(ThreadingHTTPServer):
+class ThrottledServer(ThreadingHTTPServer):
     """Serves the viewer, and `files` by name, on 127.0.0.1: a context manager.
 
-    rate: bytes a second, None as fast as it goes; of files alone, so that the page can be there already. latency:
-    seconds before an answer. ranges: whether byte ranges are known. `log`: (name, first byte, bytes sent) per answer.
+    rate: bytes a second of files (None: unlimited); the page is not throttled. latency: seconds before each response
+    with a file. ranges: whether byte ranges are supported. `log`: [name, first byte, bytes sent] per file response.
     """
 
     daemon_threads = True
@@ -29,9 +29,9 @@ class Line(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Handler)
         self.files, self.rate, self.latency, self.ranges = files, rate, latency, ranges
         self.log: list[list] = []
-        self._free, self._turn = 0.0, threading.Lock()
+        self._free_at, self._lock = 0.0, threading.Lock()
 
-    def __enter__(self) -> Line:
+    def __enter__(self) -> ThrottledServer:
         threading.Thread(target=self.serve_forever, args=(0.02,), daemon=True).start()
         return self
 
@@ -40,7 +40,7 @@ class Line(ThreadingHTTPServer):
         self.server_close()
 
     def handle_error(self, request, client_address) -> None:
-        """A browser that closes a connection is none."""
+        """Ignored: browsers close connections at any time."""
 
     @property
     def address(self) -> str:
@@ -48,51 +48,51 @@ class Line(ThreadingHTTPServer):
 
     def page(self, name: str | None = None, **more: str) -> str:
         """The viewer's address with a file."""
-        asked = ([f"file=/{name}"] if name else []) + [f"{key}={value}" for key, value in more.items()]
-        return self.address + ("?" + "&".join(asked) if asked else "")
+        query = ([f"file=/{name}"] if name else []) + [f"{key}={value}" for key, value in more.items()]
+        return self.address + ("?" + "&".join(query) if query else "")
 
     def sent(self, name: str) -> int:
-        return sum(size for each, _, size in self.log if each == name)
+        return sum(size for file, _, size in self.log if file == name)
 
     def wait(self, size: int) -> None:
-        """Until `size` bytes more have gone through the line."""
+        """Sleeps until `size` more bytes may be sent."""
         if self.rate is None:
             return
-        with self._turn:
-            self._free = max(self._free, time.monotonic()) + size / self.rate
-            until = self._free
+        with self._lock:
+            self._free_at = max(self._free_at, time.monotonic()) + size / self.rate
+            until = self._free_at
         time.sleep(max(0.0, until - time.monotonic()))
 
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
-    disable_nagle_algorithm = True  # the end of an answer would wait 40 ms
-    server: Line
+    disable_nagle_algorithm = True  # it would delay the end of a response by 40 ms
+    server: ThrottledServer
 
     def do_GET(self) -> None:
         name = self.path.split("?")[0].lstrip("/") or "index.html"
         if name in self.server.files:
             self._file(name, self.server.files[name])
         elif (WEB / name).is_file():
-            self._answer(200, (WEB / name).read_bytes(), {"Content-Type": TYPES.get(Path(name).suffix, "text/plain")})
+            self._respond(200, (WEB / name).read_bytes(), {"Content-Type": TYPES.get(Path(name).suffix, "text/plain")})
         else:
-            self._answer(404, b"", {})
+            self._respond(404, b"", {})
 
     def _file(self, name: str, data: bytes) -> None:
         time.sleep(self.server.latency)
-        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", "")) if self.server.ranges else None
-        first, last = (int(asked[1]), min(int(asked[2]), len(data) - 1)) if asked else (0, len(data) - 1)
+        requested = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", "")) if self.server.ranges else None
+        first, last = (int(requested[1]), min(int(requested[2]), len(data) - 1)) if requested else (0, len(data) - 1)
         entry = [name, first, 0]
         self.server.log.append(entry)
         if first >= len(data):
-            self._answer(416, b"", {"Content-Range": f"bytes */{len(data)}"})
+            self._respond(416, b"", {"Content-Range": f"bytes */{len(data)}"})
             return
         headers = {"Content-Type": "application/octet-stream", "ETag": f'"{len(data)}"'}
-        if asked:
+        if requested:
             headers["Content-Range"] = f"bytes {first}-{last}/{len(data)}"
-        self._answer(206 if asked else 200, data[first: last + 1], headers, entry)
+        self._respond(206 if requested else 200, data[first: last + 1], headers, entry)
 
-    def _answer(self, status: int, body: bytes, headers: dict[str, str], entry: list | None = None) -> None:
+    def _respond(self, status: int, body: bytes, headers: dict[str, str], entry: list | None = None) -> None:
         self.send_response(status)
         for name, value in (headers | {"Content-Length": str(len(body))}).items():
             self.send_header(name, value)
@@ -100,11 +100,11 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             if entry is None:
                 self.wfile.write(body)
-            for at in range(0, len(body) if entry else 0, PIECE):
-                piece = body[at: at + PIECE]
-                self.server.wait(len(piece))
-                self.wfile.write(piece)
-                entry[2] += len(piece)
+            for at in range(0, len(body) if entry else 0, PACKET):
+                packet = body[at: at + PACKET]
+                self.server.wait(len(packet))
+                self.wfile.write(packet)
+                entry[2] += len(packet)
         except ConnectionError:
             self.close_connection = True
 

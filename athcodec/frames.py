@@ -1,7 +1,7 @@
-"""Positions that are made when they are asked for: what a reader gives a MotionClip in place of an array.
+"""Positions that are made when they are asked for, in place of an array in memory.
 
-It knows no file format. Readers have a function that makes a run of frames; clips, and whatever changes units or
-axes, slice the result as they would an array.
+A reader has a function that makes a run of frames; a MotionClip, and whatever joins clips or changes their units,
+slices the result as it would an array.
 """
 
 from __future__ import annotations
@@ -9,17 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 
 class Frames:
     """(T, N, 3) positions of which only the frames that are sliced exist.
 
-    read(start, stop) gives frames start to stop - 1 as (stop - start, N, 3) in `dtype`; 0 <= start < stop <= T. It may
-    raise ClipError, and is called by one thread at a time, mostly forward, often twice over the whole clip.
+    Parameters
+    ----------
+    read : callable
+        read(start, stop) gives frames start to stop - 1 as (stop - start, N, 3) in `dtype`; 0 <= start < stop <= T. It
+        may raise ClipError, and is called by one thread at a time, mostly forward, often twice over the whole clip.
+    frame_count, vertex_count : int
+        T and N.
+    dtype : dtype, optional
+        float32 by default.
     """
 
     def __init__(self, read: Callable[[int, int], np.ndarray], frame_count: int, vertex_count: int,
-                 dtype: object = np.float32):
+                 dtype: DTypeLike = np.float32):
         self._read = read
         self.shape, self.dtype = (frame_count, vertex_count, 3), np.dtype(dtype)
 

@@ -1,8 +1,9 @@
-"""Which codecs take part: athcodec, the baselines and the programs, by name, and a codec of one's own.
+"""The codecs that are compared, by name: athcodec, the baselines, the programs, and custom ones.
 
-A codec of one's own is named MODULE:NAME, an object or class of a module on the path (see codecs/__init__.py
-for what it has to offer). `fingerprint` says which code made a result, so that it is measured again when that
-has changed. Baselines use parts of athcodec: for them its version counts, and not each change of its code.
+A custom codec is named MODULE:NAME, an object or class of an importable module (codecs/__init__.py says what it must
+provide). `fingerprint` identifies the code that made a result, so that the result is measured again when that code has
+changed; comments, docstrings and layout do not count. Baselines use parts of athcodec: for them its version counts, not
+every change of its code.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import ast
 import hashlib
 import importlib
 import importlib.util
+import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -29,7 +31,7 @@ DISTRIBUTIONS = ("athcodec", "numpy", "zstandard")
 
 
 def all_codecs() -> Iterator[Codec]:
-    """Every codec of this benchmark, athcodec first, lossless ones last; modules are imported in turn."""
+    """Every codec of this benchmark, athcodec first, lossless ones last; modules are imported one by one."""
     for module, attribute in SOURCES:
         yield from _codecs_of(importlib.import_module(module), attribute)
     yield from lossless()
@@ -52,9 +54,9 @@ def is_lossless(codec: Codec) -> bool:
 
 
 def chosen(names: Iterable[str]) -> dict[str, Codec]:
-    """Codecs by name or as MODULE:NAME; none named: all that are not lossless.
+    """Codecs by name or as MODULE:NAME; without names all that are not lossless.
 
-    Raises SystemExit for a name that there is not.
+    Raises SystemExit for an unknown name.
     """
     names = list(names)
     return {name: _named(name) for name in names} if names else {
@@ -96,12 +98,13 @@ def _version(name: str) -> str:
 
 
 def _athcodec_files() -> set[Path]:
-    """Python and the compiled core of the installed package."""
-    return {library_path(), *Path(athcodec.__file__).parent.glob("*.py")}
+    """Python of the encoder and decoder, and the compiled core, of the installed package."""
+    package = Path(athcodec.__file__).parent
+    return {library_path(), *package.glob("*.py"), *package.glob("encoding/*.py")}
 
 
 def _bench_files(module: str) -> set[Path]:
-    """The file of a module, of the C beside it, of the codecs' modules that it imports, and so on."""
+    """The file of a module, the C file beside it, and those of the codec modules that it imports, recursively."""
     files: set[Path] = set()
     names = [module]
     while names:
@@ -134,5 +137,23 @@ def _imports(file: Path) -> list[str]:
 def _digest(files: tuple[Path, ...]) -> str:
     digest = hashlib.sha256()
     for file in files:
-        digest.update(file.name.encode() + file.read_bytes())
+        digest.update(file.name.encode() + _code(file))
     return digest.hexdigest()[:12]
+
+
+def _code(file: Path) -> bytes:
+    """The contents of a source file without comments, docstrings, imports and layout; of others, all of it."""
+    if file.suffix == ".c":
+        return "".join(re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(), flags=re.DOTALL).split()).encode()
+    if file.suffix != ".py":
+        return file.read_bytes()
+    tree = ast.parse(file.read_text())
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [statement for statement in body if not _is_docstring_or_import(statement)]
+    return ast.dump(tree).encode()
+
+
+def _is_docstring_or_import(statement: ast.stmt) -> bool:
+    is_text = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return is_text or isinstance(statement, (ast.Import, ast.ImportFrom))

@@ -1,11 +1,11 @@
-"""Two processes of their own for rd.py: one encodes a clip with a codec, another decodes and measures.
+"""The worker processes of rd.py: one encodes a clip with a codec, another decodes and measures.
 
-    python -m bench.point encode CODEC CLIP.h5 BOUND FILE
-    python -m bench.point decode CODEC CLIP.h5 BOUND FILE
+    python -m bench.rd_worker encode CODEC CLIP.h5 BOUND FILE
+    python -m bench.rd_worker decode CODEC CLIP.h5 BOUND FILE
 
-The second one has nothing of the first but the file, so that what it gives is in those bytes; it reads the
-clip only when it has decoded. Peak memory is that of the whole process. A codec that crashes takes only its
-own process with it. BOUND is a fraction of the bounding box's diagonal. Prints one line of JSON.
+The second gets only the file from the first, so that its output depends on these bytes alone; it reads the clip after
+decoding. Peak memory is that of the whole process. A codec that crashes ends only its own process. BOUND is a fraction
+of the bounding box's diagonal. Prints one line of JSON.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ import numpy as np
 
 import athcodec
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from bench.codec_registry import chosen
 from bench.codecs import Source
-from bench.codecs.peer import CannotKeep
-from bench.opponents import chosen
-from bench.peak import peak_bytes
+from bench.codecs.program import CannotKeep
+from bench.memory_worker import peak_bytes
 
 ENCODES, QUICK_ENCODE = 3, 1.0  # an encoder that takes longer than these seconds runs once
 DECODES, DECODE_SECONDS = 7, 5.0  # fewer decodes, at least three, where they take longer than this together
@@ -35,22 +35,21 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
     [codec] = chosen([codec_name]).values()
     with athcodec.read_hdf5(clip_path) as clip:
         bound = rel_bound * Source(clip).diagonal
-        loaded = peak_bytes()
         runs: list[float] = []
         while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
-            source = _loaded(clip)  # a new one: codecs may keep with it what they have worked out
+            source = _loaded(clip)  # a new one, since codecs may cache results in it
             seconds, data = _timed(lambda: codec.encode(source, bound))
             runs.append(seconds)
     peak = peak_bytes()
     file.write_bytes(data)
-    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "loaded_bytes": loaded,
-            "encode_peak_bytes": peak, "settings": _plain(codec.settings)}
+    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "encode_peak_bytes": peak,
+            "settings": _words(codec.settings)}
 
 
 def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
     [codec] = chosen([codec_name]).values()
     data = file.read_bytes()
-    decoded = codec.decode(data)  # a warm-up that counts for memory alone
+    decoded = codec.decode(data)  # a warm-up: only its memory counts
     peak = peak_bytes()
     runs: list[float] = []
     while len(runs) < DECODES and (len(runs) < 3 or sum(runs) < DECODE_SECONDS):
@@ -76,7 +75,7 @@ def _timed(step: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
-    """Errors over the diagonal, and in words what is wrong with them, if anything."""
+    """Errors over the diagonal; "broken" describes a wrong type, shape or error."""
     shape = source.positions.shape
     if getattr(decoded, "shape", None) != shape or decoded.dtype != np.float32:
         is_array = isinstance(decoded, np.ndarray)
@@ -92,15 +91,13 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
     return errors
 
 
-def _plain(settings: Any) -> Any:
-    """Settings as JSON holds them."""
+def _words(settings: Any) -> str:
+    """Settings on one line."""
     if isinstance(settings, dict):
-        return {str(name): _plain(value) for name, value in settings.items()}
+        return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
     if isinstance(settings, (list, tuple, np.ndarray)):
-        return [_plain(value) for value in settings]
-    if isinstance(settings, np.generic):
-        return settings.item()
-    return settings if isinstance(settings, (str, int, float, bool, type(None))) else str(settings)
+        return " ".join(map(_words, settings))
+    return f"{settings:.4g}" if isinstance(settings, (float, np.floating)) else str(settings)
 
 
 if __name__ == "__main__":

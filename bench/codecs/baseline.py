@@ -1,17 +1,16 @@
-"""What all baselines share: the search for the settings of the smallest encoding, and corrections.
+"""Common parts of the baselines: the search for the settings of the smallest encoding, and corrections.
 
-A baseline writes and reads its lossy part; here its positions are decoded as a reader will, and vertices that
-are beyond the bound are corrected as athcodec corrects them. So a baseline's step may be coarser than its
-worst vertex allows, and step and corrections are searched together. Settings are found one after the other,
-each along its ladder from where it stands, two rungs at a time and then one, until a round changes nothing: a
-local search, not a full one.
+A baseline writes and reads its lossy part; here its positions are decoded as a reader decodes them, and vertices whose
+error exceeds the bound are corrected as in athcodec. So a baseline's step may be coarser than its worst vertex allows,
+and step and corrections are searched together. Settings are searched one after the other, each along its ladder from
+its current value in strides of two and then one, until a round changes nothing: a local search.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -33,7 +32,7 @@ FINALISTS = 3
 
 @dataclass(frozen=True)
 class Ladder:
-    """Numbers in order: what is between two good ones is good too."""
+    """Ordered numbers, over which the size is expected to have a single minimum."""
 
     values: tuple[float, ...]
     start: int
@@ -42,12 +41,16 @@ class Ladder:
     def geometric(cls, low: float, high: float, start: float, per_octave: int = 2) -> Ladder:
         count = round(np.log2(high / low) * per_octave)
         values = tuple(round(low * 2 ** (i / per_octave), 6) for i in range(count + 1))
-        return cls(values, int(np.argmin(np.abs(np.log(np.array(values) / start)))))
+        return cls(values, 0).starting_at(start)
+
+    def starting_at(self, value: float) -> Ladder:
+        """The same numbers; the search starts at the one nearest to `value`."""
+        return replace(self, start=int(np.argmin(np.abs(np.log(np.array(self.values) / value)))))
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Names or numbers that have nothing to do with each other; all are tried."""
+    """Unordered names or numbers; all are tried."""
 
     values: tuple
     start: int = 0
@@ -55,7 +58,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Split(Choice):
-    """A choice that changes where the others are best: a round over those is made for each of its values."""
+    """A choice on which the best values of the others depend: the first round is made for each of its values."""
 
 
 Settings = dict[str, float | int | str]
@@ -78,7 +81,7 @@ class Search:
         return self.known[at]
 
     def run(self, rounds: int) -> list[Settings]:
-        """Settings that were tried, the best first."""
+        """All settings tried, best first."""
         splits = [
             range(len(axis.values)) if isinstance(axis, Split) else (axis.start,)
             for axis in self.grid.values()
@@ -118,7 +121,7 @@ class Search:
 
 
 class Baseline(ABC):
-    """A codec of the literature in two variants, by entropy coder."""
+    """A method of the literature, with one of two entropy coders."""
 
     kind = "baseline"
     title = ""
@@ -174,7 +177,7 @@ class Baseline(ABC):
 
 
 def quantised(units: np.ndarray, dead_zone: float) -> np.ndarray:
-    """Integers of numbers in steps: 0 below the dead zone, rounding biased towards 0 by as much."""
+    """Integers of numbers in steps: 0 below the dead zone, with rounding biased towards 0 by the same amount."""
     magnitude = np.abs(units)
     magnitude += 1 - dead_zone
     np.floor(magnitude, out=magnitude)

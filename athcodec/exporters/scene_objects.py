@@ -6,14 +6,13 @@ knows no format and touches no positions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from athcodec.clip import frame_rate
-from athcodec.errors import ClipError
+from athcodec.sources.scene_objects import ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains")
@@ -21,23 +20,8 @@ KNOWN_ATTRIBUTES = ("part_vertex_counts", "curve_vertex_counts", "face_vertex_co
 DOMAINS = ("vertex", "corner", "face", "constant")
 
 
-def frame_numbers(motion: Any) -> tuple[np.ndarray, float]:
-    """The number of each frame in the tool that made the clip, and frames per second."""
-    metadata = motion.metadata
-    rate = frame_rate(metadata) if "fps" in metadata else float(motion.fps)
-    start = metadata.get("start_frame", 0)
-    if isinstance(start, bool) or not isinstance(start, (int, float)):
-        raise ClipError(f"start_frame: got {start!r}, expected a number")
-    codes = start + np.round(np.asarray(motion.time) * rate, 6)
-    if (np.diff(codes) <= 0).any():
-        frame = int(np.flatnonzero(np.diff(codes) <= 0)[0]) + 1
-        raise ClipError(f"time: frame {frame} has the number {codes[frame]:g} as the one before it, expected a larger "
-                        "one")
-    return codes, rate
-
-
 @dataclass
-class Part:
+class SceneObject:
     """A run of vertices that becomes one prim, its faces and its curves in its own numbering."""
 
     name: str
@@ -57,7 +41,8 @@ class Part:
         return slice(self.first, self.first + self.count)
 
 
-def parts_of(motion: Any) -> list[Part]:
+def objects_of(motion: Any) -> list[SceneObject]:
+    """The objects of a motion, in the order of their vertices; one of all where it does not say."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     face_indices = np.asarray(face_indices, np.int64)
@@ -65,18 +50,18 @@ def parts_of(motion: Any) -> list[Part]:
     ends = np.cumsum(counts, dtype=np.int64)
     owner = _owners(corners, face_indices, ends)
     curves = iter(_curve_counts(motion, ends, kinds))
-    parts = []
+    objects = []
     for i, (name, kind, end, count, detail) in enumerate(zip(names, kinds, ends, counts, details)):
         low, high = np.searchsorted(owner, [i, i + 1])
         rows, first = slice(int(corners[low]), int(corners[high])), int(end - count)
         faces = np.asarray(face_counts[low:high]), face_indices[rows] - first
         face_rows = slice(int(low), int(high))
-        parts.append(Part(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
-    return parts
+        objects.append(SceneObject(name, kind, first, int(count), faces, next(curves), face_rows, rows, detail))
+    return objects
 
 
 def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(F,) the part of each face, ascending; everything belongs to part 0 where faces lie across parts."""
+    """(F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
     counts = np.diff(corners)
     of_corner = np.searchsorted(ends, indices, "right")
     faces = np.repeat(np.arange(len(counts)), counts)
@@ -88,7 +73,7 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
 
 
 def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
-    """Names, vertices, kinds and further details of the parts: what the clip says, where that fits, else one part."""
+    """Names, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
@@ -99,12 +84,12 @@ def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[
             details = metadata.get("part_usd")
             if not isinstance(details, list) or len(details) != len(names):
                 details = [{}] * len(names)
-            return [str(each) for each in names], counts.astype(np.int64), kinds, details
+            return [str(name) for name in names], counts.astype(np.int64), kinds, details
     return ["plant"], np.array([count]), [_kind(motion, np.array([count]), 0)], [{}]
 
 
 def _fits(motion: Any, counts: np.ndarray) -> bool:
-    """Whether every face is of one part, and the faces are in the order of the parts."""
+    """Whether every face is of one object, and the faces are in the order of the objects."""
     if motion.polygons is None:
         return True
     face_counts, indices = motion.polygons
@@ -140,7 +125,7 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
 
 
 def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
-    """For each part its vertices per curve, empty where it is none."""
+    """For each object its vertices per curve, empty where it is none."""
     said = motion.attributes.get("curve_vertex_counts")
     totals = [int(end - start) if kind == "curves" else 0 for end, start, kind in
               zip(ends, np.append(0, ends[:-1]), kinds)]
@@ -167,22 +152,34 @@ def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str
     said = domains.get(name) if isinstance(domains, dict) else None
     if said is not None:
         return said if rows.get(said) == count else "other"
-    return next((each for each in ("vertex", "branch", "face") if count == rows[each]), "other")
+    return next((domain for domain in ("vertex", "branch", "face") if count == rows[domain]), "other")
 
 
-def rows_of(values: np.ndarray, domain: str, part: Part) -> np.ndarray:
-    """The rows of a static array that belong to a part."""
-    rows = {"vertex": part.vertices, "corner": part.corner_rows, "face": part.face_rows, "constant": slice(0, 1)}
+def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
+    """The rows of a static array that belong to an object."""
+    rows = {"vertex": obj.vertices, "corner": obj.corner_rows, "face": obj.face_rows, "constant": slice(0, 1)}
     return values[rows[domain]]
 
 
-def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[str, np.ndarray, str]]:
-    """(name, array, domain) of what scene formats have no place for: the arrays in `left`, branches, edges, rest."""
-    rest = np.asarray(motion.rest)
-    yield "rest", rest.astype(getattr(motion, "rest_dtype", rest.dtype)), "vertex"
+def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[ArrayDescriptor, np.ndarray]]:
+    """What scene formats have no place for: rest, branches, edges and the arrays in `left`, each as (bytes,) uint8."""
+    arrays = {"rest": (getattr(motion, "source_rest", motion.rest), "vertex")}
     for name, domain in (("vertex_branch", "vertex"), ("branch_parent", ""), ("stem_index", "vertex"), ("edges", "")):
-        values = getattr(motion, name, None)
+        arrays[name] = getattr(motion, name, None), domain
+    for name, (values, domain) in (arrays | left).items():
         if values is not None:
-            yield name, np.asarray(values), domain
-    for name, (values, domain) in left.items():
-        yield name, values, "" if domain == "other" else domain
+            values = np.asarray(values)
+            raw = np.frombuffer(np.ascontiguousarray(values).tobytes(), np.uint8)
+            yield ArrayDescriptor.of(name, values, "" if domain == "other" else domain), raw
+
+
+def distinct(names: Iterable[str]) -> list[str]:
+    """The names, each made different from those before it by a number behind it."""
+    taken: dict[str, None] = {}
+    for wanted in names:
+        name, number = wanted, 1
+        while name in taken:
+            number += 1
+            name = f"{wanted}_{number}"
+        taken[name] = None
+    return list(taken)

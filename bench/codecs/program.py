@@ -1,18 +1,18 @@
-"""What every real program needs to take part: layouts, grids, poses, predictors, and the search among them.
+"""Common parts of the programs: layouts, grids, poses, predictors, and the search among them.
 
-A program sees numbers, not motion. So that each is at its best it is offered, and the search chooses: the
+A program compresses numbers, not motion. For its best result, the search tries: the
 vertices in the source's or in the hierarchy's order; positions, or displacements from the rest pose, the mean
 pose or the first frame; integers on a grid as coarse as the bound allows, or floats where the program bounds
 their error itself; differences over time and along the vertices, exact on integers; and the program's own
-layouts and settings. Setups are compared on a piece of the clip, the best few on all of it. What is
-subtracted and how vertices are reordered is stored and counted. Displacements are taken from the pose as it
+layouts and settings. Setups are compared on a piece of the clip, the best few on all of it. The pose that is
+subtracted and the order of vertices are stored and counted. Displacements are taken from the pose as it
 will be decoded, so that its rounding adds no error. No program is imported before it is used.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -22,7 +22,7 @@ from types import ModuleType
 import numpy as np
 import zstandard
 
-from bench.codecs import Source
+from bench.codecs import Source, blocks, largest_error
 
 AXES = {"T,N,3": (0, 1, 2), "T,3N": (0, 1, 2), "N,T,3": (1, 0, 2), "3N,T": (1, 2, 0),
         "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0), "3|T,N": (2, 0, 1), "3|N,T": (2, 1, 0)}
@@ -37,7 +37,6 @@ COARSER = (1.05, 1.03, 1.02, 1.015, 1.01, 1.007, 1.005, 1.003, 1.001, 1.0, 0.999
 CORNER = 2 / np.sqrt(3)  # step of a grid over the distance from a cell's centre to its corners
 NEARLY = COARSER.index(0.999)
 SAMPLE_FRAMES = 512
-BLOCK = 1 << 20
 BEAM = 6
 HEAD = struct.Struct("<6BII")
 
@@ -120,7 +119,7 @@ def unpack_integers(data: bytes, count: int) -> np.ndarray:
 # ---- arrays ----
 
 
-def parts(values: np.ndarray, layout: str) -> list[np.ndarray]:
+def arrays_of(values: np.ndarray, layout: str) -> list[np.ndarray]:
     """(T, N, 3) as the arrays that a program gets."""
     frames, vertices, _ = values.shape
     turned = np.ascontiguousarray(values.transpose(AXES[layout]))
@@ -130,12 +129,12 @@ def parts(values: np.ndarray, layout: str) -> list[np.ndarray]:
     return [turned.reshape(flat.get(layout, turned.shape))]
 
 
-def part_shapes(shape: tuple[int, int, int], layout: str) -> list[tuple[int, ...]]:
-    return [part.shape for part in parts(np.broadcast_to(np.int8(0), shape), layout)]
+def array_shapes(shape: tuple[int, int, int], layout: str) -> list[tuple[int, ...]]:
+    return [part.shape for part in arrays_of(np.broadcast_to(np.int8(0), shape), layout)]
 
 
-def whole(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int, int]) -> np.ndarray:
-    """The inverse of parts."""
+def from_arrays(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int, int]) -> np.ndarray:
+    """The inverse of arrays_of."""
     turned = np.concatenate([piece.reshape(-1) for piece in pieces])
     turned = turned.reshape([shape[axis] for axis in AXES[layout]])
     return np.ascontiguousarray(turned.transpose(np.argsort(AXES[layout])))
@@ -152,7 +151,7 @@ def _sum(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def predict(values: np.ndarray, predictor: str) -> np.ndarray:
-    """(T, N, 3) int32: what is left of each after those before it; exact, modulo 2**32."""
+    """(T, N, 3) int32 residuals; exact, modulo 2**32."""
     for axis in _predictor_axes(predictor):
         values = _difference(values, axis)
     return values
@@ -177,22 +176,6 @@ def ordered_bits(values: np.ndarray) -> np.ndarray:
 
 def from_ordered_bits(bits: np.ndarray) -> np.ndarray:
     return np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits).view(np.float32)
-
-
-def blocks(values: np.ndarray) -> Iterator[slice]:
-    """Of the first axis, so that copies in doubles stay small."""
-    length = max(1, BLOCK // values[0].size)
-    return (slice(start, start + length) for start in range(0, len(values), length))
-
-
-def worst(positions: np.ndarray, decoded: np.ndarray) -> float:
-    """Largest Euclidean distance; infinite where something is not a number."""
-    largest = 0.0
-    for block in blocks(positions):
-        gap = decoded[block].astype(np.float64) - positions[block]
-        distance = float(np.sqrt(np.einsum("...k,...k->...", gap, gap).max()))
-        largest = max(largest, distance if distance >= 0 else np.inf)
-    return largest
 
 
 # ---- a clip, and its grid ----
@@ -222,7 +205,7 @@ class Grid:
 
     def keeps(self, positions: np.ndarray, bound: float) -> bool:
         parts = (positions[block] for block in blocks(positions))
-        return all(worst(part, self.positions(self.integers(part))) <= bound for part in parts)
+        return all(largest_error(part, self.positions(self.integers(part))) <= bound for part in parts)
 
     def pack(self) -> bytes:
         return struct.pack("<4d", self.step, *self.origin)
@@ -235,7 +218,7 @@ class Grid:
 
 @dataclass
 class Case:
-    """A clip in one order of its vertices, and what is worked out once for all setups."""
+    """A clip in one order of its vertices, and values computed once for all setups."""
 
     positions: np.ndarray
     rest: np.ndarray
@@ -301,7 +284,7 @@ def cases_of(source: Source, exact: bool) -> dict[str, Case]:
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that is chosen; `choice` is the program's own."""
+    """All settings; `choice` is an index into the program's own."""
 
     form: str
     order: str = "source"
@@ -311,8 +294,8 @@ class Setup:
     choice: int = 0
 
 
-class Peer:
-    """A real program as a Codec; see bench.codecs. Subclasses say how it takes integers, floats or both.
+class Program:
+    """A program as a Codec; see bench.codecs. Subclasses define how it encodes integers, floats or both.
 
     `choices(form)` lists the program's own settings; `encode_*` and `decode_*` get one of them. Floats have a
     strength: the error that a value may have, or one of `strengths`, the exactest last; None: exact.
@@ -373,7 +356,7 @@ class Peer:
             self._descend(form, order, lambda setup: self._size(pieces, setup, bound, sizes))
         ranked = sorted((size, number, setup) for number, (setup, size) in enumerate(sizes.items())
                         if np.isfinite(size))
-        # what fails on all of the clip makes room for the next
+        # a setup that fails on the whole clip is replaced by the next
         done: list[tuple[bytes, Setup]] = []
         for _, _, setup in ranked:
             data = self._write(cases[setup.order], setup, bound, thorough=True)
@@ -401,7 +384,7 @@ class Peer:
         return placed
 
     def _words(self, setup: Setup) -> dict:
-        """The setup without what its form has no use for."""
+        """The setup without settings that its form does not use."""
         unused = "predictor" if setup.form == "floats" else "pose_step"
         words = {name: value for name, value in asdict(setup).items() if name != unused}
         if setup.pose == "none":
@@ -411,7 +394,7 @@ class Peer:
     # -- choosing --
 
     def _descend(self, form: str, order: str, size: Callable[[Setup], float]) -> None:
-        """What the program does, then for its best few what it gets, and both again."""
+        """Searches the program's settings, then poses for the best few, and both once more."""
         integers = form == "integers"
         predictors = self.predictors if integers else ("none",)
         steps = (1.0,) if integers else POSE_STEPS
@@ -484,7 +467,7 @@ class Peer:
             decoded = self.decode_floats(data, values.shape, choice)
             if setup.pose != "none":
                 decoded = (pose + decoded).astype(np.float32)
-            return data, worst(case.positions, decoded)
+            return data, largest_error(case.positions, decoded)
 
         if self.lossless:
             data = self.encode_floats(values, None, choice, thorough)
@@ -559,7 +542,7 @@ def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[i
 
 
 def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials: int) -> bytes:
-    """The smallest within the bound: the allowed error is moved until what it causes just keeps the bound."""
+    """The smallest within the bound: the allowed error is adjusted until the resulting error just keeps the bound."""
     allowed, kept, broken, best = bound / np.sqrt(3), 0.0, np.inf, None
     for trial in range(trials + 20):
         data, error = encode(allowed)
@@ -579,14 +562,14 @@ def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials
     raise CannotKeep("allowed error: no value keeps the bound")
 
 
-def each(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
-    """Every array of a layout by itself."""
-    return join([encode(part) for part in parts(values, layout)])
+def encode_arrays(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
+    """Encodes every array of a layout separately."""
+    return join([encode(part) for part in arrays_of(values, layout)])
 
 
-def all_of(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
+def decode_arrays(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
            shape: tuple[int, int, int]) -> np.ndarray:
-    """The inverse of each: `decode` gets bytes and a shape."""
+    """The inverse of encode_arrays: `decode` gets bytes and a shape."""
     blobs: Iterable[bytes] = split(data)
-    return whole([decode(blob, part) for blob, part in zip(blobs, part_shapes(shape, layout), strict=True)],
+    return from_arrays([decode(blob, part) for blob, part in zip(blobs, array_shapes(shape, layout), strict=True)],
                  layout, shape)

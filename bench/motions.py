@@ -1,7 +1,7 @@
-"""Several motions of one plant in one file: its bytes against those of a file each, and how far seams are off.
+"""Several motions of one plant in one file: its size compared with one file per motion, and the errors at the seams.
 
-The motions are windows of each clip, one after the other, all as loops with a part of their frames blended; every file
-keeps the same bound in scene units, checked by decoding.
+The motions are consecutive windows of each clip, all as loops with some frames blended; every file has the same bound
+in scene units, checked by decoding.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from bench.clips import add_clips, add_rel_error, measure
 from bench.tables import table
 
 NOTE = """
-One clip: the source as it is, of as many frames as the motions have together but for those that were blended. Seam:
-largest distance, over all loops and at the deepest level, between the step over the seam as decoded and that of the
-motion, over the bound; 2 at most.
+One clip: the unchanged source, whose frames are those of the motions and the blended ones. Seam: largest distance,
+over all loops and at the deepest level, between the decoded step over the seam and that of the motion, over the bound;
+2 at most.
 """
 
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument("--motions", type=int, nargs="+", default=[2, 4], metavar="N", help="windows of a clip")
-    parser.add_argument("--blend", type=int, default=4, metavar="FRAMES", help="of each window")
+    parser.add_argument("--blend", type=int, default=4, metavar="FRAMES", help="frames blended in each window")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -46,11 +46,11 @@ def _row(path: Path, count: int, blend: int, rel_error: float) -> dict[str, Any]
         file = Path(folder, "a.ath")
         whole = athcodec.encode(clip, file, rel_error=rel_error, attributes="none")
         bound, motions = whole.max_error_bound, dict(_windows(clip, count, blend))
-        apart = [athcodec.encode(each, file, max_error=bound, attributes="none").bytes for each in motions.values()]
+        apart = [athcodec.encode(motion, file, max_error=bound, attributes="none").bytes for motion in motions.values()]
         joined = athcodec.encode(athcodec.join(motions), file, max_error=bound, attributes="none")
         with athcodec.open(file, strict=True) as decoder:
-            error = max(measure(each, decoder.play(name)).max_error for name, each in motions.items())
-    return {"clip": path.stem, "motions": count, "frames": sum(each.frame_count for each in motions.values()),
+            error = max(measure(motion, decoder.play(name)).max_error for name, motion in motions.items())
+    return {"clip": path.stem, "motions": count, "frames": sum(motion.frame_count for motion in motions.values()),
             "bytes, one clip": whole.bytes, "bytes, a file each": sum(apart), "bytes, one file": joined.bytes,
             "one file / a file each": joined.bytes / sum(apart), "seam": max(s.error for s in joined.seams) / bound,
             "kept": error <= bound}

@@ -1,0 +1,339 @@
+"""Objects of a scene as runs of one clip's vertices: what readers of scene formats share.
+
+A reader fills in a SceneObject for each, in the numbering of that object; here their faces, edges, static arrays and
+positions are joined. It knows no format.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from athcodec.clip import RESERVED_NAMES, MotionClip
+from athcodec.errors import ClipError
+from athcodec.frames import Frames
+from athcodec.sources import ReadOptions
+
+MAX_METADATA_BYTES = 1 << 24
+DESCRIPTOR = ".descriptor"  # behind the name of an array's property in an Alembic file: that of its ArrayDescriptor
+OWN = "athcodec"  # the namespace of what our writers add to files of other formats
+KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains")
+
+
+@dataclass
+class Static:
+    """A named array of one object and what its rows stand for: vertex, corner, face or constant."""
+
+    domain: str
+    values: np.ndarray
+
+
+@dataclass
+class SceneObject:
+    """One object: its kind ("mesh", "curves" or "points"), its place among the vertices, and what does not move.
+
+    face_counts (F,), face_indices (C,), curve_counts (curves,) int32; details: words that only its format knows.
+    """
+
+    kind: str
+    name: str = ""
+    path: str = ""
+    first: int = 0
+    count: int = 0
+    face_counts: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    face_indices: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))
+    curve_counts: np.ndarray | None = None
+    details: dict[str, str] = field(default_factory=dict)
+    statics: dict[str, Static] = field(default_factory=dict)
+    is_still: bool = False  # neither its points nor its place change
+    still: np.ndarray | None = None  # its positions then, once they have been read
+
+    @property
+    def vertices(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+    def rows(self, domain: str) -> int:
+        sizes = {"vertex": self.count, "corner": len(self.face_indices), "face": len(self.face_counts), "constant": 1}
+        return sizes[domain]
+
+    def check(self) -> None:
+        """Raises ClipError where faces or curves do not fit the points."""
+        corners = self.face_counts.sum(dtype=np.int64)
+        if (self.face_counts < 0).any() or corners != len(self.face_indices):
+            raise ClipError(f"{self.path}: got faces of {corners} corners, expected {len(self.face_indices)}, one per "
+                            "index")
+        bad = np.flatnonzero((self.face_indices < 0) | (self.face_indices >= self.count))
+        if bad.size:
+            raise ClipError(f"{self.path}: corner {bad[0]} is vertex {self.face_indices[bad[0]]}, expected 0 to "
+                            f"{self.count - 1}")
+        points = self.count if self.curve_counts is None else self.curve_counts.sum(dtype=np.int64)
+        if points != self.count or self.curve_counts is not None and (self.curve_counts < 0).any():
+            raise ClipError(f"{self.path}: got curves of {points} points, expected {self.count}")
+
+    def keep(self, name: str, domain: str | None, values: np.ndarray | None) -> None:
+        """Keeps a static array where its rows fit; a row per curve becomes one per vertex."""
+        if values is None or domain is None or name in self.statics or domain == "constant" and len(values) != 1:
+            return
+        if domain == "face" and self.curve_counts is not None and len(values) == len(self.curve_counts):
+            domain, values = "vertex", np.repeat(values, self.curve_counts, axis=0)
+        elif domain == "face" and self.kind == "points":
+            domain = "constant"
+        if len(values) == self.rows(domain):
+            self.statics[name] = Static(domain, values)
+
+    def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
+        """Transforms normals to world space; removes them where they turn in time, or have no direction there."""
+        normals = self.statics.get("normals")
+        if normals is None or normals.values.shape[1:] != (3,):
+            return
+        if moves or not np.linalg.det(matrix[:3, :3]):
+            del self.statics["normals"]
+        elif not np.array_equal(matrix[:3, :3], np.eye(3)):
+            turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
+            turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
+            self.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
+
+    def halve_widths(self, matrix: np.ndarray) -> None:
+        """Replaces the widths in "radius" by radii in world space."""
+        widths = self.statics.get("radius")
+        if widths is not None:
+            scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+            self.statics["radius"] = Static(widths.domain, (widths.values * scale).astype(widths.values.dtype))
+
+
+class ArrayDescriptor(NamedTuple):
+    """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it, a
+    record's as JSON; shape as JSON; domain: what its rows stand for, "" for nothing."""
+
+    name: str = ""
+    dtype: str = ""
+    shape: str = ""
+    domain: str = ""
+
+    @classmethod
+    def of(cls, name: str, values: np.ndarray, domain: str) -> ArrayDescriptor:
+        dtype = json.dumps(values.dtype.descr) if values.dtype.names else values.dtype.str
+        return cls(name, dtype, json.dumps(list(values.shape)), domain)
+
+    def array(self, raw: bytes) -> np.ndarray | None:
+        """The array; None where the bytes do not make one."""
+        try:
+            dtype = np.dtype([tuple(item) for item in json.loads(self.dtype)] if self.dtype.startswith("[")
+                             else self.dtype)
+            return None if dtype.hasobject else np.frombuffer(raw, dtype).reshape(json.loads(self.shape))
+        except (ValueError, TypeError, RecursionError):
+            return None
+
+
+def clip_of_objects(objects: list[Any], frames: Frames, time: np.ndarray, metadata: dict[str, Any],
+                    kept: Iterable[tuple[ArrayDescriptor, bytes]], options: ReadOptions, **more: Any) -> MotionClip:
+    """The clip of all objects. kept: arrays that a writer of ours has added to the file; more: further fields of
+    MotionClip."""
+    attributes, domains = _joined_statics(objects, options.skip)
+    _add_kept(kept, attributes, domains, options.skip)
+    known = _fields(attributes, domains)
+    rest, links = known.pop("rest", None), known.pop("edges", None)
+    polygons = _faces(objects, attributes)
+    return MotionClip(
+        frames, time, rest=rest if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first", edges=_edges(objects) if links is None else links,
+        faces=polygons, attributes=attributes, metadata=metadata | _names_and_kinds(objects) | {"domains": domains},
+        **known, **more)
+
+
+def frames_of_objects(objects: Sequence[Any], frame_count: int,
+                      sample: Callable[[Any, int], tuple[np.ndarray, np.ndarray]],
+                      frame_name: Callable[[int], str] = "frame {}".format,
+                      context: Callable[[], AbstractContextManager[None]] = nullcontext) -> Frames:
+    """Positions of all objects in world space, frame by frame.
+
+    sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
+    frame_name is how errors name a frame; frames are read inside `context()`.
+    """
+    count = sum(obj.count for obj in objects)
+
+    def positions(obj: Any, frame: int) -> np.ndarray:
+        if obj.still is not None:
+            return obj.still
+        points, matrix = sample(obj, frame)
+        if len(points) != obj.count:
+            raise ClipError(f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count} as in "
+                            "the first frame")
+        points = transformed(points, matrix)
+        if obj.is_still:
+            obj.still = points
+        return points
+
+    def read(start: int, stop: int) -> np.ndarray:
+        out = np.empty((stop - start, count, 3), np.float32)
+        with context():
+            for row, frame in enumerate(range(start, stop)):
+                for obj in objects:
+                    out[row, obj.vertices] = positions(obj, frame)
+        return out
+
+    return Frames(read, frame_count, count)
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """(n, 3) points by a (4, 4) matrix for row vectors, as float32."""
+    if np.array_equal(matrix, np.eye(4)):
+        return points
+    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+
+
+def _add_kept(kept: Iterable[tuple[ArrayDescriptor, bytes]], attributes: dict[str, np.ndarray],
+              domains: dict[str, str], skip: Collection[str]) -> None:
+    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
+    for descriptor, raw in kept:
+        name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
+        if values is None or not name or name in skip or name in attributes:
+            continue
+        if domain == "vertex" and len(values) != vertices:
+            continue
+        attributes[name] = values
+        if domain and domain != "vertex":
+            domains[name] = domain
+
+
+def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
+    """Metadata: the names, or the paths where names come twice."""
+    names = [obj.name for obj in objects]
+    unique = len(set(names)) == len(names)
+    metadata = {"part_names": names if unique else [obj.path for obj in objects],
+                "part_kinds": [obj.kind for obj in objects]}
+    return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
+
+
+def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Static arrays of all objects, one after the other, and what their rows stand for where that is no vertex."""
+    attributes, domains = {}, {}
+    for name in dict.fromkeys(name for obj in objects for name in obj.statics):
+        if name in skip:
+            continue
+        array = _joined_static(name, objects)
+        if array is not None:
+            attributes[name] = array.values
+            if array.domain != "vertex":
+                domains[name] = array.domain
+    attributes["part_vertex_counts"] = np.array([obj.count for obj in objects], np.int32)
+    domains["part_vertex_counts"] = "constant"
+    if any(obj.curve_counts is not None for obj in objects):
+        attributes["curve_vertex_counts"] = np.concatenate([obj.curve_counts for obj in objects
+                                                            if obj.curve_counts is not None])
+        domains["curve_vertex_counts"] = "constant"
+    return attributes, domains
+
+
+def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
+    """An object that lacks the array has zeros; None where the objects' arrays do not go together."""
+    found = [obj.statics[name] for obj in objects if name in obj.statics]
+    shapes = {static.values.shape[1:] for static in found}
+    if len(shapes) != 1:
+        return None
+    domain = _common_domain(found, len(objects))
+    dtypes = {static.values.dtype for static in found}
+    dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
+    if domain == "constant":
+        return Static(domain, found[0].values.astype(dtype, copy=False))
+    rows = [_spread(obj, obj.statics.get(name), domain, next(iter(shapes))) for obj in objects]
+    return Static(domain, np.concatenate(rows).astype(dtype, copy=False))
+
+
+def _common_domain(found: list[Static], object_count: int) -> str:
+    domains = {static.domain for static in found}
+    if domains == {"constant"}:
+        same = all(np.array_equal(static.values, found[0].values) for static in found)
+        return "constant" if same and len(found) == object_count else "vertex"
+    domains.discard("constant")
+    return domains.pop() if len(domains) == 1 else "corner"
+
+
+def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[int, ...]) -> np.ndarray:
+    if static is None:
+        return np.zeros((obj.rows(domain), *shape), np.uint8)
+    if static.domain == domain:
+        return static.values
+    if static.domain == "constant":
+        return np.repeat(static.values, obj.rows(domain), axis=0)
+    if static.domain == "vertex":
+        return static.values[obj.face_indices]
+    return np.repeat(static.values, obj.face_counts, axis=0)
+
+
+def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.ndarray | None:
+    """(F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
+    counts = np.concatenate([obj.face_counts for obj in objects])
+    if not len(counts):
+        return None
+    indices = np.concatenate([obj.face_indices + np.int32(obj.first) for obj in objects])
+    if counts.min() == counts.max() > 0:
+        return indices.reshape(-1, counts[0])
+    attributes |= {"face_vertex_counts": counts, "face_vertex_indices": indices}
+    return None
+
+
+def _edges(objects: list[SceneObject]) -> np.ndarray | None:
+    """Those between the neighbours on each curve; closed where it is periodic."""
+    found = []
+    for obj in objects:
+        if obj.curve_counts is None or not obj.count:
+            continue
+        counts = obj.curve_counts[obj.curve_counts > 0].astype(np.int64)
+        ends = np.cumsum(counts)
+        vertices = np.arange(obj.count)
+        following = vertices + 1
+        keep = np.ones(obj.count, bool)
+        if obj.details.get("wrap") == "periodic":
+            following[ends - 1] = ends - counts
+            keep[ends - 1] = counts > 2
+        else:
+            keep[ends - 1] = False
+        found.append(np.stack([vertices, following], axis=1)[keep] + obj.first)
+    return np.concatenate(found).astype(np.int32) if found else None
+
+
+def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
+    """Takes what a MotionClip has members for out of the attributes; others of these names are renamed."""
+    found = {}
+    vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
+    rest, edges = attributes.get("rest"), attributes.get("edges")
+    if rest is not None and rest.shape == (vertices, 3) and rest.dtype.kind == "f" and "rest" not in domains:
+        found["rest"] = attributes.pop("rest")
+    if edges is not None and edges.ndim == 2 and edges.shape[1] == 2 and edges.dtype.kind in "iu":
+        found["edges"] = attributes.pop("edges")
+    if "vertex_branch" in attributes and "branch_parent" in attributes:
+        for name in ("vertex_branch", "branch_parent", "stem_index"):
+            if name in attributes:
+                found[name] = attributes.pop(name)
+    for name in [name for name in attributes if name in RESERVED_NAMES]:
+        attributes[f"{name}_primvar"] = attributes.pop(name)
+        if name in domains:
+            domains[f"{name}_primvar"] = domains.pop(name)
+    for name in found:
+        domains.pop(name, None)
+    return found
+
+
+def own_metadata(text: Any) -> dict[str, Any]:
+    """What a writer of ours has kept of a clip's metadata, JSON, besides what the format itself holds; else nothing."""
+    if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
+        return {}
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    found = found if isinstance(found, dict) else {}
+    return {name: value for name, value in found.items() if name not in KNOWN_METADATA}
+
+
+def turned_corners(counts: np.ndarray) -> np.ndarray:
+    """(C,) the corners of each face from the last to the first."""
+    counts = np.asarray(counts, np.int64)
+    ends = np.cumsum(counts)
+    return np.repeat(2 * ends - counts - 1, counts) - np.arange(int(ends[-1]) if len(ends) else 0)
