@@ -164,7 +164,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         double step = ath_shift_step(piece, base);
         for (int32_t i = 0; i < 3 * T; i++)
             scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
-        if (before) ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->predicted_shift);
+        if (before) ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift,
+                                       rows->coarse_shift, rows->predicted_shift);
         code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
         ath_move_point(T, scratch->track, scratch->at.point);
         if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
@@ -174,7 +175,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         fit_rotation(plan, T, piece, local, scratch->track);
         if (before)
             ath_predict_track(base, T, before->frequencies, rotation_step, motion->ratio, before->rotation,
-                              rows->predicted_rotation);
+                              rows->coarse_rotation, rows->predicted_rotation);
         code_track(base, T, rotation_step, dead_zone, scratch->track, rows->predicted_rotation, rows->rotation);
         ath_turn(T, scratch->track, scratch->at.rotation);
         if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
@@ -214,7 +215,7 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     const ath_coarse *layer = motion->before;
     size_t T = (size_t)motion->frames;
     ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
-                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p], layer->extents[2 * p + 1]};
+                               layer->tracks + (size_t)p * 6 * T + 3 * T, 0, 0, 0, 0, layer->extents[2 * p], layer->extents[2 * p + 1]};
     return before;
 }
 
@@ -225,7 +226,10 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
     ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
     ath_piece_before before;
     int32_t T = motion->frames;
-    if (motion->before) before = piece_before(plan, motion, p);
+    if (motion->before) {
+        before = piece_before(plan, motion, p);
+        ath_coarse_rows(motion, piece, p, &rows);
+    }
     if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, dead_zone, scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);

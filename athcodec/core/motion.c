@@ -642,18 +642,19 @@ static double wave_product(int32_t T, const double *wave, const double *track)
     return sum;
 }
 
-static int32_t nearest_or_none(double units, int32_t ratio)
+static int32_t nearest_or_none(double units, double least)
 {
     double magnitude = units < 0.0 ? -units : units;
-    if (!(magnitude >= 0.5 * (double)ratio)) return 0;
+    if (!(magnitude >= least)) return 0;
     int32_t whole = magnitude >= 536870911.0 ? 536870911 : (int32_t)(magnitude + 0.5);
     return units < 0.0 ? -whole : whole;
 }
 
 void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, double step, int32_t ratio,
-                       const double *track, int32_t *predicted)
+                       const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
+    double least = coarse ? 0.5 : 0.5 * (double)ratio;
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
     for (int32_t axis = 0; axis < 3; axis++) {
         const double *row = track + axis * T;
@@ -663,11 +664,13 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
         for (; k + PREDICTED <= count; k += PREDICTED) {
             double sums[PREDICTED];
             project_waves(T, stream->temporal + (size_t)k * (size_t)T, row, sums);
-            for (int32_t i = 0; i < PREDICTED; i++) predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, ratio);
+            for (int32_t i = 0; i < PREDICTED; i++) predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, least);
         }
         for (; k < count; k++)
             predicted[axis * T + k] =
-                nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / step, ratio);
+                nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / step, least);
+        for (k = 0; coarse && k < count; k++)
+            if (coarse[axis * T + k] == 0) predicted[axis * T + k] = 0;
     }
 }
 
@@ -743,6 +746,7 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
             track = scratch->track;
         }
         ath_predict_track(stream, T, before->frequencies, ath_row_step(motion, piece, rows, r), motion->ratio, track,
+                          rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0,
                           ath_row(rows->predicted_modes, r, T));
     }
     for (int32_t r = modes; r < piece->rank; r++) memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));

@@ -16,6 +16,8 @@ typedef struct ath_stream {
 /* The layer before, from which a refinement predicts: what all pieces have become there. */
 typedef struct ath_coarse {
     double *placed;   /* vertex_count x 3 x frames: positions less the origin */
+    const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
+    const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
     double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
     int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
 } ath_coarse;
@@ -46,12 +48,15 @@ typedef struct {
     int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
     const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
     int32_t *predicted_modes, *predicted_rotation, *predicted_shift; /* of a refinement, as large as the rows; else null */
+    const int32_t *coarse_modes, *coarse_rotation, *coarse_shift;    /* rows of the layer before; null: of other functions */
 } ath_piece_rows;
 
 /* A piece as the layer before has it. */
 typedef struct {
     const double *placed;            /* count x 3 x frames */
     const double *rotation, *shift;  /* 3 x frames */
+    const int32_t *modes_rows, *rotation_row, *shift_row; /* its integers */
+    int32_t has_shapes;
     int32_t frequencies, modes;      /* that its rows reach; 0 frequencies: nothing is predicted from it */
 } ath_piece_before;
 
@@ -97,7 +102,7 @@ void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, con
 /* Integers of three axes over temporal frequency that a track would have in steps of `step`, nearest, where they are at least
  * half of `ratio`, the steps of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
 void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, double step, int32_t ratio,
-                       const double *track, int32_t *predicted);
+                       const double *track, const int32_t *coarse, int32_t *predicted);
 /* The same for the modes of a piece, from its vertices in the layer before seen from its attach frame now (scratch->at). */
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
                        const ath_scratch *scratch, ath_piece_rows *rows);

@@ -77,9 +77,9 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
 /* What the stream of a refinement holds of a piece, once its predictions are known: tracks first, then modes, whose
  * predictions need the attach frame that the tracks make. */
 static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
-                               int32_t slot, const int32_t *predicted, const ath_piece_rows *rows, int32_t *row)
+                               int32_t slot, const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows, int32_t *row)
 {
-    row_prediction prediction = {predicted, 0, motion->frames, (uint32_t)motion->ratio};
+    row_prediction prediction = {predicted, coarse, 0, motion->frames, (uint32_t)motion->ratio};
     note_count(rows, slot, code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row));
 }
 
@@ -87,20 +87,22 @@ static void code_refined_tracks(ath_coder *coder, refinement_model *model, const
                                 const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows)
 {
     if (ath_has_shift(piece))
-        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows, rows->shift);
+        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows->coarse_shift, rows, rows->shift);
     if (ath_rotation_step(plan, piece, stream) > 0.0)
-        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows, rows->rotation);
+        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows->coarse_rotation, rows, rows->rotation);
 }
 
 static void code_refined_modes(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
                                const ath_piece *piece, const ath_piece_rows *rows)
 {
     int32_t T = motion->frames, above_count = -1;
-    row_prediction prediction = {0, 0, T, (uint32_t)motion->ratio};
+    row_prediction prediction = {0, 0, 0, T, (uint32_t)motion->ratio};
     for (int32_t m = 0; m < piece->rank; m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         prediction.row = ath_row(rows->predicted_modes, m, T);
-        prediction.below = m + 1 < piece->rank ? prediction.row + 3 * T : 0;
+        const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)m * 3 * (size_t)T : 0;
+        prediction.coarse = coarse;
+        prediction.below = m + 1 < piece->rank ? (coarse ? coarse : prediction.row) + 3 * T : 0;
         above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction, ath_row(rows->modes, m, T));
         note_count(rows, m, above_count);
     }

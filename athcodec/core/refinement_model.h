@@ -36,23 +36,25 @@ ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio) { return (ma
 
 /* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */
 typedef struct {
-    const int32_t *row, *below;
+    const int32_t *row, *coarse, *below;
     int32_t frames;
     uint32_t ratio;
 } row_prediction;
 
 ATH_INLINE uint32_t coarse_at(const row_prediction *p, const int32_t *row, int32_t axis, int32_t k)
 {
-    return k < p->frames ? coarse_steps(row[axis * p->frames + k], p->ratio) : 0;
+    if (k >= p->frames) return 0;
+    return p->coarse ? clipped(row[axis * p->frames + k]) : coarse_steps(row[axis * p->frames + k], p->ratio);
 }
 
 /* How loud the layer before is around an integer, where that is not known otherwise yet. */
 static uint32_t loudness(const row_prediction *p, int32_t axis, int32_t k)
 {
-    uint32_t loud = 2 * (2 * coarse_at(p, p->row, axis, k + 1) + coarse_at(p, p->row, axis, k + 2)), below = 0;
+    const int32_t *row = p->coarse ? p->coarse : p->row;
+    uint32_t loud = 2 * (2 * coarse_at(p, row, axis, k + 1) + coarse_at(p, row, axis, k + 2)), below = 0;
     for (int32_t other = 0; other < 3; other++) {
-        loud += coarse_at(p, p->row, other, k + 1);
-        if (other > axis) loud += coarse_at(p, p->row, other, k);
+        loud += coarse_at(p, row, other, k + 1);
+        if (other > axis) loud += coarse_at(p, row, other, k);
         if (p->below) below += coarse_at(p, p->below, other, k);
     }
     return p->below ? loud + 2 * below + coarse_at(p, p->below, axis, k + 1) : loud;
@@ -81,7 +83,7 @@ static int32_t code_refined_difference(ath_coder *coder, refinement_model *model
                                        int32_t k, uint32_t of_differences, uint32_t of_integers, int32_t difference)
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k], around;
-    uint32_t steps = coarse_steps(predicted, prediction->ratio), size = steps < REFINED_SIZES ? steps : REFINED_SIZES - 1;
+    uint32_t steps = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k), size = steps < REFINED_SIZES ? steps : REFINED_SIZES - 1;
     uint32_t expected = of_differences;
     if (steps == 0) {
         uint32_t loud = loudness(prediction, axis, k);

@@ -184,7 +184,9 @@ class SegmentMotion:
             self.placed = np.zeros((plan.vertex_count, 3, frames))
             self.placed_tracks = np.zeros(self.tracks.shape)
             self.extents = np.zeros((core.piece_count, 2), np.int32)
-            self.coarse = Coarse(self.placed.ctypes.data, self.placed_tracks.ctypes.data, self.extents.ctypes.data)
+            self.coarse = Coarse(self.placed.ctypes.data, self.coefficients.ctypes.data, self.tracks.ctypes.data,
+                                 None if learned_modes is None else learned_modes.counts.ctypes.data,
+                                 self.placed_tracks.ctypes.data, self.extents.ctypes.data)
         self._bind()
 
     def _bind(self) -> None:
