@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec import player
+from athcodec import core_file
 from athcodec.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 from blender import INSTALL, Blender, build_extension
@@ -147,7 +147,7 @@ def _counted_core(tmp_path_factory):
 @pytest.fixture
 def work_of(_counted_core, monkeypatch):
     """A function that counts the work of an action; until the test ends, Python decodes with a core that counts."""
-    monkeypatch.setattr(player, "lib", _counted_core)
+    monkeypatch.setattr(core_file, "lib", _counted_core)
     return _counted_core.work_of
 
 
