@@ -182,15 +182,6 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     }
 }
 
-static int32_t frequencies_of(const int32_t *row, int32_t T)
-{
-    int32_t count = 0;
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = T; k > count; k--)
-            if (row[axis * T + k - 1] != 0) count = k;
-    return count;
-}
-
 /* What the next layer predicts from. */
 static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t p, const ath_piece_rows *rows,
                        const ath_scratch *scratch, const double *placed)
@@ -201,10 +192,10 @@ static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t
     memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
     int32_t *extents = decoded->extents + 2 * p;
-    extents[0] = ath_max(frequencies_of(rows->shift, motion->frames), frequencies_of(rows->rotation, motion->frames));
+    extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames), ath_row_extent(rows->rotation, motion->frames, motion->frames));
     extents[1] = 0;
     for (int32_t r = 0; r < piece->rank; r++) {
-        int32_t count = frequencies_of(ath_row(rows->modes, r, motion->frames), motion->frames);
+        int32_t count = ath_row_extent(ath_row(rows->modes, r, motion->frames), motion->frames, motion->frames);
         extents[0] = ath_max(extents[0], count);
         if (count > 0) extents[1] = rows->shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
     }

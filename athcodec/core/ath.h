@@ -78,7 +78,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format --------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 4 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 5 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {
@@ -95,6 +95,7 @@ enum {
     ATH_CORRECTIONS = 18,
     ATH_SHAPES = 19, /* of all segments, in segment 0 */
     ATH_EXACT = 20,
+    ATH_REFINED_REST = 21, /* of all segments, in segment 0 */
     ATH_ATTRIBUTE = ATH_OPTIONAL | 32
 };
 
@@ -125,6 +126,7 @@ typedef enum ath_field {
     ATH_FIELD_FULL_LEVEL_COUNT,
     ATH_FIELD_LEVEL_COUNT,
     ATH_FIELD_CLIP_COUNT,
+    ATH_FIELD_LAYER_COUNT,
     ATH_FIELD_FLAGS,
     ATH_FIELD_RESERVED,
     ATH_FIELD_MAX_ERROR,
@@ -197,6 +199,14 @@ ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, si
 ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
+/* Levels 0 to info.depth_levels - 1 are the branch hierarchy's, at the precision of the first layer; each further level refines
+ * all of it by one layer, some of which refine the rest pose too. Before such a level is prepared, what its layers share is
+ * built, in memory of their own, once ath_build has run and the REFINED_REST chunks are fed, which ath_ranges names.
+ * *memory_bytes: what ath_refine needs for the layers up to the level; 0: there is nothing left to build. ATH_MISSING; errors of
+ * the file. */
+ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
+ATH_API int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes);
+
 /* ---- what a file holds ------------------------------------------------------------------------------------------- */
 
 typedef struct ath_info {
@@ -208,6 +218,8 @@ typedef struct ath_info {
     int32_t clip_count;
     int32_t level_count;     /* stored levels: 0 to level_count - 1 */
     int32_t full_level_count;
+    int32_t layer_count;     /* of the full file; 1: no level refines another */
+    int32_t depth_levels;    /* levels of the first layer: those beyond are refinements */
     int32_t node_count, chunk_count;
     int32_t is_float64;            /* 1: positions are double in the file's own arithmetic, else float */
     float epsilon, xi;       /* the thresholds by which nodes were accepted */
@@ -262,6 +274,8 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
  * what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
+/* The rest pose of a level's layer: the one above for levels of the first layer. ATH_BAD_ARGUMENT where it is not built. */
+ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result may be
  * null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */

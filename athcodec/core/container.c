@@ -5,7 +5,8 @@ enum {
     HEADER_SIZE = 64,
     CHUNK_SIZE = 16,
     ERRORS_SIZE = 8,
-    CHECKSUM_AT = 12
+    CHECKSUM_AT = 12,
+    MOST_SHIFT = 15
 };
 
 static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
@@ -89,6 +90,7 @@ static void parse_header(const uint8_t *bytes, ath_header *header)
     header->clip_count = bytes[46];
     header->is_float64 = bytes[47] & 1;
     header->max_error = f64_at(bytes + 48);
+    header->layer_count = bytes[56];
 }
 
 /* Whether the value is none of those allowed: then the fault is filled in. */
@@ -119,7 +121,8 @@ static int is_bad_header(const uint8_t *bytes, const ath_limits *limits, const a
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LEVEL_COUNT, header->level_count, 1, header->full_level_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_CLIP_COUNT, header->clip_count, 1, 255)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FLAGS, bytes[47], 0, 1)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_RESERVED, (double)u64_at(bytes + 56), 0, 0)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LAYER_COUNT, header->layer_count, 1, ATH_LAYERS)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_RESERVED, (double)(u64_at(bytes + 56) >> 8), 0, 0)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST);
 }
 
@@ -388,6 +391,30 @@ int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step)
     *first = f64_at(body.bytes + 16 * (size_t)clip);
     *step = f64_at(body.bytes + 16 * (size_t)clip + 8);
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+int ath_parse_refined_rest(ath_bytes chunk, double *step, int32_t *shift, ath_bytes *body)
+{
+    if (chunk.size < 9 || chunk.bytes[8] > MOST_SHIFT) return ATH_BAD_CHUNK;
+    *step = f64_at(chunk.bytes);
+    *shift = chunk.bytes[8];
+    *body = rest_of(chunk, 9);
+    return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body)
+{
+    if (chunk.size < 1 || chunk.bytes[0] > MOST_SHIFT) return ATH_BAD_CHUNK;
+    *shift = chunk.bytes[0];
+    *body = rest_of(chunk, 1);
+    return ATH_OK;
+}
+
+int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
+{
+    if (chunk.size < 2) return ATH_BAD_CHUNK;
+    head->ratio = (int32_t)u16_at(chunk.bytes);
+    return head->ratio < 1 ? ATH_BAD_CHUNK : ath_parse_stems(rest_of(chunk, 2), frames, head, body);
 }
 
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)

@@ -10,7 +10,7 @@ typedef struct {
     double max_error;
     uint32_t checksum;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, clip_count, is_float64;
+    int32_t level_count, full_level_count, clip_count, layer_count, is_float64;
 } ath_header;
 
 /* Fills in a fault, and the chunk that it is about. Both return its code. */
@@ -62,6 +62,7 @@ typedef int32_t ath_time_method;
 typedef struct {
     double step, rotation_step_factor;
     int32_t bits, rank;
+    int32_t ratio; /* of a refinement: the step of the layer before over this one's */
     ath_bytes basis;
 } ath_stems_head;
 
@@ -73,6 +74,10 @@ float ath_seam(const ath_clip_entry *entry, int32_t level);
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body);
 int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step);
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
+/* Of refinements; shift: the layer before's integers are multiplied by 2 ^ shift to predict these. */
+int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
+int ath_parse_refined_rest(ath_bytes chunk, double *step, int32_t *shift, ath_bytes *body);
+int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 
 int ath_is_finite(double value);

@@ -20,11 +20,12 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, const double *source, double *rest)
+                        double step, const int32_t *coarse, int32_t shift, int32_t *steps, const double *source, double *rest)
 {
     ath_coder coder;
+    rest_layer layer = {coarse, shift, steps};
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_rest(&coder, (rest_model *)model, branches, branch_count, step, source, rest));
+    return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }
 
 int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
@@ -61,6 +62,22 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     for (int32_t p = 0; p < plan->piece_count && valid; p++)
         valid = code_shapes(&coder, model, plan->pieces + p, level, shape_counts[p],
                             integers + shape_first[p] * ATH_SHAPE_NUMBERS) >= 0;
+    return written(&coder, valid);
+}
+
+int64_t ath_encode_refined_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                  const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
+                                  const int32_t *coarse_counts, const int64_t *coarse_first, const int32_t *coarse, int32_t shift)
+{
+    ath_coder coder;
+    refined_shape_model *model = (refined_shape_model *)memory;
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    refined_shape_model_init(model);
+    for (int32_t p = 0; p < plan->piece_count && valid; p++)
+        valid = code_refined_shapes(&coder, model, plan->pieces + p, coarse_counts ? coarse_counts[p] : 0,
+                                    coarse_counts ? coarse + coarse_first[p] * ATH_SHAPE_NUMBERS : 0, shift, shape_counts[p],
+                                    integers + shape_first[p] * ATH_SHAPE_NUMBERS) >= 0;
     return written(&coder, valid);
 }
 
@@ -162,7 +179,7 @@ size_t ath_model_size(void)
 {
     size_t size = sizeof(refinement_model) + refinement_history_size(ATH_SEGMENT_FRAMES); /* larger than that of maps */
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
-    if (size < sizeof(shape_model)) size = sizeof(shape_model);
+    if (size < sizeof(refined_shape_model)) size = sizeof(refined_shape_model); /* larger than that of shapes */
     if (size < sizeof(exact_model)) size = sizeof(exact_model);
     return size < sizeof(rest_model) ? sizeof(rest_model) : size; /* the others are smaller */
 }

@@ -111,7 +111,8 @@ ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t
                                      int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                      const int32_t *vertex_source);
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                int32_t branch_count, double step, const double *source, double *rest);
+                                int32_t branch_count, double step, const int32_t *coarse, int32_t shift,
+                                int32_t *steps, const double *source, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                       int32_t branch_count, int is_float64, const double *rest);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
@@ -122,6 +123,11 @@ ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t 
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                   const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
                                   int32_t level);
+/* The same of a refinement; coarse_counts: null where the layer before has no shapes. */
+ATH_ENCODER_API int64_t ath_encode_refined_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
+                                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
+                                          const int32_t *coarse_counts, const int64_t *coarse_first,
+                                          const int32_t *coarse, int32_t shift);
 /* positions, source: vertex-major, float or (is_float64) double. */
 ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                  int32_t frames, int is_float64, const void *positions, const void *source);

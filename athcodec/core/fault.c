@@ -50,6 +50,7 @@ const char *ath_kind_name(int kind)
     case ATH_CORRECTIONS: return "CORRECTIONS";
     case ATH_SHAPES: return "SHAPES";
     case ATH_EXACT: return "EXACT";
+    case ATH_REFINED_REST: return "REFINED_REST";
     case ATH_ATTRIBUTE: return "ATTRIBUTE";
     default: return 0;
     }
@@ -139,6 +140,7 @@ static const char *const sentences[] = {
     "header: got Full_Level_Count %f%a",
     "header: got Level_Count %f%a",
     "header: got Clip_Count %f%a",
+    "header: got Layer_Count %f%a",
     "header: got Flags %f%a",
     "header: got Reserved %f%a",
     "header: got Max_Error %f; expected a finite length",

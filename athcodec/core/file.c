@@ -19,6 +19,18 @@ static uint64_t scratch_size(const ath_header *header)
     return larger(larger(size, ath_prelude_model_size()), ATH_BASIS_WORK * sizeof(double));
 }
 
+/* The rest poses of layers are there where the file has any, whether all of them are stored or not. */
+static void carve_layers(ath_file *file, const ath_header *header, ath_arena *arena)
+{
+    uint64_t vertices = header->vertex_count;
+    if (header->layer_count > 1) file->rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
+    for (int32_t q = 1; q < header->layer_count; q++) {
+        file->layers[q].pieces = (ath_piece *)ath_take(arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
+        file->layers[q].rest = (double *)ath_take(arena, vertices * 3 * sizeof(double));
+        file->layers[q].rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
+    }
+}
+
 /* Lays the file out behind its struct; with a null base only counts. */
 static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 {
@@ -41,6 +53,7 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     file->nodes = (ath_node *)ath_take(&arena, branches * sizeof(ath_node));
     file->gaps = (uint8_t *)ath_take(&arena, vertices);
     file->scratch = ath_take(&arena, scratch_size(header));
+    carve_layers(file, header, &arena);
     return arena.used;
 }
 
@@ -218,6 +231,23 @@ static void build_plan(ath_file *file)
     ath_build_plan(plan, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
 }
 
+/* A refinement's pieces come all with its level. */
+static void plan_layers(ath_file *file)
+{
+    for (int32_t q = 1; q < file->header.layer_count; q++) {
+        ath_layer *layer = &file->layers[q];
+        layer->plan = file->plan;
+        layer->plan.pieces = layer->pieces;
+        layer->plan.bases = 0;
+        memcpy(layer->pieces, file->pieces, (size_t)file->plan.piece_count * sizeof *layer->pieces);
+        for (int32_t p = 0; p < file->plan.piece_count; p++) {
+            layer->pieces[p].level = ath_level_of_layer(file, q);
+            layer->pieces[p].low_level = -1;
+            layer->pieces[p].low_modes = 0;
+        }
+    }
+}
+
 /* Which levels have which chunks. */
 static void plan_levels(ath_file *file)
 {
@@ -228,6 +258,7 @@ static void plan_levels(ath_file *file)
         file->stems_levels |= 1u << plan->pieces[p].level;
         if (plan->pieces[p].low_level >= 0) file->stems_levels |= 1u << plan->pieces[p].low_level;
     }
+    for (int32_t q = 1; q < file->header.layer_count; q++) file->stems_levels |= 1u << ath_level_of_layer(file, q);
     for (int32_t n = 0; n < plan->node_count; n++) {
         const ath_node *node = plan->nodes + n;
         for (int32_t level = node->level; node->coded && level <= node->last; level++)
@@ -240,13 +271,15 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
     if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
     if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
-    if (kind == ATH_CORRECTIONS) return d <= level && d == file->plan.height + 1;
-    return kind == ATH_EXACT && d == level && d == file->plan.height + 2;
+    int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
+    if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height;
+    if (kind == ATH_REFINED_REST) return d <= shown && d > file->plan.height + 1;
+    return kind == ATH_EXACT && d == level && d > shown;
 }
 
 static int is_wanted(const ath_file *file, const ath_chunk *chunk)
 {
-    if (chunk->kind == ATH_SHAPES && chunk->segment > 0) return 0;
+    if (ath_is_shared(chunk->kind) && chunk->segment > 0) return 0;
     return !ath_is_motion(chunk) || !ath_kind_name(chunk->kind)
            || ath_file_needs(file, chunk->kind, chunk->level, chunk->level);
 }
@@ -301,9 +334,10 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
         result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
                                        (int32_t)header->branch_count, head.is_float64, file->stored_rest);
         for (size_t i = 0; i < numbers; i++) file->rest[i] = file->stored_rest[i] - head.origin[i % 3];
+        if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                 head.step, file->rest);
+                                 head.step, 0, 0, file->rest_steps, file->rest);
         file->stored_rest = 0;
     }
     return result != ATH_OK ? result : all_finite(file->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
@@ -350,6 +384,7 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->segment_count = (int32_t)header->segment_count;
     info->level_count = header->level_count;
     info->full_level_count = header->full_level_count;
+    info->layer_count = header->layer_count;
     info->chunk_count = (int32_t)header->chunk_count;
     info->is_float64 = header->is_float64;
 }
@@ -357,7 +392,7 @@ static void set_info(ath_file *file, uint64_t prelude)
 /* One level more than the lossy ones gives the very positions of the source. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
-    int32_t lossy = file->plan.height + 2, found = file->info.full_level_count;
+    int32_t lossy = ath_lossy_levels(file), found = file->info.full_level_count;
     if (found == lossy || found == lossy + 1) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
@@ -370,7 +405,9 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if (result != ATH_OK) return result;
     build_plan(file);
     file->info.node_count = file->plan.node_count;
+    file->info.depth_levels = ath_min(file->info.level_count, file->plan.height + 2);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
+    plan_layers(file);
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
@@ -456,6 +493,119 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     return ATH_OK;
 }
 
+/* ---- refinements ---- */
+
+static size_t place_of(const ath_file *file, ath_order order, size_t v)
+{
+    return order == ATH_SOURCE_ORDER ? (size_t)file->vertex_source[v] : v;
+}
+
+static const double *layer_rest(const ath_file *file, int32_t layer) { return ath_layer_plan(file, layer)->rest; }
+
+static const int32_t *layer_rest_steps(const ath_file *file, int32_t layer)
+{
+    return layer > 0 ? file->layers[layer].rest_steps : file->rest_steps;
+}
+
+static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
+{
+    ath_layer *layer = &file->layers[q];
+    size_t numbers = 3 * (size_t)file->header.vertex_count;
+    ath_bytes body;
+    double step;
+    int32_t shift, result = ath_parse_refined_rest(chunk, &step, &shift, &body);
+    if (result == ATH_OK)
+        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
+                                 layer_rest_steps(file, q - 1), shift, layer->rest_steps, layer->rest);
+    return result != ATH_OK ? result : all_finite(layer->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+/* The layer's rest pose, once that of the layer before is known. */
+static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
+{
+    ath_layer *layer = &file->layers[q];
+    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, ath_level_of_layer(file, q), 0);
+    layer->plan.rest = layer_rest(file, q - 1);
+    if (!chunk) {
+        memcpy(layer->rest_steps, layer_rest_steps(file, q - 1), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
+        return ATH_OK;
+    }
+    int32_t index = (int32_t)(chunk - file->chunks);
+    ath_bytes content = {chunk->bytes, chunk->length};
+    if (!chunk->bytes)
+        return ath_refuse_chunk(fault, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, index, 0, chunk->length, chunk->length);
+    if (ath_check_chunk(file, index) != ATH_OK)
+        return ath_refuse_chunk(fault, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, index,
+                                ath_crc32c(0, chunk->bytes, chunk->length), chunk->checksum, chunk->checksum);
+    if (file->stored_rest || decode_layer_rest(file, q, content) != ATH_OK)
+        return ath_refuse_chunk(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, chunk, index, 0, 0, 0);
+    layer->plan.rest = layer->rest;
+    layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
+                                                    (int32_t *)file->scratch);
+    return ATH_OK;
+}
+
+static int32_t last_layer(const ath_file *file, int32_t level) { return ath_layer_of(file, level); }
+
+int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
+{
+    ath_fault_info unwanted;
+    uint64_t size = 0;
+    *memory_bytes = 0;
+    for (int32_t q = 1; q <= last_layer(file, level); q++) {
+        ath_layer *layer = &file->layers[q];
+        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, fault ? fault : &unwanted);
+        if (result != ATH_OK) return result;
+        layer->rest_known = 1;
+        if (!layer->plan.bases) size += layer->bases_count * sizeof(double) + 16;
+    }
+    *memory_bytes = ath_size_or_most(size);
+    return ATH_OK;
+}
+
+int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
+{
+    ath_arena arena = {(uint8_t *)memory, 0};
+    size_t needed;
+    int result = ath_refine_size(file, level, &needed, 0);
+    if (result != ATH_OK) return result;
+    if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
+    for (int32_t q = 1; q <= last_layer(file, level); q++) {
+        ath_layer *layer = &file->layers[q];
+        if (layer->plan.bases) continue;
+        double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double) + 16);
+        if (layer->bases_count > 0) {
+            ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
+            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (double *)file->scratch, bases);
+            layer->plan.bases = bases;
+        } else {
+            const ath_piece *before = ath_layer_plan(file, q - 1)->pieces;
+            for (int32_t p = 0; p < layer->plan.piece_count; p++) {
+                layer->pieces[p].modes = before[p].modes;
+                layer->pieces[p].basis = before[p].basis;
+                layer->pieces[p].rank = before[p].rank;
+            }
+            layer->plan.bases = ath_layer_plan(file, q - 1)->bases;
+        }
+    }
+    return ATH_OK;
+}
+
+int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride)
+{
+    int32_t layer = last_layer(file, level);
+    if (level < 0 || level >= file->info.level_count || (layer > 0 && !file->layers[layer].rest_known)) return ATH_BAD_ARGUMENT;
+    if (layer == 0 || layer_rest(file, layer) == file->rest) {
+        ath_rest_float64(file, order, xyz, stride);
+        return ATH_OK;
+    }
+    for (size_t v = 0; v < file->header.vertex_count; v++) {
+        double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
+        for (size_t k = 0; k < 3; k++) out[k] = layer_rest(file, layer)[3 * v + k] + file->info.origin[k];
+    }
+    return ATH_OK;
+}
+
 /* ---- what a file holds ---- */
 
 void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
@@ -487,11 +637,6 @@ double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
 static double rest_number(const ath_file *file, size_t i)
 {
     return file->stored_rest ? file->stored_rest[i] : file->rest[i] + file->info.origin[i % 3];
-}
-
-static size_t place_of(const ath_file *file, ath_order order, size_t v)
-{
-    return order == ATH_SOURCE_ORDER ? (size_t)file->vertex_source[v] : v;
 }
 
 void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
@@ -585,7 +730,7 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)
 {
     return ath_find_chunk(file->chunks, file->header.chunk_count, kind, level,
-                          kind == ATH_SHAPES ? 0 : (uint32_t)segment);
+                          ath_is_shared(kind) ? 0 : (uint32_t)segment);
 }
 
 /* First chunk that ends behind `offset`. */
@@ -631,6 +776,13 @@ static void add_range(const ath_chunk *chunk, int all, uint64_t *end, ath_range 
     ranges[*count - 1].size = *end - ranges[*count - 1].offset;
 }
 
+/* As ath_file_needs; not, unless `all` are asked for, of a rest pose that has been read. */
+static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level, int all)
+{
+    if (!ath_file_needs(file, kind, d, level)) return 0;
+    return all || kind != ATH_REFINED_REST || !file->layers[ath_layer_of(file, d)].rest_known;
+}
+
 /* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
  * chunks for each. */
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
@@ -639,13 +791,15 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
     int32_t count = 0;
     uint64_t end = 0;
     for (int32_t d = 0; d <= level; d++) {
-        if (first_segment > 0) /* shapes stand with segment 0 */
-            add_range(ath_file_chunk(file, ATH_SHAPES, d, 0), all, &end, ranges, capacity, &count);
+        if (first_segment > 0) /* what all segments share stands with segment 0 */
+            for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
+                if (ath_is_shared(kind) && is_used(file, kind, d, level, all))
+                    add_range(ath_file_chunk(file, kind, d, 0), all, &end, ranges, capacity, &count);
         uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first_segment);
         for (; i < file->header.chunk_count; i++) {
             const ath_chunk *chunk = file->chunks + i;
             if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last_segment) break;
-            if (ath_file_needs(file, chunk->kind, d, level)) add_range(chunk, all, &end, ranges, capacity, &count);
+            if (is_used(file, chunk->kind, d, level, all)) add_range(chunk, all, &end, ranges, capacity, &count);
         }
     }
     return count;
@@ -653,9 +807,9 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
-    for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
+    for (int32_t kind = ATH_STEMS; kind <= ATH_REFINED_REST; kind++)
         for (int32_t d = 0; d <= level; d++) {
-            if (!ath_file_needs(file, kind, d, level)) continue;
+            if (!is_used(file, kind, d, level, 0)) continue;
             const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);
             if (chunk && !chunk->bytes) return 0;
         }

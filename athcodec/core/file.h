@@ -5,6 +5,17 @@
 #include "container.h"
 #include "plan.h"
 
+/* A refinement: the plant at a finer precision. Its pieces are all of its level's; a layer that refines no rest pose has that of
+ * the layer before, and its bases. */
+typedef struct {
+    ath_plan plan;        /* plan.bases null: not built yet */
+    ath_piece *pieces;
+    double *rest;         /* null: that of the layer before */
+    int32_t *rest_steps;
+    uint64_t bases_count; /* 0: those of the layer before, or not known yet */
+    int32_t rest_known;
+} ath_layer;
+
 struct ath_file {
     ath_header header;
     ath_info info;
@@ -24,6 +35,8 @@ struct ath_file {
     uint8_t *gaps;
     void *scratch;               /* of opening and building */
     double *bases;               /* null until ath_build */
+    int32_t *rest_steps;         /* null where no layer refines the rest pose */
+    ath_layer layers[ATH_LAYERS]; /* 1 to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
     int32_t longest;             /* frames of the longest segment */
@@ -34,10 +47,26 @@ struct ath_file {
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
+/* Kinds whose one chunk of a level stands with segment 0 and serves all segments. */
+ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind == ATH_REFINED_REST; }
+
+/* Levels that are not the source's very numbers. */
+ATH_INLINE int32_t ath_lossy_levels(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }
+
 /* Whether it stores the level behind the last lossy one. */
-ATH_INLINE int ath_file_is_lossless(const ath_file *file)
+ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.level_count > ath_lossy_levels(file); }
+
+/* The layer of precision of a level: 0 for those of the branch hierarchy. */
+ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)
 {
-    return file->header.level_count > file->plan.height + 2;
+    return ath_max(0, ath_min(level, ath_lossy_levels(file) - 1) - file->plan.height - 1);
+}
+
+ATH_INLINE int32_t ath_level_of_layer(const ath_file *file, int32_t layer) { return file->plan.height + 1 + layer; }
+
+ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer)
+{
+    return layer > 0 ? &file->layers[layer].plan : &file->plan;
 }
 /* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);

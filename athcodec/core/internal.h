@@ -58,7 +58,8 @@ void *memset(void *to, int value, size_t size);
 enum {
     ATH_PIECE_VERTICES = 64,  /* longest piece of a stem */
     ATH_SEGMENT_FRAMES = 256, /* longest segment */
-    ATH_LEVELS = 32           /* most levels */
+    ATH_LEVELS = 32,          /* most levels */
+    ATH_LAYERS = 8            /* most layers of precision */
 };
 
 ATH_INLINE int32_t ath_min(int32_t a, int32_t b) { return a < b ? a : b; }

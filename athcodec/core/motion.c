@@ -408,13 +408,14 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     const ath_stream *base = ath_base_stream(motion, piece);
     double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
+    memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     if (ath_has_shift(piece)) {
-        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->track);
-        ath_move_point(T, scratch->track, scratch->at.point);
+        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->shift);
+        ath_move_point(T, scratch->shift, scratch->at.point);
     }
     if (rotation_step > 0.0) {
-        inverse_track(base, T, count_of(rows, ROTATION_SLOT, base), rotation_step, rows->rotation, scratch->track);
-        ath_turn(T, scratch->track, scratch->at.rotation);
+        inverse_track(base, T, count_of(rows, ROTATION_SLOT, base), rotation_step, rows->rotation, scratch->rotation);
+        ath_turn(T, scratch->rotation, scratch->at.rotation);
     }
 }
 
@@ -454,9 +455,15 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch)
 {
+    ath_turned_attach(plan, motion, p, rows, scratch);
+    return ath_pose_turned(plan, motion, p, rows, scratch);
+}
+
+const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                              const ath_scratch *scratch)
+{
     const ath_piece *piece = plan->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
-    ath_turned_attach(plan, motion, p, rows, scratch);
     for (int32_t m = 0; m < piece->rank; m++) {
         used[m] = 0;
         if (rows->counts && rows->counts[m] == 0) continue;
@@ -750,4 +757,13 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
                           ath_row(rows->predicted_modes, r, T));
     }
     for (int32_t r = modes; r < piece->rank; r++) memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
+}
+
+int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
+{
+    int32_t count = 0;
+    for (int32_t axis = 0; axis < 3; axis++)
+        for (int32_t k = most; k > count; k--)
+            if (row[axis * T + k - 1] != 0) count = k;
+    return count;
 }

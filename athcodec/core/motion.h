@@ -95,6 +95,11 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
 /* The same from its integers. */
 const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                              const ath_scratch *scratch);
+/* The same where ath_turned_attach has been called. */
+const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                              const ath_scratch *scratch);
+/* The frequencies up to which a row is not all 0, at most `most`. */
+int32_t ath_row_extent(const int32_t *row, int32_t frames, int32_t most);
 /* The node's map x = point + rotation (x0 - a), left in scratch->at. */
 void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);

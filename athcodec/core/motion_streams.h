@@ -43,6 +43,37 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
     return model->rows.invalid ? -1 : from + own;
 }
 
+typedef struct {
+    refinement_model rows;
+    uint32_t history[2 * ATH_SLOTS * ATH_SHAPE_MODES];
+    number_model count;
+} refined_shape_model;
+
+static void refined_shape_model_init(refined_shape_model *model)
+{
+    refinement_model_init(&model->rows, ATH_SHAPE_MODES, model->history);
+    number_model_init(&model->count);
+}
+
+/* All shapes of a piece in a refinement: those that the layer before has too, `coarse`, are coded about theirs, times
+ * 2 ^ shift. Returns their number, -1 where it cannot be. */
+static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model, const ath_piece *piece, int32_t coarse_count,
+                                   const int32_t *coarse, int32_t shift, int32_t count, int32_t *integers)
+{
+    static const int32_t nothing[ATH_SHAPE_NUMBERS];
+    int32_t modes = ath_shape_modes(piece), above_count = -1;
+    int32_t own = (int32_t)code_unsigned(coder, &model->count, (uint32_t)coarse_count * 16, (uint32_t)count);
+    if (own > 3 * modes) return -1;
+    for (int32_t s = 0; s < own; s++) {
+        const int32_t *known = s < coarse_count ? coarse + s * ATH_SHAPE_NUMBERS : nothing;
+        int32_t predicted[ATH_SHAPE_NUMBERS];
+        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, 1};
+        for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) predicted[i] = shifted(known[i], shift);
+        above_count = code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
+    }
+    return model->rows.rows.invalid ? -1 : own;
+}
+
 /* ---- stems ---- */
 
 static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)

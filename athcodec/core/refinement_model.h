@@ -31,6 +31,13 @@ static void refinement_model_init(refinement_model *model, int32_t frames, uint3
     for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
 }
 
+/* An integer of the layer before in steps of this one; what is too large for that is kept from overflowing. */
+ATH_INLINE int32_t shifted(int32_t coarse, int32_t shift)
+{
+    int32_t most = 0x3fffffff >> shift;
+    return (coarse > most ? most : coarse < -most ? -most : coarse) * (1 << shift);
+}
+
 /* Steps of the layer before that a prediction stands for. */
 ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio) { return (magnitude_of(predicted) + ratio / 2) / ratio; }
 

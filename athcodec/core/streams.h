@@ -4,8 +4,8 @@
 #ifndef ATH_STREAMS_H
 #define ATH_STREAMS_H
 
-#include "coefficient_model.h"
 #include "exact_model.h"
+#include "refinement_model.h"
 
 /* ---- hierarchy ---- */
 
@@ -166,22 +166,38 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
 
 enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
 
+/* What a rest pose's integers are coded about: those of the layer before, times 2 ^ shift. Three for each vertex; those of a
+ * run's modes stand with its vertices. */
+typedef struct {
+    const int32_t *coarse; /* null: nothing is known */
+    int32_t shift;
+    int32_t *steps;        /* filled for the next layer; may be null */
+} rest_layer;
+
 typedef struct {
     number_model inner, start;
+    number_model refined[2]; /* where the layer before has 0, and elsewhere */
     uint32_t mean[2][3];
-    coefficient_model modes;
-    uint32_t history[ATH_SLOTS * REST_RUN];
+    union {
+        coefficient_model modes;
+        refinement_model refined_modes;
+    };
+    uint32_t history[2 * ATH_SLOTS * REST_RUN];
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
 } rest_model;
 
-static void rest_model_init(rest_model *model)
+static void rest_model_init(rest_model *model, int is_refinement)
 {
     number_model_init(&model->inner);
     number_model_init(&model->start);
+    for (int32_t i = 0; i < 2; i++) number_model_init(&model->refined[i]);
     for (int32_t i = 0; i < 6; i++) model->mean[i / 3][i % 3] = 64;
-    coefficient_model_init(&model->modes, REST_RUN, model->history);
+    if (is_refinement)
+        refinement_model_init(&model->refined_modes, REST_RUN, model->history);
+    else
+        coefficient_model_init(&model->modes, REST_RUN, model->history);
     memset(model->made, 0, sizeof model->made);
 }
 
@@ -212,8 +228,8 @@ static int32_t steps_in(double value, double step, double half)
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
-static void code_rest_vertex(ath_coder *coder, rest_model *model, const ath_branch *branch, int32_t i, double step,
-                             const double *source, double *rest)
+static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch, int32_t i,
+                             double step, const double *source, double *rest)
 {
     double predicted[3], *out = rest + 3 * (size_t)(branch->first + i);
     int32_t starting = i < 2;
@@ -221,10 +237,18 @@ static void code_rest_vertex(ath_coder *coder, rest_model *model, const ath_bran
     predict_rest(branch, rest, i, predicted);
     for (int32_t k = 0; k < 3; k++) {
         int32_t given = ENCODING ? steps_in(source[out - rest + k] - predicted[k], step, 0.5) : 0;
-        int32_t steps = code_signed(coder, starting ? &model->start : &model->inner,
-                                    (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
+        uint32_t expected = (mean[k] + mean[0] + mean[1] + mean[2]) / 4;
+        int32_t steps, about = 0;
+        if (layer->coarse) {
+            int32_t coarse = layer->coarse[out - rest + k];
+            about = shifted(coarse, layer->shift);
+            steps = about + code_signed(coder, &model->refined[coarse != 0], expected, given - about);
+        } else {
+            steps = code_signed(coder, starting ? &model->start : &model->inner, expected, given);
+        }
         out[k] = predicted[k] + (double)steps * step;
-        mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
+        mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps - about) * 2;
+        if (layer->steps) layer->steps[out - rest + k] = steps;
     }
 }
 
@@ -247,15 +271,33 @@ static void steps_of_run(int32_t n, const double *basis, double step, const doub
         }
 }
 
+/* Integers of a run's modes, among those of its vertices. */
+static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n, int32_t *row)
+{
+    int32_t predicted[3 * REST_RUN] = {0}, known[3 * REST_RUN] = {0};
+    row_prediction prediction = {predicted, known, 0, REST_RUN, 1};
+    for (int32_t i = 0; i < 3 * n; i++) {
+        int32_t at = i / n * REST_RUN + i % n;
+        known[at] = layer->coarse[3 * (size_t)first + (size_t)i];
+        predicted[at] = shifted(known[at], layer->shift);
+    }
+    code_refined_row(coder, &model->refined_modes, n, 0, -1, &prediction, row);
+}
+
 /* `n` vertices of a beam from `first` on, by the modes of a beam that hangs on `base`. */
-static void code_rest_run(ath_coder *coder, rest_model *model, int32_t first, int32_t n, const double base[3],
-                          double step, const double *source, double *rest)
+static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n,
+                          const double base[3], double step, const double *source, double *rest)
 {
     int32_t row[3 * REST_RUN] = {0};
     const double *basis = rest_basis(model, n);
     double *run = rest + 3 * (size_t)first;
     if (ENCODING) steps_of_run(n, basis, step, base, source + 3 * (size_t)first, row);
-    code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
+    if (layer->coarse)
+        refine_rest_row(coder, model, layer, first, n, row);
+    else
+        code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
+    for (int32_t i = 0; layer->steps && i < 3 * n; i++)
+        layer->steps[3 * (size_t)first + (size_t)i] = row[i / n * REST_RUN + i % n];
     for (int32_t i = 0; i < n; i++)
         for (int32_t k = 0; k < 3; k++) {
             double sum = 0.0;
@@ -265,29 +307,29 @@ static void code_rest_run(ath_coder *coder, rest_model *model, int32_t first, in
 }
 
 /* A beam is cut into runs of like length, each of which hangs on the vertex before it. */
-static void code_rest_beam(ath_coder *coder, rest_model *model, const ath_branch *branch, double step,
+static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch, double step,
                            const double *source, double *rest)
 {
     int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
-    if (from) code_rest_vertex(coder, model, branch, 0, step, source, rest);
+    if (from) code_rest_vertex(coder, model, layer, branch, 0, step, source, rest);
     for (int32_t r = 0; r < runs; r++) {
         int32_t start = from + (int32_t)((int64_t)left * r / runs), end = from + (int32_t)((int64_t)left * (r + 1) / runs);
         size_t before = start > 0 ? (size_t)(branch->first + start - 1) : (size_t)branch->attach;
         double base[3] = {rest[3 * before], rest[3 * before + 1], rest[3 * before + 2]};
-        code_rest_run(coder, model, branch->first + start, end - start, base, step, source, rest);
+        code_rest_run(coder, model, layer, branch->first + start, end - start, base, step, source, rest);
     }
 }
 
-static int code_rest(ath_coder *coder, rest_model *model, const ath_branch *branches, int32_t branch_count, double step,
-                     const double *source, double *rest)
+static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
+                     int32_t branch_count, double step, const double *source, double *rest)
 {
-    rest_model_init(model);
+    rest_model_init(model, layer->coarse != 0);
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
         if (branches[b].lag == 0)
-            code_rest_beam(coder, model, branches + b, step, source, rest);
+            code_rest_beam(coder, model, layer, branches + b, step, source, rest);
         else
             for (int32_t i = 0; i < branches[b].count; i++)
-                code_rest_vertex(coder, model, branches + b, i, step, source, rest);
+                code_rest_vertex(coder, model, layer, branches + b, i, step, source, rest);
     }
     return !model->modes.invalid;
 }
