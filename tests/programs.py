@@ -7,8 +7,14 @@ import os
 import subprocess
 import sys
 import venv
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
 
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "athcodec-tests"
 
@@ -32,11 +38,25 @@ def run_script(python: str, script: str, *arguments: object) -> str:
     return done.stdout
 
 
+def install_once(folder: Path, packages: str, install: Callable[[], object]) -> None:
+    """Installs packages into a folder that has not got them yet; other processes of the tests wait for that."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        installed = folder / "installed"
+        if not installed.exists() or installed.read_text() != packages:
+            install()
+            installed.write_text(packages)
+
+
 def _environment(name: str, *packages: str) -> str:
     folder = CACHE / f"{name}-{sys.version_info.major}.{sys.version_info.minor}"
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    if not (folder / "installed").exists():
+
+    def install() -> None:
         venv.create(folder, with_pip=True, clear=True)
         subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
-        (folder / "installed").touch()
+
+    install_once(folder, " ".join(packages), install)
     return str(python)

@@ -50,8 +50,14 @@ def cells_of(text, title):
     return dict(zip(header, row, strict=True))
 
 
-def test_sizes_come_with_a_bound_that_was_measured_and_kept(tmp_path):
-    text, result = run_bench(tmp_path, "sizes", "--rel-error", "1e-3", "--effort", "fast")
+@pytest.fixture(scope="module")
+def sizes(tmp_path_factory):
+    """What the verb `sizes` prints, and its JSON."""
+    return run_bench(tmp_path_factory.mktemp("sizes"), "sizes", "--rel-error", "1e-3", "--effort", "fast")
+
+
+def test_sizes_come_with_a_bound_that_was_measured_and_kept(sizes):
+    text, result = sizes
     [size], [chunks], [choices] = tables_of(result)
     assert 0 < size["max/bound"] <= 1 and size["kept"] and result["broken"] == []
     assert cells_of(text, "Sizes")["kept"] == "yes"
@@ -79,9 +85,9 @@ def test_motions_of_one_plant_take_less_in_one_file_and_keep_the_bound(tmp_path)
     assert 0 < row["seam"] <= 2 and result["broken"] == []
 
 
-def test_figures_come_with_command_versions_and_machine(tmp_path):
-    _, result = run_bench(tmp_path, "sizes", "--rel-error", "1e-2", "--effort", "fast")
-    assert result["command"].startswith("python -m bench sizes --rel-error 1e-2")
+def test_figures_come_with_command_versions_and_machine(sizes):
+    _, result = sizes
+    assert result["command"].startswith("python -m bench sizes --rel-error 1e-3")
     assert {"python", "numpy", "athcodec"} <= result["versions"].keys()
     assert {"cpu", "cores"} <= result["machine"].keys()
 

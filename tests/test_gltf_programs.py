@@ -4,6 +4,7 @@ Needs Node and npm; the packages are installed once, into pytest's cache. Run wi
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pygltflib
 import pytest
+from programs import install_once
 from test_gltf import Maker, far, leafy, leafy_ath, seasons, seasons_ath  # noqa: F401, the fixtures too
 from test_vat import exr
 
@@ -34,15 +36,18 @@ PACKAGES = ["three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@gltf-transform/c
 def node(request):
     """Runs a script of the folder `node` with the packages beside it, and gives what it prints."""
     folder = Path(request.config.cache.mkdir("gltf_programs"))
-    wanted = folder / "packages.json"
-    if not wanted.exists() or json.loads(wanted.read_text()) != PACKAGES:
+
+    def install():
         (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
         subprocess.run(["npm", "install", "--no-audit", "--no-fund", *PACKAGES], cwd=folder, check=True,
                        capture_output=True)
-        wanted.write_text(json.dumps(PACKAGES))
+        for script in SCRIPTS.glob("*.mjs"):
+            shutil.copy(script, folder)
+
+    scripts = [hashlib.sha256(script.read_bytes()).hexdigest() for script in sorted(SCRIPTS.glob("*.mjs"))]
+    install_once(folder, " ".join([*PACKAGES, *scripts]), install)
 
     def run(script, *words):
-        shutil.copy(SCRIPTS / script, folder)
         done = subprocess.run(["node", folder / script, *map(str, words)], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         return done.stdout
@@ -53,10 +58,9 @@ def node(request):
 @pytest.fixture(scope="session")
 def panda(request, tmp_path_factory):
     """A walking panda that people drew and rigged, as Panda3D moves it; see node/panda.py."""
-    folder = Path(request.config.cache.mkdir("panda3d"))
-    if not (folder / "panda3d").exists():
-        subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder,
-                        "panda3d==1.10.16"], check=True)
+    folder, package = Path(request.config.cache.mkdir("panda3d")), "panda3d==1.10.16"
+    install_once(folder, package, lambda: subprocess.run(
+        [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder, package], check=True))
     out = tmp_path_factory.mktemp("panda") / "panda.npz"
     path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
     subprocess.run([sys.executable, SCRIPTS / "panda.py", out], check=True, env=os.environ | {"PYTHONPATH": path},

@@ -60,7 +60,7 @@ size_t fuzz_chunks_at(const uint8_t *file, size_t size)
 
 void fuzz_repair(uint8_t *file, size_t size)
 {
-    static const uint8_t front[12] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', FORMAT_MAJOR, 0, FORMAT_MINOR, 0};
+    static const uint8_t front[12] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
     size_t tables_end = fuzz_chunks_at(file, size), at = tables_end;
     if (tables_end == 0) return;
     for (uint32_t i = 0; i < fuzz_u32(file + CHUNK_COUNT_AT); i++) {

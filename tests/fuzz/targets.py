@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from athcodec.container import MAJOR, MINOR
 from fuzz import seeds
 
 HERE = Path(__file__).resolve().parent
@@ -27,7 +26,7 @@ NO_FUZZER = ("no clang with -fsanitize=fuzzer was found (install clang, or name 
              "once, not mutated")
 
 COMMON = ["-g", "-O2", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fno-omit-frame-pointer", "-DATH_STATIC",
-          "-Wall", "-Wextra", f"-DFORMAT_MAJOR={MAJOR}", f"-DFORMAT_MINOR={MINOR}", f"-I{HERE}"]
+          "-Wall", "-Wextra", f"-I{HERE}"]
 ADDRESS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 SANITIZERS = {"address": [*ADDRESS, "-fsanitize=float-cast-overflow"],
               "memory": ["-fsanitize=memory", "-fsanitize-memory-track-origins", "-fno-sanitize-recover=all"],

@@ -1,0 +1,108 @@
+"""A constant of the format has the same value wherever it is written: the headers of the C core define it; Python, JavaScript
+and FORMAT.md repeat it."""
+
+from __future__ import annotations
+
+import re
+from ctypes import byref, sizeof
+from pathlib import Path
+
+import pytest
+
+from athcodec import _native, container, core_file, errors
+from athcodec._native import lib
+from athcodec.segmentation import decoding_bytes
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE, VIEWER = ROOT / "athcodec" / "core", ROOT / "athcodec" / "viewer"
+FORMAT = (ROOT / "FORMAT.md").read_text("utf-8")
+
+
+def c_constants(*headers: str) -> dict[str, int]:
+    """All enumerators, by name without ATH_."""
+    found: dict[str, int] = {}
+    for header in headers:
+        code = re.sub(r"/\*.*?\*/", "", (CORE / header).read_text("utf-8"), flags=re.S)
+        for body in re.findall(r"\benum\s*\w*\s*\{([^}]*)\}", code):
+            last = -1
+            for entry in filter(None, map(str.strip, body.split(","))):
+                name, _, value = map(str.strip, entry.partition("="))
+                last = eval(value, {}, {f"ATH_{key}": known for key, known in found.items()}) if value else last + 1
+                found[name.removeprefix("ATH_")] = last
+    return found
+
+
+C = c_constants("ath.h", "internal.h", "motion.h")
+
+
+def js_constants(path: str) -> dict[str, int]:
+    """Integers that are declared at the top of a module."""
+    code = (VIEWER / path).read_text("utf-8")
+    lines = re.findall(r"^const ((?:[A-Z_]+ = (?:0x)?[0-9a-f]+(?:, )?)+);", code, flags=re.M)
+    return {name: int(value, 0) for line in lines for name, value in re.findall(r"([A-Z_]+) = (\w+)", line)}
+
+
+def default_limits() -> core_file.Limits:
+    limits = core_file.Limits()
+    lib.ath_default_limits(byref(limits))
+    return limits
+
+
+def test_the_version_of_the_format_is_the_same_everywhere():
+    version = C["FORMAT_MAJOR"], C["FORMAT_MINOR"]
+    assert version == (container.MAJOR, container.MINOR)
+    assert FORMAT.splitlines()[2] == "Format_Version {}.{}".format(*version)
+
+
+def test_chunks_have_the_same_kinds_and_names_everywhere():
+    in_format = {name: int(kind, 16) for name, kind in re.findall(r"^\| ([A-Z]+) \| (0x\w{4}) \|", FORMAT, flags=re.M)}
+    assert len(in_format) == 13 and in_format == {name: kind for kind, name in container.KIND_NAMES.items()}
+    for name, kind in in_format.items():
+        assert C[name] == getattr(container, name) == kind and lib.ath_kind_name(kind) == name.encode()
+    assert {kind for kind in range(1 << 16) if lib.ath_kind_name(kind)} == set(in_format.values())
+    assert (C["OPTIONAL"], C["NO_LEVEL"]) == (container.OPTIONAL, container.NO_LEVEL)
+    for module in ("src/statics.js", "src/ATHMotion.js", "ath_decoder.template.mjs"):
+        kinds = {name: value for name, value in js_constants(module).items() if name in (*in_format, "NO_LEVEL")}
+        assert kinds and kinds.items() <= C.items()
+
+
+def test_limits_are_the_same_everywhere():
+    rows = re.findall(r"^\| Max_(\w+) \| (\d+) \|", FORMAT, flags=re.M)
+    assert {name.lower(): int(value) for name, value in rows} == vars(container.Limits())
+    limits = default_limits()
+    for name, _ in core_file.Limits._fields_:
+        if name != "reserved":
+            assert getattr(limits, name) == getattr(container.Limits, name)
+
+
+@pytest.mark.parametrize("vertices, frames", [(1, 1), (7, 256), (8000, 33)])
+def test_the_memory_of_a_segment_is_the_same_everywhere(vertices, frames):
+    assert f"Vertex_Count * ({C['BYTES_PER_FRAME']} * F + {C['BYTES_PER_VERTEX']})" in FORMAT
+    assert decoding_bytes(vertices, frames) == vertices * (C["BYTES_PER_FRAME"] * frames + C["BYTES_PER_VERTEX"])
+
+
+def test_codes_of_errors_are_the_same_everywhere():
+    in_format = {name: int(code) for code, name in re.findall(r"^\| (\d+) \| ([A-Z_]+) \| [a-z]", FORMAT, flags=re.M)}
+    of_python = {error.name: error.code for error in (errors.FormatError, *errors.FormatError.__subclasses__())}
+    assert len(in_format) == 11 and in_format == of_python
+    for name, code in in_format.items():
+        assert C[name] == code and lib.ath_result_name(code) == name.encode()
+
+
+def test_python_and_javascript_repeat_the_numbers_of_the_core():
+    names = "PIECE_VERTICES SEGMENT_FRAMES SHAPE_MODES SHEET LOOSE WHOLE".split()
+    assert {name: getattr(_native, name) for name in names}.items() <= C.items()
+    names = "OK HELD MISSING FILE_ORDER SOURCE_ORDER FAULT_TEXT".split()
+    assert {name: getattr(core_file, name) for name in names}.items() <= C.items()
+    repeated = {name: value for name, value in js_constants("ath_decoder.template.mjs").items() if name in C}
+    assert repeated.items() <= C.items() and {"MORE", "HELD", "MISSING", "NO_MEMORY", "FAULT_TEXT"} <= repeated.keys()
+
+
+def test_structs_of_python_are_as_large_as_those_of_c():
+    """wasm.c asserts the sizes at 32 bits, which no pointer of these changes."""
+    asserted = dict(re.findall(r"sizeof\((ath_\w+)\) == (\d+)", (VIEWER / "wasm.c").read_text("utf-8")))
+    assert sizeof(core_file.Info) == int(asserted["ath_info"])
+    assert sizeof(core_file.Fault) == int(asserted["ath_fault_info"])
+    assert core_file.CHUNK.itemsize == int(asserted["ath_chunk"])
+    assert core_file.PART.itemsize == int(asserted["ath_part"])
+    assert _native.BRANCH.itemsize == int(asserted["ath_branch"])
