@@ -30,18 +30,18 @@ from athcodec.errors import (
 )
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 4
+MAJOR, MINOR = 0, 5
 NO_LEVEL = 255
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 CLIPS = 7
-STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
 ATTRIBUTE = OPTIONAL | 32
 KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
               CLIPS: "CLIPS", STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
-              EXACT: "EXACT", ATTRIBUTE: "ATTRIBUTE"}
+              EXACT: "EXACT", REFINED_REST: "REFINED_REST", ATTRIBUTE: "ATTRIBUTE"}
 
 _HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
 _CHUNK = struct.Struct("<HBBIII")
@@ -92,6 +92,7 @@ class Header:
     max_error: float
     is_float64: bool = False
     clip_count: int = 1
+    layer_count: int = 1
     chunk_count: int = 0
     file_length: int = 0
 
@@ -133,7 +134,7 @@ class Chunk:
 def _pack_header(header: Header, checksum: int) -> bytes:
     return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
                         header.branch_count, header.frame_count, header.segment_count, header.level_count,
-                        header.full_level_count, header.clip_count, int(header.is_float64), header.max_error, 0)
+                        header.full_level_count, header.clip_count, int(header.is_float64), header.max_error, header.layer_count)
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
@@ -212,6 +213,9 @@ _CLIP = struct.Struct("<IIBB")
 _STEMS = struct.Struct("<fBBH")
 _BASIS_LENGTH = struct.Struct("<I")
 _CORRECTIONS = struct.Struct("<f")
+_RATIO = struct.Struct("<H")
+_SHIFT = struct.Struct("<B")
+_REFINED_REST = struct.Struct("<dB")
 _ARRAY = struct.Struct("<H")
 
 
@@ -298,6 +302,21 @@ def pack_stems(head: StemsHead, stream: bytes) -> bytes:
     if head.bits:
         data += _BASIS_LENGTH.pack(len(head.basis)) + head.basis
     return data + stream
+
+
+def pack_refined_stems(ratio: int, head: StemsHead, stream: bytes) -> bytes:
+    """ratio: the step of the layer before over that of this one."""
+    return _RATIO.pack(ratio) + pack_stems(head, stream)
+
+
+def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
+    """shift: binary digits that this layer's integers have more than those of the layer before."""
+    return _SHIFT.pack(shift) + stream
+
+
+def pack_refined_rest(step: float, shift: int, stream: bytes) -> bytes:
+    """See pack_refined_shapes."""
+    return _REFINED_REST.pack(step, shift) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:

@@ -61,7 +61,8 @@ class Info(Structure):
     _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
                 ("origin", c_double * 3)]
     _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
-                                              "level_count full_level_count node_count chunk_count is_float64").split()]
+                                              "level_count full_level_count layer_count depth_levels node_count chunk_count "
+                                              "is_float64").split()]
     _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lam", c_uint32),
                  ("rest_is_float64", c_int32)]
 
@@ -148,6 +149,7 @@ class File:
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self._build: np.ndarray | None = None
+        self._refinements: list[np.ndarray] = []
         self._building = threading.Lock()
 
     @staticmethod
@@ -163,6 +165,18 @@ class File:
                 memory = aligned(lib.ath_build_size(self._file))
                 self._check(lib.ath_build(self._file, memory.ctypes.data, len(memory)))
                 self._build = memory
+
+    def refine(self, level: int) -> None:
+        """Computes what the layers of precision up to that of a level share, unless that is done."""
+        if level < self.info.depth_levels:
+            return
+        with self._building:
+            size, fault = c_size_t(), Fault()
+            self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)
+            memory = aligned(size.value)
+            self._check(lib.ath_refine(self._file, level, memory.ctypes.data, size.value))
+            if size.value:
+                self._refinements.append(memory)
 
     def _array(self, address: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
         dtype = np.dtype(dtype)
@@ -194,6 +208,12 @@ class File:
         """(N, 3) float64."""
         out = np.empty((self.info.vertex_count, 3))
         lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0])
+        return out
+
+    def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
+        """(N, 3) float64: that of the level's layer, which `refine` has built."""
+        out = np.empty((self.info.vertex_count, 3))
+        self._check(lib.ath_level_rest(self._file, level, order, out.ctypes.data, out.strides[0]))
         return out
 
     def chunks(self) -> np.ndarray:
@@ -260,6 +280,7 @@ class File:
     def prepare(self, work: Work, segment: int, level: int, into: Segment) -> None:
         """Decodes a segment at a level."""
         self.build()
+        self.refine(level)
         memory, fault = work.memory.ctypes.data, Fault()
         result = lib.ath_prepare(memory, len(work.memory), self._file, segment, level, into.pointer, len(into.memory))
         if result != OK:

@@ -530,15 +530,11 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
         memcpy(layer->rest_steps, layer_rest_steps(file, q - 1), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
         return ATH_OK;
     }
-    int32_t index = (int32_t)(chunk - file->chunks);
     ath_bytes content = {chunk->bytes, chunk->length};
-    if (!chunk->bytes)
-        return ath_refuse_chunk(fault, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, chunk, index, 0, chunk->length, chunk->length);
-    if (ath_check_chunk(file, index) != ATH_OK)
-        return ath_refuse_chunk(fault, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, chunk, index,
-                                ath_crc32c(0, chunk->bytes, chunk->length), chunk->checksum, chunk->checksum);
+    int result = ath_check_chunk(file, (int32_t)(chunk - file->chunks), fault);
+    if (result != ATH_OK) return result;
     if (file->stored_rest || decode_layer_rest(file, q, content) != ATH_OK)
-        return ath_refuse_chunk(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, chunk, index, 0, 0, 0);
+        return ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
     layer->plan.rest = layer->rest;
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);

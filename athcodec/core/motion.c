@@ -723,6 +723,19 @@ ATH_HOT void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece
     }
 }
 
+void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                        ath_piece_rows *rows)
+{
+    const ath_stream *stream = ath_base_stream(motion, piece);
+    double step = ath_rotation_step(plan, piece, stream);
+    if (ath_has_shift(piece))
+        ath_predict_track(stream, motion->frames, before->frequencies, ath_shift_step(piece, stream), motion->ratio,
+                          before->shift, rows->coarse_shift, rows->predicted_shift);
+    if (step > 0.0)
+        ath_predict_track(stream, motion->frames, before->frequencies, step, motion->ratio, before->rotation,
+                          rows->coarse_rotation, rows->predicted_rotation);
+}
+
 /* Three tracks of shapes at a time: the products of the modes with each. */
 static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows *rows, int32_t r, const double *modes,
                          double *track)

@@ -108,6 +108,9 @@ void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, con
  * half of `ratio`, the steps of the layer before over this one's; 0 elsewhere and from `frequencies` on. */
 void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, double step, int32_t ratio,
                        const double *track, const int32_t *coarse, int32_t *predicted);
+/* Those of a piece's tracks, which make its attach frame. */
+void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                        ath_piece_rows *rows);
 /* The same for the modes of a piece, from its vertices in the layer before seen from its attach frame now (scratch->at). */
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
                        const ath_scratch *scratch, ath_piece_rows *rows);

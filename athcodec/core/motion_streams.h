@@ -111,7 +111,8 @@ static void code_refined_track(ath_coder *coder, refinement_model *model, const 
                                int32_t slot, const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows, int32_t *row)
 {
     row_prediction prediction = {predicted, coarse, 0, motion->frames, (uint32_t)motion->ratio};
-    note_count(rows, slot, code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row));
+    code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
+    note_count(rows, slot, ath_row_extent(row, motion->frames, motion->frames));
 }
 
 static void code_refined_tracks(ath_coder *coder, refinement_model *model, const ath_plan *plan, const ath_stream *stream,
@@ -135,7 +136,7 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
         prediction.coarse = coarse;
         prediction.below = m + 1 < piece->rank ? (coarse ? coarse : prediction.row) + 3 * T : 0;
         above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction, ath_row(rows->modes, m, T));
-        note_count(rows, m, above_count);
+        note_count(rows, m, ath_row_extent(ath_row(rows->modes, m, T), T, T));
     }
 }
 

@@ -12,12 +12,15 @@ typedef enum { CHECKSUMS, HEADS, PIECES, DONE, FAILED } prepare_phase;
 typedef struct {
     ath_coder coder;
     shape_model *model;
-    const ath_chunk *chunk; /* null: no piece of the level has shapes */
+    refined_shape_model *refined; /* of a refinement, in its place */
+    int32_t shift;                /* of a refinement */
+    const ath_chunk *chunk;       /* null: no piece of the level has shapes */
 } shapes_reader;
 
 typedef struct {
     ath_coder coder;
     coefficient_model *model;
+    refinement_model *refined;    /* of a refinement, in its place */
     uint32_t *history;
     double *temporal;
     const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
@@ -44,6 +47,18 @@ typedef struct {
     const ath_chunk *chunk;
 } exact_reader;
 
+/* A layer of precision while one piece after the other passes through it. */
+typedef struct {
+    const ath_plan *plan;
+    ath_motion motion;
+    ath_scratch scratch;
+    ath_piece_rows rows;
+    int32_t counts[ATH_SLOTS];
+    int32_t *shape_integers; /* of the piece, 0 between pieces */
+    double *unit_shapes;
+    ath_piece_before before; /* the piece as the layer before has it */
+} layer_work;
+
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
@@ -53,22 +68,18 @@ struct ath_work {
     corrections_reader corrections;
     exact_reader exact_level;
     ath_stream streams[ATH_LEVELS];
-    ath_motion motion;
-    ath_scratch scratch;
-    ath_piece_rows piece;
+    layer_work layers[ATH_LAYERS];
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
     int32_t index, level;    /* of the segment in preparation */
+    int32_t layer;           /* the last one that it takes */
     int32_t next;            /* level of CHECKSUMS and HEADS, piece of PIECES */
     int32_t next_kind;       /* of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
     int32_t node_step;
-    int32_t counts[ATH_SLOTS];
-    int32_t *shape_integers; /* of the piece, 0 between pieces */
-    double *unit_shapes;
 };
 
 /* ---- memory ---- */
@@ -80,20 +91,49 @@ static uint32_t levels_with_affines(const ath_file *file)
     return levels;
 }
 
+static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t frames, ath_arena *arena)
+{
+    shapes_reader *shapes = work->shapes + d;
+    stems_reader *stems = work->stems + d;
+    int has_shapes = ath_file_chunk(file, ATH_SHAPES, d, 0) != 0;
+    if (ath_layer_of(file, d) > 0) {
+        if (has_shapes) shapes->refined = (refined_shape_model *)ath_take(arena, sizeof(refined_shape_model));
+        stems->refined = (refinement_model *)ath_take(arena, sizeof(refinement_model));
+        stems->history = (uint32_t *)ath_take(arena, refinement_history_size(frames));
+    } else {
+        if (has_shapes) shapes->model = (shape_model *)ath_take(arena, sizeof(shape_model));
+        stems->model = (coefficient_model *)ath_take(arena, sizeof(coefficient_model));
+        stems->history = (uint32_t *)ath_take(arena, history_size(frames));
+    }
+    stems->temporal = (double *)ath_take(arena, (uint64_t)frames * (uint64_t)frames * sizeof(double));
+}
+
+static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int32_t frames, ath_arena *arena)
+{
+    uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t), rows = (uint64_t)file->plan.longest * row;
+    layer->shape_integers = (int32_t *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->unit_shapes = (double *)ath_take(arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
+    layer->rows.modes = (int32_t *)ath_take(arena, rows);
+    layer->rows.rotation = (int32_t *)ath_take(arena, row);
+    layer->rows.shift = (int32_t *)ath_take(arena, row);
+    if (q > 0) {
+        layer->rows.predicted_modes = (int32_t *)ath_take(arena, rows);
+        layer->rows.predicted_rotation = (int32_t *)ath_take(arena, row);
+        layer->rows.predicted_shift = (int32_t *)ath_take(arena, row);
+    }
+    layer->motion.work = (double *)ath_take(arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
+    layer->motion.attach_caches =
+        (double *)ath_take(arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
+}
+
 static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, row = 3 * T * sizeof(int32_t);
+    uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
     uint32_t affines = levels_with_affines(file);
     ath_take(&arena, sizeof *work);
     for (int32_t d = 0; d < file->info.level_count; d++) {
-        if (file->stems_levels >> d & 1) {
-            if (ath_file_chunk(file, ATH_SHAPES, d, 0))
-                work->shapes[d].model = (shape_model *)ath_take(&arena, sizeof(shape_model));
-            work->stems[d].model = (coefficient_model *)ath_take(&arena, sizeof(coefficient_model));
-            work->stems[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
-            work->stems[d].temporal = (double *)ath_take(&arena, T * T * sizeof(double));
-        }
+        if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
         if (affines >> d & 1) {
             work->affines[d].model = (affine_model *)ath_take(&arena, sizeof(affine_model));
             work->affines[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
@@ -102,14 +142,9 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
     if (ath_file_is_lossless(file)) work->exact_level.model = (exact_model *)ath_take(&arena, sizeof(exact_model));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
-    work->shape_integers = (int32_t *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
-    work->unit_shapes = (double *)ath_take(&arena, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(double));
-    work->piece.modes = (int32_t *)ath_take(&arena, (uint64_t)file->plan.longest * row);
-    work->piece.rotation = (int32_t *)ath_take(&arena, row);
-    work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
-    work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
-    work->motion.attach_caches = (double *)ath_take(&arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
+    for (int32_t q = 0; q <= ath_layer_of(file, file->info.level_count - 1); q++)
+        carve_layer(work->layers + q, file, q, frames, &arena);
     return arena.used;
 }
 
@@ -194,29 +229,39 @@ static int find_chunks(ath_work *work)
         if (result == ATH_OK) result = check_fed(work, shapes);
     }
     work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
-                                           work->file->plan.height + 1);
+                                           ath_min(work->level, ath_lossy_levels(work->file) - 1));
     work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
 }
 
+static void ready_layer(ath_work *work, int32_t q)
+{
+    layer_work *layer = work->layers + q;
+    size_t row = 3 * (size_t)work->segment->frames * sizeof(int32_t);
+    layer->plan = ath_layer_plan(work->file, q);
+    layer->motion.frames = work->segment->frames;
+    layer->motion.streams = work->streams;
+    layer->motion.cosines = work->file->cosines[work->segment->frames];
+    layer->motion.ratio = 1;
+    layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
+    layer->rows.counts = layer->counts;
+    layer->rows.shapes = layer->unit_shapes;
+    memset(layer->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    memset(layer->rows.modes, 0, (size_t)work->file->plan.longest * row);
+    memset(layer->rows.rotation, 0, row);
+    memset(layer->rows.shift, 0, row);
+}
+
 static void ready_motion(ath_work *work)
 {
-    work->motion.frames = work->segment->frames;
-    work->motion.streams = work->streams;
-    work->motion.cosines = work->file->cosines[work->segment->frames];
-    work->scratch = ath_motion_scratch(&work->file->plan, &work->motion);
-    work->piece.counts = work->counts;
-    work->piece.shapes = work->unit_shapes;
-    memset(work->shape_integers, 0, MOST_SHAPES * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    work->layer = ath_layer_of(work->file, work->level);
+    for (int32_t q = 0; q <= work->layer; q++) ready_layer(work, q);
     work->node.step = &work->node_step;
-    memset(work->piece.modes, 0, (size_t)work->file->plan.longest * 3 * (size_t)work->motion.frames * sizeof(int32_t));
-    memset(work->piece.rotation, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
-    memset(work->piece.shift, 0, 3 * (size_t)work->motion.frames * sizeof(int32_t));
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
-        work->streams[d].temporal = work->motion.cosines;
-        work->streams[d].temporal_rank = work->motion.frames;
+        work->streams[d].temporal = work->layers[0].motion.cosines;
+        work->streams[d].temporal_rank = work->segment->frames;
     }
 }
 
@@ -227,7 +272,7 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     ath_segment *segment = (ath_segment *)segment_memory;
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
-    if (!file->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (!file->bases || !ath_layer_plan(file, ath_layer_of(file, level))->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     int32_t frames = ath_file_frames(file, index);
@@ -294,7 +339,7 @@ static int check_some(ath_work *work)
 /* Integers are decoded into the far half of the rows that they become. */
 static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reader *reader, ath_stream *stream)
 {
-    int32_t frames = work->motion.frames, limit = 1 << (head->bits - 1);
+    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1);
     size_t count = (size_t)head->rank * (size_t)frames;
     int32_t *integers = (int32_t *)(void *)reader->temporal + count;
     int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames, limit,
@@ -306,18 +351,41 @@ static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reade
     return result;
 }
 
-static int open_stems(ath_work *work, stems_reader *reader, ath_stream *stream)
+static int open_stems(ath_work *work, int32_t d)
 {
+    stems_reader *reader = work->stems + d;
+    ath_stream *stream = work->streams + d;
     ath_stems_head head;
     ath_bytes body;
-    int result = ath_parse_stems(bytes_of(reader->chunk), work->motion.frames, &head, &body);
+    int32_t frames = work->segment->frames, q = ath_layer_of(work->file, d);
+    int result = q > 0 ? ath_parse_refined_stems(bytes_of(reader->chunk), frames, &head, &body)
+                       : ath_parse_stems(bytes_of(reader->chunk), frames, &head, &body);
     if (result != ATH_OK) return result;
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
     if (head.bits) result = read_temporal(work, &head, reader, stream);
-    coefficient_model_init(reader->model, work->motion.frames, reader->history);
+    if (q > 0) {
+        work->layers[q].motion.ratio = head.ratio;
+        refinement_model_init(reader->refined, frames, reader->history);
+    } else {
+        coefficient_model_init(reader->model, frames, reader->history);
+    }
     coder_start(&reader->coder, body.bytes, body.size);
     return result;
+}
+
+static int open_shapes(shapes_reader *reader)
+{
+    ath_bytes body = bytes_of(reader->chunk);
+    if (reader->refined) {
+        int result = ath_parse_refined_shapes(body, &reader->shift, &body);
+        if (result != ATH_OK) return result;
+        refined_shape_model_init(reader->refined);
+    } else {
+        shape_model_init(reader->model);
+    }
+    coder_start(&reader->coder, body.bytes, body.size);
+    return ATH_OK;
 }
 
 static int open_corrections(corrections_reader *reader)
@@ -345,16 +413,12 @@ static int open_level(ath_work *work)
     }
     affines_reader *affines = work->affines + d;
     if (affines->chunk) {
-        affine_model_init(affines->model, work->motion.frames, affines->history);
+        affine_model_init(affines->model, work->segment->frames, affines->history);
         coder_start(&affines->coder, affines->chunk->bytes, affines->chunk->length);
     }
-    shapes_reader *shapes = work->shapes + d;
-    if (shapes->chunk) {
-        shape_model_init(shapes->model);
-        coder_start(&shapes->coder, shapes->chunk->bytes, shapes->chunk->length);
-    }
-    if (work->stems[d].chunk) result = open_stems(work, work->stems + d, work->streams + d);
-    return blame(work, work->stems[d].chunk, result);
+    const ath_chunk *shapes = work->shapes[d].chunk, *stems = work->stems[d].chunk;
+    if (shapes && (result = open_shapes(work->shapes + d)) != ATH_OK) return blame(work, shapes, result);
+    return stems ? blame(work, stems, open_stems(work, d)) : ATH_OK;
 }
 
 /* ---- pieces ---- */
@@ -367,27 +431,28 @@ static void clear_row(int32_t *row, int32_t frames, int32_t *count)
 }
 
 /* Rows are zero on entry to code_row. */
-static void clear_piece(ath_work *work, const ath_piece *piece)
+static void clear_piece(layer_work *layer, const ath_piece *piece)
 {
-    int32_t T = work->motion.frames;
-    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(work->piece.modes, m, T), T, work->counts + m);
-    memset(work->shape_integers, 0, (size_t)work->piece.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
-    work->piece.shape_count = 0;
-    clear_row(work->piece.shift, T, work->counts + SHIFT_SLOT);
-    clear_row(work->piece.rotation, T, work->counts + ROTATION_SLOT);
+    int32_t T = layer->motion.frames;
+    for (int32_t m = 0; m < piece->count; m++) clear_row(ath_row(layer->rows.modes, m, T), T, layer->counts + m);
+    memset(layer->shape_integers, 0, (size_t)layer->rows.shape_count * ATH_SHAPE_NUMBERS * sizeof(int32_t));
+    layer->rows.shape_count = 0;
+    clear_row(layer->rows.shift, T, layer->counts + SHIFT_SLOT);
+    clear_row(layer->rows.rotation, T, layer->counts + ROTATION_SLOT);
 }
 
 /* The shapes that the level adds to those of the piece. */
 static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
 {
     shapes_reader *reader = work->shapes + level;
-    int32_t known = work->piece.shape_count;
-    int32_t count = code_shapes(&reader->coder, reader->model, piece, level, known, work->shape_integers);
+    layer_work *layer = work->layers;
+    int32_t known = layer->rows.shape_count;
+    int32_t count = code_shapes(&reader->coder, reader->model, piece, level, known, layer->shape_integers);
     if (count < 0) return blame(work, reader->chunk, ATH_BAD_CHUNK);
     size_t from = (size_t)known * ATH_SHAPE_NUMBERS;
-    if (!ath_unit_shapes(count - known, work->shape_integers + from, work->unit_shapes + from))
+    if (!ath_unit_shapes(count - known, layer->shape_integers + from, layer->unit_shapes + from))
         return blame(work, reader->chunk, ATH_BAD_CHUNK);
-    work->piece.shape_count = count;
+    layer->rows.shape_count = count;
     return ATH_OK;
 }
 
@@ -395,12 +460,74 @@ static int read_piece(ath_work *work, int32_t p, int32_t level)
 {
     stems_reader *reader = work->stems + level;
     ath_coder coder = reader->coder;
-    if (work->shapes[level].chunk && read_shapes(work, work->file->plan.pieces + p, level) != ATH_OK)
-        return ATH_BAD_CHUNK;
-    code_piece(&coder, reader->model, &work->file->plan, work->streams + level, work->motion.frames, p, level,
-               &work->piece);
+    layer_work *layer = work->layers;
+    if (work->shapes[level].chunk && read_shapes(work, layer->plan->pieces + p, level) != ATH_OK) return ATH_BAD_CHUNK;
+    code_piece(&coder, reader->model, layer->plan, work->streams + level, layer->motion.frames, p, level, &layer->rows);
     reader->coder = coder;
     return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
+}
+
+/* ---- refinements ---- */
+
+static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
+{
+    shapes_reader *reader = work->shapes + piece->level;
+    layer_work *layer = work->layers + q, *before = layer - 1;
+    if (!reader->chunk) return ATH_OK;
+    int32_t count = code_refined_shapes(&reader->coder, reader->refined, piece, before->rows.shape_count, before->shape_integers,
+                                        reader->shift, 0, layer->shape_integers);
+    if (count < 0 || !ath_unit_shapes(count, layer->shape_integers, layer->unit_shapes))
+        return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    layer->rows.shape_count = count;
+    return ATH_OK;
+}
+
+/* What the layer before, whose piece is at `placed`, tells this one. */
+static void look_before(ath_work *work, int32_t q, int32_t p, const double *placed)
+{
+    layer_work *layer = work->layers + q;
+    const layer_work *coarse = layer - 1;
+    const ath_piece *piece = coarse->plan->pieces + p;
+    ath_piece_before *before = &layer->before;
+    int32_t T = layer->motion.frames, cosines = work->streams[layer->plan->pieces[p].level].temporal == layer->motion.cosines;
+    before->placed = placed;
+    before->rotation = coarse->scratch.rotation;
+    before->shift = coarse->scratch.shift;
+    before->modes = 0;
+    before->frequencies = ath_max(ath_row_extent(coarse->rows.shift, T, coarse->counts[SHIFT_SLOT]),
+                                  ath_row_extent(coarse->rows.rotation, T, coarse->counts[ROTATION_SLOT]));
+    for (int32_t r = 0; r < piece->rank; r++) {
+        int32_t count = ath_row_extent(ath_row(coarse->rows.modes, r, T), T, coarse->counts[r]);
+        before->frequencies = ath_max(before->frequencies, count);
+        cosines = cosines && ath_mode_stream(&coarse->motion, piece, r)->temporal == layer->motion.cosines;
+        if (count > 0) before->modes = coarse->rows.shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
+    }
+    cosines = cosines && ath_base_stream(&coarse->motion, piece)->temporal == layer->motion.cosines;
+    if (!cosines && before->frequencies > 0) before->frequencies = T;
+    int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
+    layer->rows.coarse_modes = cosines && alike ? coarse->rows.modes : 0;
+    layer->rows.coarse_rotation = cosines ? coarse->rows.rotation : 0;
+    layer->rows.coarse_shift = cosines ? coarse->rows.shift : 0;
+}
+
+static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **placed)
+{
+    layer_work *layer = work->layers + q;
+    const ath_piece *piece = layer->plan->pieces + p;
+    const ath_stream *stream = work->streams + piece->level;
+    stems_reader *reader = work->stems + piece->level;
+    ath_coder coder = reader->coder;
+    if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
+    look_before(work, q, p, *placed);
+    ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->rows);
+    code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
+    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    ath_predict_modes(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
+    code_refined_modes(&coder, reader->refined, stream, &layer->motion, piece, &layer->rows);
+    reader->coder = coder;
+    if (reader->refined->rows.invalid) return blame(work, reader->chunk, ATH_BAD_CHUNK);
+    *placed = ath_pose_turned(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    return ATH_OK;
 }
 
 /* Transposes rows over time into frames. */
@@ -491,10 +618,14 @@ static int make_exact(ath_work *work, const ath_piece *piece)
     return ATH_OK;
 }
 
+/* The piece at the first layer, then as each further one refines it. */
 static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
-    const double *placed = ath_pose_piece(&work->file->plan, &work->motion, p, &work->piece, &work->scratch);
+    layer_work *layer = work->layers;
+    const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    for (int32_t q = 1; q <= work->layer; q++)
+        if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
     store_piece(work, piece, placed);
     if (work->corrections.chunk) correct_piece(work, piece);
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
@@ -507,11 +638,12 @@ static void show_node(ath_work *work, int32_t n)
     ath_segment *segment = work->segment;
     size_t T = (size_t)segment->frames, nodes = (size_t)segment->node_count;
     double *maps = segment->maps + ATH_MAP * (size_t)work->shown++;
-    ath_node_map(&work->file->plan, &work->motion, n, &work->piece, &work->node, &work->scratch);
+    layer_work *layer = work->layers;
+    ath_node_map(layer->plan, &layer->motion, n, &layer->rows, &work->node, &layer->scratch);
     for (size_t t = 0; t < T; t++) {
         double *map = maps + t * nodes * ATH_MAP;
-        for (size_t k = 0; k < 9; k++) map[k] = work->scratch.at.rotation[k * T + t];
-        for (size_t k = 0; k < 3; k++) map[9 + k] = work->scratch.at.point[k * T + t];
+        for (size_t k = 0; k < 9; k++) map[k] = layer->scratch.at.rotation[k * T + t];
+        for (size_t k = 0; k < 3; k++) map[9 + k] = layer->scratch.at.point[k * T + t];
     }
 }
 
@@ -520,8 +652,8 @@ static int read_node(ath_work *work, int32_t n)
     const ath_node *node = work->file->plan.nodes + n;
     affines_reader *reader = work->affines + node->level;
     if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
-    memset(work->node.rows, 0, 4 * 3 * (size_t)work->motion.frames * sizeof *work->node.rows);
-    int valid = code_node(&reader->coder, reader->model, &work->file->plan, work->motion.frames, n, &work->node);
+    memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
+    int valid = code_node(&reader->coder, reader->model, &work->file->plan, work->segment->frames, n, &work->node);
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 
@@ -566,7 +698,7 @@ static int do_piece(ath_work *work)
         if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->level)) show_node(work, n);
     }
     if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
-    clear_piece(work, piece);
+    for (int32_t q = 0; q <= work->layer; q++) clear_piece(work->layers + q, piece);
     return result;
 }
 

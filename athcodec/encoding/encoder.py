@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any
 
@@ -41,6 +41,7 @@ def encode(
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
     effort: str = "default",
+    ladder: Sequence[float] | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Summary:
@@ -78,6 +79,9 @@ def encode(
         "none" drops faces, edges and named arrays.
     effort : {"fast", "default", "best"}
         How long settings are searched.
+    ladder : sequence of float, optional
+        Largest errors over the diagonal, each about that of a layer of precision, at which a decoder can stop. By default
+        a few decades down to the bound; empty: a single layer, for archives.
     jobs : int, optional
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.
@@ -102,7 +106,8 @@ def encode(
     """
     option = BoundOption(max_error, rel_error, target_size, lossless)
     options = EncodingOptions.of(segment_frames=segment_frames, tam=tam, exact_rest=exact_rest, lossless=lossless,
-                                 weights=weights, attributes=attributes, effort=effort, jobs=jobs)
+                                 weights=weights, attributes=attributes, effort=effort, jobs=jobs,
+                                 ladder=None if ladder is None else tuple(ladder))
     check_target(path)  # before any work
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:

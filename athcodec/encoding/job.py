@@ -28,10 +28,11 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.layers import Layer, code_segment, layer_chunks, layer_digits, layers_of
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, decide
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_segment, thread_count
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -55,6 +56,7 @@ class EncodingOptions:
     attributes: str = "all"
     effort: str = "default"
     jobs: int | None = None
+    ladder: tuple[float, ...] | None = None  # largest errors over the diagonal; (): a single layer
 
     @classmethod
     def of(cls, *, segment_frames: int | None = None, **options) -> EncodingOptions:
@@ -149,6 +151,7 @@ class _Decided:
     settings: Settings
     prelude: CodedPrelude
     learned_modes: LearnedModes | None
+    layers: list[Layer]
 
     @property
     def fingerprint(self) -> str:
@@ -224,7 +227,12 @@ class EncodingJob:
         qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
                        self.source.extent)
         ath = self.seen.ath(self.thresholds(bound))
-        return _Decided(ath, *decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs))
+        settings, prelude, modes = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs)
+        return self._layered(ath, settings, prelude, modes)
+
+    def _layered(self, ath: Ath, settings: Settings, prelude: CodedPrelude, modes: LearnedModes | None) -> _Decided:
+        digits = layer_digits(self.options.ladder, settings.bound, self.seen.diagonal)
+        return _Decided(ath, settings, prelude, modes, layers_of(self.source, prelude, settings, modes, digits))
 
     def draft(self, decided: _Decided) -> Draft:
         return Draft(decided.settings, decided.learned_modes, self.seen, self.segment_count, self.found, self.options,
@@ -233,7 +241,7 @@ class EncodingJob:
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         ath = self.seen.ath(self.thresholds(draft.settings.bound))
-        decided = _Decided(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
+        decided = self._layered(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
         if decided.fingerprint != draft.fingerprint:
             raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
                             "on machines that calculate alike")
@@ -269,18 +277,18 @@ class EncodingJob:
 
     def fill(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
         """All chunks of a file."""
-        prelude = decided.prelude
-        self._add_prelude(store, prelude, decided.ath)
-        for level, stream in streams.encode_learned_modes(prelude.plan, decided.learned_modes).items():
-            store.add(ct.SHAPES, stream, level)
-        errors = self._add_motion(store, prelude, coded)
+        layers = decided.layers
+        self._add_prelude(store, decided)
+        for (level, kind), content in layer_chunks(layers).items():
+            store.add(kind, content, level)
+        errors = self._add_motion(store, layers[0].plan.level_count + len(layers) - 1, coded)
         self._add_static(store)
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
         header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
                            self.segment_count, len(errors), len(errors),
                            0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
-                           self.clip.dtype == np.float64, len(self.clip.clip_range_frames))
+                           self.clip.dtype == np.float64, len(self.clip.clip_range_frames), len(layers))
         return _Result(store, header, errors)
 
     def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
@@ -316,11 +324,11 @@ class EncodingJob:
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
-    def _add_prelude(self, store: ct.ChunkStore, prelude: CodedPrelude, ath: Ath) -> None:
-        limits = ath.thresholds
+    def _add_prelude(self, store: ct.ChunkStore, decided: _Decided) -> None:
+        limits = decided.ath.thresholds
         store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
-                                                  prelude.hierarchy_stream))
-        store.add(ct.REST, ct.pack_rest(prelude.rest_chunk))
+                                                  decided.prelude.hierarchy_stream))
+        store.add(ct.REST, ct.pack_rest(decided.layers[0].rest))
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
         metadata = self.clip.metadata if self._keeps_static else {
             key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
@@ -349,8 +357,7 @@ class EncodingJob:
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
-            return CodedSegment(index, *code_segment(
-                decided.prelude, decided.settings, positions, decided.learned_modes, exact))
+            return CodedSegment(index, *code_segment(decided.prelude, decided.layers, positions, exact))
 
         at_once = thread_count(self.options.jobs, self.source)
         pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)
@@ -360,9 +367,9 @@ class EncodingJob:
         """What is coded of a block, and its own numbers where these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
 
-    def _add_motion(self, store: ct.ChunkStore, prelude: CodedPrelude, coded: Iterable[CodedSegment]) -> np.ndarray:
+    def _add_motion(self, store: ct.ChunkStore, lossy_levels: int, coded: Iterable[CodedSegment]) -> np.ndarray:
         """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
-        errors = np.zeros((prelude.plan.level_count + self.options.lossless, self.segment_count, 2))
+        errors = np.zeros((lossy_levels + self.options.lossless, self.segment_count, 2))
         missing = set(range(self.segment_count))
         for segment in coded:
             if segment.index not in missing:

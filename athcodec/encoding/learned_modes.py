@@ -108,6 +108,19 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
     return _packed(counts, [rows[p] for p in np.flatnonzero(counts)])
 
 
+def nested(plan: Plan, modes: LearnedModes, digits: int) -> LearnedModes:
+    """The same modes with so many binary digits less; those of a piece end before the first that vanishes."""
+    integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
+    counts, rows = np.zeros_like(modes.counts), []
+    for piece in np.flatnonzero(modes.counts):
+        own = integers[modes.first[piece]: modes.first[piece] + modes.counts[piece]]
+        counts[piece] = count = np.cumprod(own.any(axis=1)).sum()
+        size = min(int(plan.pieces["rank"][piece]), SHAPE_MODES)
+        if count:
+            rows.append(own[:count].reshape(count, 3, SHAPE_MODES)[:, :, :size].transpose(0, 2, 1).reshape(count, -1))
+    return _packed(counts, rows)
+
+
 def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
     units, duals = np.zeros((2, len(integers), NUMBERS))

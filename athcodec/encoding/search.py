@@ -248,7 +248,7 @@ class Search:
             prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             self._components[known] = components(prelude.plan, (
-                analyse_finely(prelude, settings, self.source.positions(segment)) for segment in some))
+                analyse_finely(prelude.plan, settings, self.source.positions(segment)) for segment in some))
         return learn(plan, self._components[known], settings.step, None if everywhere else settings.learned_pieces)
 
     def _with_learned_modes(self, settings: Settings) -> Settings:
@@ -265,7 +265,7 @@ class Search:
         prelude = self.prelude(plain)
         learned_modes = self.learned_modes(prelude.plan, plain, everywhere=True)
         pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
-        modes, tracks = (sum(estimated_bits(analyse(prelude, plain, sample.positions, some)[0].coefficients, pieces,
+        modes, tracks = (sum(estimated_bits(analyse(prelude.plan, plain, sample.positions, some)[0].coefficients, pieces,
                                             len(learned_modes.counts)) * sample.scale for sample in self.samples)
                          for some in (None, learned_modes))
         owners = np.repeat(np.arange(len(learned_modes.counts)), learned_modes.counts)
@@ -377,7 +377,7 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment, _ = analyse(prelude, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        segment, _ = analyse(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)

@@ -6,7 +6,6 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,7 +23,6 @@ from athcodec.encoding.motion import (
     Plan,
     SegmentMotion,
     gather,
-    position_error,
     temporal_basis,
 )
 from athcodec.errors import BoundError
@@ -179,11 +177,12 @@ class CodedPrelude:
             head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
         else:
-            head.stream, decoded = streams.encode_rest(branches, head.step, source.rest)
-            while np.linalg.norm(decoded - source.rest, axis=1).max() > settings.bound:
+            coded = streams.encode_rest(branches, head.step, source.rest)
+            while np.linalg.norm(coded.decoded - source.rest, axis=1).max() > settings.bound:
                 head.step = qz.single(0.8 * head.step)
-                head.stream, decoded = streams.encode_rest(branches, head.step, source.rest)
-            self.plan.set_rest(decoded)
+                coded = streams.encode_rest(branches, head.step, source.rest)
+            head.stream = coded.stream
+            self.plan.set_rest(coded.decoded)
         return head
 
 
@@ -255,20 +254,20 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
     return segment.cosines.T @ moments @ segment.cosines, count
 
 
-def analyse_finely(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> SegmentMotion:
+def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
     """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
-    segment = SegmentMotion(prelude.plan, positions.shape[2], _level_streams(fine, prelude.plan.level_count, {}))
+    segment = SegmentMotion(plan, positions.shape[2], _level_streams(fine, plan.level_count, {}))
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 
 
-def _learn_bases(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
+def _learn_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
     """Temporal bases of the levels that learn theirs, from a finer pass with cosines."""
     levels = [level for level, learned in enumerate(settings.learned_bases) if learned]
     if not levels:
         return {}
-    segment = analyse_finely(prelude, settings, positions)
+    segment = analyse_finely(plan, settings, positions)
     bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE)
              for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
@@ -298,21 +297,21 @@ class Coded:
         return ct.pack_corrections(self.correction_step, stream)
 
 
-def analyse(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
-            learned_modes: LearnedModes | None) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
-    """The integers of the stems, and the time bases of the levels that learn theirs."""
-    bases = _learn_bases(prelude, settings, positions)
-    level_streams = _level_streams(settings, prelude.plan.level_count, bases)
-    segment = SegmentMotion(prelude.plan, positions.shape[2], level_streams, learned_modes)
+def analyse(plan: Plan, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None,
+            before: SegmentMotion | None = None, ratio: int = 1,
+            layered: bool = False) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
+    """The integers of the stems, and the time bases of the levels that learn theirs; before, ratio, layered: as
+    SegmentMotion has them."""
+    bases = _learn_bases(plan, settings, positions)
+    level_streams = _level_streams(settings, plan.level_count, bases)
+    segment = SegmentMotion(plan, positions.shape[2], level_streams, learned_modes, before, ratio, layered)
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment, bases
 
 
-def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
-               learned_modes: LearnedModes | None) -> Coded:
-    """Streams of the stems and the corrections that keep the limit."""
-    plan = prelude.plan
-    segment, bases = analyse(prelude, settings, positions, learned_modes)
+def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, np.ndarray]) -> tuple[dict, dict]:
+    """STEMS of the levels of a first layer, and the bytes of their time bases."""
+    plan = segment.plan
 
     def stem_stream(level: int) -> tuple[bytes, int]:
         head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
@@ -324,43 +323,29 @@ def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
     levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
     coded = plan.pool.map(stem_stream, [(level,) for level in levels])
     stems, heads = (dict(zip(levels, column)) for column in zip(*coded))
-    decoded = segment.pose(plan.level_count - 1, prelude.origin, prelude.dtype)
+    return stems, heads
+
+
+def correct(decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings,
+            pool: ThreadPool) -> tuple[np.ndarray, float]:
+    """Corrections (K, 5) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
     factor = 1.0
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = streams.find_corrections(decoded, positions, prelude.origin, settings.limit, step,
-                                                plan.pool)
+        corrections = streams.find_corrections(decoded, positions, origin, settings.limit, step, pool)
         if corrections is not None:
-            return Coded(segment, stems, corrections, decoded, step, heads)
+            return corrections, step
         factor *= 0.5
         if factor < 1e-3:
             raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "
-                             f"{prelude.dtype.name} numbers")
+                             f"{decoded.dtype.name} numbers")
 
 
-def code_segment(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None,
-                 exact: np.ndarray | None = None) -> tuple[dict, np.ndarray]:
-    """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
-
-    exact: the source's own numbers (see Source.exact), which one more level is to give.
-    """
-    plan, last = prelude.plan, prelude.plan.level_count - 1
-    coded = code_stems(prelude, settings, positions, learned_modes)
-    segment = coded.segment
-    segment.analyse_nodes(positions, settings.node_steps, qz.DEAD_ZONE)
-    chunks: dict[tuple[int, int], bytes] = {(level, ct.STEMS): data for level, data in coded.stems.items()}
-    for level in range(plan.level_count):
-        if plan.has_affines(level):
-            chunks[level, ct.AFFINES] = streams.encode_affines(segment, level)
-    if len(coded.corrections):
-        chunks[last, ct.CORRECTIONS] = coded.correction_chunk
-    if exact is not None:
-        chunks[last + 1, ct.EXACT] = streams.encode_exact(coded.decoded, exact)
-    errors = np.zeros((plan.level_count + (exact is not None), 2))
-    for level in range(plan.level_count):
-        decoded = coded.decoded if level == last else segment.pose(level, prelude.origin, prelude.dtype)
-        largest, squares = position_error(decoded, positions, prelude.origin, plan.pool)
-        errors[level] = largest, math.sqrt(squares / (positions.shape[0] * positions.shape[2]))
-    if errors[last, 0] > settings.largest_bound:
-        raise AssertionError(f"decoded error {errors[last, 0]} is beyond the bound {settings.largest_bound}")
-    return chunks, errors
+def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
+               learned_modes: LearnedModes | None) -> Coded:
+    """Streams of the stems of a single layer and the corrections that keep the limit."""
+    segment, bases = analyse(prelude.plan, settings, positions, learned_modes)
+    stems, heads = stem_streams(segment, settings, bases)
+    decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)
+    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan.pool)
+    return Coded(segment, stems, corrections, decoded, step, heads)

@@ -6,6 +6,8 @@ the container's business. Reading streams is the core's.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from athcodec._native import BRANCH, address, encode_stream, lib
@@ -22,12 +24,25 @@ def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_sou
                          address(vertex_source, np.int32, len(vertex_source)))
 
 
-def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """The stream of a rest pose, (N, 3) float64 less the origin, and the pose that it decodes to."""
-    decoded = np.zeros_like(rest)
+@dataclass
+class CodedRest:
+    """A rest pose at one precision: the stream, what it decodes to, (N, 3) float64, and its integers, (N, 3) int32."""
+
+    step: float
+    stream: bytes
+    decoded: np.ndarray
+    steps: np.ndarray
+
+
+def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray, coarse: CodedRest | None = None,
+                shift: int = 0) -> CodedRest:
+    """A rest pose, (N, 3) float64 less the origin; about that of a coarser layer, whose step is 2 ** shift of this one."""
+    decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
     data = encode_stream("ath_encode_rest", 1024 + 8 * rest.size, address(branches, BRANCH, 1), len(branches), step,
-                         address(rest, np.float64, rest.size), address(decoded, np.float64, rest.size))
-    return data, decoded
+                         None if coarse is None else address(coarse.steps, np.int32, rest.size), shift,
+                         address(steps, np.int32, rest.size), address(rest, np.float64, rest.size),
+                         address(decoded, np.float64, rest.size))
+    return CodedRest(step, data, decoded, steps)
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
@@ -58,6 +73,19 @@ def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict
               address(learned_modes.integers, np.int32, learned_modes.integers.size))
     return {level: encode_stream("ath_encode_shapes", 4096 + 8 * learned_modes.integers.size, plan.core, *arrays, level)
             for level in learned_modes.levels(plan).tolist()}
+
+
+def encode_refined_modes(plan: Plan, modes: LearnedModes | None, coarse: LearnedModes | None, shift: int) -> bytes | None:
+    """Learned modes of a refinement, all of its level, about those of the layer before; None where there are none."""
+    if modes is None:
+        return None
+    pieces, known = len(plan.pieces), (None, None, None)
+    if coarse is not None:
+        known = (address(coarse.counts, np.int32, pieces), address(coarse.first, np.int64, pieces),
+                 address(coarse.integers, np.int32, coarse.integers.size))
+    return encode_stream("ath_encode_refined_shapes", 4096 + 8 * modes.integers.size, plan.core,
+                         address(modes.counts, np.int32, pieces), address(modes.first, np.int64, pieces),
+                         address(modes.integers, np.int32, modes.integers.size), *known, shift)
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
