@@ -215,7 +215,7 @@ _BASIS_LENGTH = struct.Struct("<I")
 _CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
-_REFINED_REST = struct.Struct("<dB")
+_REFINED_REST = struct.Struct("<d")
 _ARRAY = struct.Struct("<H")
 
 
@@ -314,9 +314,8 @@ def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
     return _SHIFT.pack(shift) + stream
 
 
-def pack_refined_rest(step: float, shift: int, stream: bytes) -> bytes:
-    """See pack_refined_shapes."""
-    return _REFINED_REST.pack(step, shift) + stream
+def pack_refined_rest(step: float, stream: bytes) -> bytes:
+    return _REFINED_REST.pack(step) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:

@@ -393,12 +393,11 @@ int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step)
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-int ath_parse_refined_rest(ath_bytes chunk, double *step, int32_t *shift, ath_bytes *body)
+int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body)
 {
-    if (chunk.size < 9 || chunk.bytes[8] > MOST_SHIFT) return ATH_BAD_CHUNK;
+    if (chunk.size < 8) return ATH_BAD_CHUNK;
     *step = f64_at(chunk.bytes);
-    *shift = chunk.bytes[8];
-    *body = rest_of(chunk, 9);
+    *body = rest_of(chunk, 8);
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 

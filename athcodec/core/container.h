@@ -76,7 +76,7 @@ int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step);
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 /* Of refinements; shift: the layer before's integers are multiplied by 2 ^ shift to predict these. */
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
-int ath_parse_refined_rest(ath_bytes chunk, double *step, int32_t *shift, ath_bytes *body);
+int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 

@@ -20,10 +20,10 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, const int32_t *coarse, int32_t shift, int32_t *steps, const double *source, double *rest)
+                        double step, const int32_t *coarse, const double *before, int32_t *steps, const double *source, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, shift, steps};
+    rest_layer layer = {coarse, before, steps};
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }

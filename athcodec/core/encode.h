@@ -111,7 +111,7 @@ ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t
                                      int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                      const int32_t *vertex_source);
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                int32_t branch_count, double step, const int32_t *coarse, int32_t shift,
+                                int32_t branch_count, double step, const int32_t *coarse, const double *before,
                                 int32_t *steps, const double *source, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                       int32_t branch_count, int is_float64, const double *rest);

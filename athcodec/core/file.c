@@ -513,10 +513,10 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     size_t numbers = 3 * (size_t)file->header.vertex_count;
     ath_bytes body;
     double step;
-    int32_t shift, result = ath_parse_refined_rest(chunk, &step, &shift, &body);
+    int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                                 layer_rest_steps(file, q - 1), shift, layer->rest_steps, layer->rest);
+                                 layer_rest_steps(file, q - 1), layer_rest(file, q - 1), layer->rest_steps, layer->rest);
     return result != ATH_OK ? result : all_finite(layer->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
 }
 

@@ -166,11 +166,11 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
 
 enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
 
-/* What a rest pose's integers are coded about: those of the layer before, times 2 ^ shift. Three for each vertex; those of a
- * run's modes stand with its vertices. */
+/* The rest pose of the layer before, which a refinement is coded about: positions, and integers, three for each vertex; those of
+ * a run's modes stand with its vertices. */
 typedef struct {
     const int32_t *coarse; /* null: nothing is known */
-    int32_t shift;
+    const double *before;
     int32_t *steps;        /* filled for the next layer; may be null */
 } rest_layer;
 
@@ -241,7 +241,7 @@ static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_lay
         int32_t steps, about = 0;
         if (layer->coarse) {
             int32_t coarse = layer->coarse[out - rest + k];
-            about = shifted(coarse, layer->shift);
+            about = coarse ? steps_in(layer->before[out - rest + k] - predicted[k], step, 0.5) : 0;
             steps = about + code_signed(coder, &model->refined[coarse != 0], expected, given - about);
         } else {
             steps = code_signed(coder, starting ? &model->start : &model->inner, expected, given);
@@ -260,26 +260,27 @@ static const double *rest_basis(rest_model *model, int32_t n)
     return basis;
 }
 
-static void steps_of_run(int32_t n, const double *basis, double step, const double base[3], const double *run,
+static void steps_of_run(int32_t n, const double *basis, double step, double half, const double base[3], const double *run,
                          int32_t *row)
 {
     for (int32_t k = 0; k < 3; k++)
         for (int32_t m = 0; m < n; m++) {
             double sum = 0.0;
             for (int32_t i = 0; i < n; i++) sum = sum + basis[m * n + i] * (run[3 * i + k] - base[k]);
-            row[k * REST_RUN + m] = steps_in(sum, step, 0.55);
+            row[k * REST_RUN + m] = steps_in(sum, step, half);
         }
 }
 
-/* Integers of a run's modes, among those of its vertices. */
-static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n, int32_t *row)
+static void refine_rest_row(ath_coder *coder, rest_model *model, const rest_layer *layer, int32_t first, int32_t n,
+                            const double *basis, double step, const double base[3], int32_t *row)
 {
     int32_t predicted[3 * REST_RUN] = {0}, known[3 * REST_RUN] = {0};
     row_prediction prediction = {predicted, known, 0, REST_RUN, 1};
+    steps_of_run(n, basis, step, 0.5, base, layer->before + 3 * (size_t)first, predicted);
     for (int32_t i = 0; i < 3 * n; i++) {
         int32_t at = i / n * REST_RUN + i % n;
         known[at] = layer->coarse[3 * (size_t)first + (size_t)i];
-        predicted[at] = shifted(known[at], layer->shift);
+        if (known[at] == 0) predicted[at] = 0;
     }
     code_refined_row(coder, &model->refined_modes, n, 0, -1, &prediction, row);
 }
@@ -291,9 +292,9 @@ static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer 
     int32_t row[3 * REST_RUN] = {0};
     const double *basis = rest_basis(model, n);
     double *run = rest + 3 * (size_t)first;
-    if (ENCODING) steps_of_run(n, basis, step, base, source + 3 * (size_t)first, row);
+    if (ENCODING) steps_of_run(n, basis, step, 0.55, base, source + 3 * (size_t)first, row);
     if (layer->coarse)
-        refine_rest_row(coder, model, layer, first, n, row);
+        refine_rest_row(coder, model, layer, first, n, basis, step, base, row);
     else
         code_row(coder, &model->modes, REST_RUN, n, 0, -1, row);
     for (int32_t i = 0; layer->steps && i < 3 * n; i++)

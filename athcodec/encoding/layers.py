@@ -22,7 +22,6 @@ from athcodec.encoding.segment import CodedPrelude, Settings, Source, analyse, c
 DEFAULT_LADDER = (1e-2, 1e-3, 1e-4, 1e-5)  # largest errors over the diagonal
 LEAST_RATIO = 4  # of the steps of neighbouring layers
 MOST_DIGITS = 14  # binary, between neighbouring layers
-REST_FACTOR = 0.5  # a layer's factor on the step of the rest pose over that on the step of the motion
 
 
 @dataclass
@@ -40,8 +39,6 @@ class Layer:
         Binary digits of its integers beyond those of the layer before; 0 for the first.
     rest : ct.Rest or streams.CodedRest or None
         The content of REST for the first layer, of REFINED_REST for others; None: the rest pose of the layer before.
-    rest_digits : int
-        As `digits`.
     """
 
     plan: Plan
@@ -49,7 +46,6 @@ class Layer:
     modes: LearnedModes | None
     digits: int = 0
     rest: ct.Rest | streams.CodedRest | None = None
-    rest_digits: int = 0
 
 
 def layer_digits(ladder: Sequence[float] | None, bound: float, diagonal: float) -> list[int]:
@@ -83,22 +79,21 @@ def layers_of(source: Source, prelude: CodedPrelude, settings: Settings, modes: 
         layers.append(Layer(plan, replace(settings, step=step, limit=limit, learned_bases=(False,) * len(settings.learned_bases)
                                           if len(digits) > 1 else settings.learned_bases),
                             modes if coarser == 0 or modes is None else nested(plan, modes, coarser),
-                            digits[i - 1] - coarser if i else 0, *rests[i][::2]))
+                            digits[i - 1] - coarser if i else 0, rests[i][0]))
     return layers
 
 
 def _rests(source: Source, prelude: CodedPrelude, digits: Sequence[int]) -> list[tuple]:
-    """(rest, decoded pose, digits) of each layer."""
+    """(rest, decoded pose) of each layer, as Layer.rest has it."""
     final = prelude.rest_chunk
     if final.exact or len(digits) == 1:
-        return [(final if i == 0 else None, prelude.plan.rest, 0) for i in range(len(digits))]
-    branches, found, before, known = prelude.plan.branches, [], None, 0
-    for i, coarser in enumerate(digits):
-        own = max(0, coarser + round(np.log2(REST_FACTOR)))
-        coded = streams.encode_rest(branches, final.step * 2.0**own, source.rest, before, known - own if i else 0)
-        rest = replace(final, step=coded.step, stream=coded.stream) if i == 0 else coded
-        found.append((rest, coded.decoded, known - own if i else 0))
-        before, known = coded, own
+        return [(final if i == 0 else None, prelude.plan.rest) for i in range(len(digits))]
+    found: list[tuple] = []
+    coded = None
+    for coarser in digits:
+        step = final.step * 2.0 ** max(0, coarser - 1)
+        coded = streams.encode_rest(prelude.plan.branches, step, source.rest, coded)
+        found.append((coded if found else replace(final, step=step, stream=coded.stream), coded.decoded))
     return found
 
 
@@ -112,7 +107,7 @@ def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
         if modes is not None:
             chunks[level, ct.SHAPES] = ct.pack_refined_shapes(layer.digits, modes)
         if isinstance(layer.rest, streams.CodedRest):
-            chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest_digits, layer.rest.stream)
+            chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest.stream)
         before = layer
     return chunks
 

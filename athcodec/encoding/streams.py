@@ -34,12 +34,12 @@ class CodedRest:
     steps: np.ndarray
 
 
-def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray, coarse: CodedRest | None = None,
-                shift: int = 0) -> CodedRest:
-    """A rest pose, (N, 3) float64 less the origin; about that of a coarser layer, whose step is 2 ** shift of this one."""
+def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray, coarse: CodedRest | None = None) -> CodedRest:
+    """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one."""
     decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
     data = encode_stream("ath_encode_rest", 1024 + 8 * rest.size, address(branches, BRANCH, 1), len(branches), step,
-                         None if coarse is None else address(coarse.steps, np.int32, rest.size), shift,
+                         None if coarse is None else address(coarse.steps, np.int32, rest.size),
+                         None if coarse is None else address(coarse.decoded, np.float64, rest.size),
                          address(steps, np.int32, rest.size), address(rest, np.float64, rest.size),
                          address(decoded, np.float64, rest.size))
     return CodedRest(step, data, decoded, steps)
