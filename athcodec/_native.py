@@ -67,7 +67,8 @@ class Motion(ctypes.Structure):
 class Coarse(ctypes.Structure):
     """ath_coarse."""
 
-    _fields_ = [(name, c_void_p) for name in ("placed", "integers", "integer_tracks", "shape_counts", "tracks",
+    _fields_ = [(name, c_void_p) for name in ("placed", "integers", "integer_tracks", "shape_counts", "in_cosines",
+                                              "tracks",
                                               "extents")]
 
 

@@ -49,13 +49,14 @@ static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank
 }
 
 /* A lone 1 costs many bits and removes little error: it must be larger than one in company. */
-static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], int32_t *quantised)
+static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
+                           int32_t *quantised)
 {
     static const double least[2] = {1.1, 0.9};
     for (int32_t axis = 0; axis < 3; axis++)
         for (int32_t k = rank - 1; k >= 0; k--) {
             int32_t *q = quantised + axis * T + k;
-            if (*q != 1 && *q != -1) continue;
+            if ((*q != 1 && *q != -1) || (predicted && predicted[axis * T + k] != 0)) continue;
             int32_t busy = busy_neighbours(quantised, T, rank, axis, k);
             if (busy < 2 && absolute(units[axis][k]) < least[busy]) *q = 0;
         }
@@ -71,11 +72,12 @@ static void code_track(const ath_stream *stream, int32_t T, double step, double 
         if (!forward_temporal(stream, T, step, predicted ? 0.0 : dead_zone, track + axis * T, units[axis]))
             memset(units[axis], 0, sizeof units[axis]);
         for (int32_t k = 0; k < stream->temporal_rank; k++) {
-            if (predicted) units[axis][k] -= (double)predicted[axis * T + k];
-            quantised[axis * T + k] = quantise(units[axis][k], dead_zone);
+            int32_t about = predicted ? predicted[axis * T + k] : 0;
+            units[axis][k] -= (double)about;
+            quantised[axis * T + k] = quantise(units[axis][k], about ? 0.5 : dead_zone);
         }
     }
-    drop_lone_ones(T, stream->temporal_rank, units, quantised);
+    drop_lone_ones(T, stream->temporal_rank, units, predicted, quantised);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
         ath_inverse_temporal(stream, T, stream->temporal_rank, step, quantised + axis * T, track + axis * T);
@@ -206,7 +208,9 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     const ath_coarse *layer = motion->before;
     size_t T = (size_t)motion->frames;
     ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
-                               layer->tracks + (size_t)p * 6 * T + 3 * T, 0, 0, 0, 0, layer->extents[2 * p], layer->extents[2 * p + 1]};
+                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p], layer->extents[2 * p + 1]};
+    int cosines = layer->in_cosines[p] && motion->streams[plan->pieces[p].level].temporal == motion->cosines;
+    if (!cosines && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
 }
 

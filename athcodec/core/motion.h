@@ -18,6 +18,7 @@ typedef struct ath_coarse {
     double *placed;   /* vertex_count x 3 x frames: positions less the origin */
     const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
     const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
+    const uint8_t *in_cosines;   /* piece_count: whether all rows of a piece are in cosines */
     double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
     int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
 } ath_coarse;
@@ -55,8 +56,6 @@ typedef struct {
 typedef struct {
     const double *placed;            /* count x 3 x frames */
     const double *rotation, *shift;  /* 3 x frames */
-    const int32_t *modes_rows, *rotation_row, *shift_row; /* its integers */
-    int32_t has_shapes;
     int32_t frequencies, modes;      /* that its rows reach; 0 frequencies: nothing is predicted from it */
 } ath_piece_before;
 

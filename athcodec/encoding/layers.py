@@ -17,7 +17,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_error
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, analyse, correct, stem_streams
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, analyse, correct, stem_streams, stems_head
 
 DEFAULT_LADDER = (1e-2, 1e-3, 1e-4, 1e-5)  # largest errors over the diagonal
 LEAST_RATIO = 4  # of the steps of neighbouring layers
@@ -57,7 +57,7 @@ def layer_digits(ladder: Sequence[float] | None, bound: float, diagonal: float) 
     digits: list[int] = []
     for error in sorted(DEFAULT_LADDER if ladder is None else ladder, reverse=True):
         ratio = error * diagonal / bound
-        coarser = int(np.ceil(np.log2(ratio) - 0.5)) if ratio > 1 else 0
+        coarser = int(np.ceil(np.log2(ratio))) if ratio > 1 else 0
         if 2**coarser >= LEAST_RATIO and (not digits or digits[-1] - coarser >= 2):
             digits.append(coarser)
     digits.append(0)
@@ -76,11 +76,21 @@ def layers_of(source: Source, prelude: CodedPrelude, settings: Settings, modes: 
             plan.set_rest(rests[i][1])
         step = qz.single(settings.step * 2.0**coarser)
         limit = settings.limit if coarser == 0 else None
-        layers.append(Layer(plan, replace(settings, step=step, limit=limit, learned_bases=(False,) * len(settings.learned_bases)
-                                          if len(digits) > 1 else settings.learned_bases),
+        own = replace(settings if i == 0 else _uniform(prelude.plan, settings), step=step, limit=limit)
+        layers.append(Layer(plan, own,
                             modes if coarser == 0 or modes is None else nested(plan, modes, coarser),
                             digits[i - 1] - coarser if i else 0, rests[i][0]))
     return layers
+
+
+def _uniform(plan: Plan, settings: Settings) -> Settings:
+    """For a refinement, which has one stream: the settings of the level with the most rows, the finest step of all."""
+    levels = np.bincount(plan.base_level, plan.pieces["low_modes"], plan.level_count)
+    levels += np.bincount(plan.pieces["level"], plan.pieces["rank"] - plan.pieces["low_modes"], plan.level_count)
+    main = int(levels.argmax())
+    return replace(settings, level_steps=np.full(plan.level_count, settings.level_steps[levels > 0].min()),
+                   rotation_step_factors=(settings.rotation_step_factors[main],) * plan.level_count,
+                   learned_bases=(settings.learned_bases[main],) * plan.level_count)
 
 
 def _rests(source: Source, prelude: CodedPrelude, digits: Sequence[int]) -> list[tuple]:
@@ -140,8 +150,9 @@ class _SegmentCoder:
     def refine(self, layer: Layer, before: SegmentMotion, level: int) -> SegmentMotion:
         """One further level."""
         settings, last = layer.settings, layer.plan.level_count - 1
-        segment, _ = analyse(layer.plan, settings, self._positions, layer.modes, before, 1 << layer.digits, layered=True)
-        head = ct.StemsHead(settings.step_of(last), settings.rotation_step_factors[last])
+        segment, bases = analyse(layer.plan, settings, self._positions, layer.modes, before, 1 << layer.digits,
+                                 layered=True)
+        head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(1 << layer.digits, head,
                                                              streams.encode_refinement(segment, last))
         self._finish_with(segment, layer, level)

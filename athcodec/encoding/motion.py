@@ -184,8 +184,11 @@ class SegmentMotion:
             self.placed = np.zeros((plan.vertex_count, 3, frames))
             self.placed_tracks = np.zeros(self.tracks.shape)
             self.extents = np.zeros((core.piece_count, 2), np.int32)
+            learned = np.array([stream.temporal is not None for stream in streams])
+            self.in_cosines = (~(learned[plan.pieces["level"]] | learned[plan.base_level])).astype(np.uint8)
             self.coarse = Coarse(self.placed.ctypes.data, self.coefficients.ctypes.data, self.tracks.ctypes.data,
                                  None if learned_modes is None else learned_modes.counts.ctypes.data,
+                                 self.in_cosines.ctypes.data,
                                  self.placed_tracks.ctypes.data, self.extents.ctypes.data)
         self._bind()
 

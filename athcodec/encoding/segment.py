@@ -309,15 +309,21 @@ def analyse(plan: Plan, settings: Settings, positions: np.ndarray, learned_modes
     return segment, bases
 
 
+def stems_head(settings: Settings, level: int, bases: dict[int, np.ndarray]) -> ct.StemsHead:
+    """Of the stems of a level, whose time basis is among `bases` where it is learned."""
+    head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
+    if level in bases:
+        head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
+        head.basis = streams.encode_temporal(bases[level], head.bits)
+    return head
+
+
 def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, np.ndarray]) -> tuple[dict, dict]:
     """STEMS of the levels of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 
     def stem_stream(level: int) -> tuple[bytes, int]:
-        head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
-        if level in bases:
-            head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
-            head.basis = streams.encode_temporal(bases[level], head.bits)
+        head = stems_head(settings, level, bases)
         return ct.pack_stems(head, streams.encode_stems(segment, level)), len(head.basis)
 
     levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
