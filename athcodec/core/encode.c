@@ -177,7 +177,7 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
 
 size_t ath_model_size(void)
 {
-    size_t size = sizeof(refinement_model) + refinement_history_size(ATH_SEGMENT_FRAMES); /* larger than that of maps */
+    size_t size = sizeof(refinement_model) + history_size(ATH_SEGMENT_FRAMES); /* larger than that of maps */
     if (size < sizeof(correction_model)) size = sizeof(correction_model);
     if (size < sizeof(refined_shape_model)) size = sizeof(refined_shape_model); /* larger than that of shapes */
     if (size < sizeof(exact_model)) size = sizeof(exact_model);

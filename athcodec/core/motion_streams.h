@@ -45,7 +45,7 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
 
 typedef struct {
     refinement_model rows;
-    uint32_t history[2 * ATH_SLOTS * ATH_SHAPE_MODES];
+    uint32_t history[ATH_SLOTS * ATH_SHAPE_MODES];
     number_model count;
 } refined_shape_model;
 
@@ -67,7 +67,7 @@ static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model,
     for (int32_t s = 0; s < own; s++) {
         const int32_t *known = s < coarse_count ? coarse + s * ATH_SHAPE_NUMBERS : nothing;
         int32_t predicted[ATH_SHAPE_NUMBERS];
-        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, 1};
+        row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, 1u << shift};
         for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) predicted[i] = shifted(known[i], shift);
         above_count = code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
     }

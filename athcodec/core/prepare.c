@@ -99,7 +99,7 @@ static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t
     if (ath_layer_of(file, d) > 0) {
         if (has_shapes) shapes->refined = (refined_shape_model *)ath_take(arena, sizeof(refined_shape_model));
         stems->refined = (refinement_model *)ath_take(arena, sizeof(refinement_model));
-        stems->history = (uint32_t *)ath_take(arena, refinement_history_size(frames));
+        stems->history = (uint32_t *)ath_take(arena, history_size(frames));
     } else {
         if (has_shapes) shapes->model = (shape_model *)ath_take(arena, sizeof(shape_model));
         stems->model = (coefficient_model *)ath_take(arena, sizeof(coefficient_model));

@@ -7,27 +7,19 @@
 
 #include "coefficient_model.h"
 
-enum { REFINED_SIZES = 4, REFINED_SURROUNDINGS = 3, REFINED_SIGNS = 3 };
+enum { REFINED_SIGNS = 3 };
 
 typedef struct {
-    coefficient_model rows; /* counts, and what is remembered of rows: of the differences */
-    number_model numbers[REFINED_SIZES][REFINED_SURROUNDINGS];
+    coefficient_model rows;  /* counts, and what is remembered of rows: of the differences */
+    number_model numbers[2]; /* of integers that are 0 in the layer before, of others */
     ath_context sign[REFINED_SIGNS];
-    uint32_t *history;      /* as that of rows, of the integers themselves */
-    uint32_t sums[2][SUMS_BEFORE + ATH_SEGMENT_FRAMES + 1];
 } refinement_model;
 
-ATH_INLINE size_t refinement_history_size(int32_t frames) { return 2 * history_size(frames); }
-
-/* `history`: refinement_history_size(frames) bytes. */
+/* `history`: history_size(frames) bytes. */
 static void refinement_model_init(refinement_model *model, int32_t frames, uint32_t *history)
 {
-    memset(model->sums, 0, sizeof model->sums);
     coefficient_model_init(&model->rows, frames, history);
-    model->history = history + (size_t)ATH_SLOTS * (size_t)frames;
-    memset(model->history, 0, history_size(frames));
-    for (int32_t i = 0; i < REFINED_SIZES; i++)
-        for (int32_t j = 0; j < REFINED_SURROUNDINGS; j++) number_model_init(&model->numbers[i][j]);
+    for (int32_t i = 0; i < 2; i++) number_model_init(&model->numbers[i]);
     for (int32_t i = 0; i < REFINED_SIGNS; i++) context_init(&model->sign[i], 32768);
 }
 
@@ -76,30 +68,14 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
     return count;
 }
 
-/* What neighbours that are coded lead one to expect, in 1/16: of one axis and frequency, from a row's magnitudes. */
-ATH_INLINE uint32_t expected_of(const uint32_t near[3], const uint32_t *sums, const uint32_t *above, int32_t above_count,
-                                uint32_t history, uint32_t beside, int32_t axis, int32_t k)
-{
-    uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
-    uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over;
-    uint32_t around = axis == 0 ? history : (beside * 16 / (uint32_t)axis + history) / 2;
-    return ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
-}
-
+/* expected: of the differences around this one, in 1/16. */
 static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction, int32_t axis,
-                                       int32_t k, uint32_t of_differences, uint32_t of_integers, int32_t difference)
+                                       int32_t k, uint32_t expected, int32_t difference)
 {
-    int32_t predicted = prediction->row[axis * prediction->frames + k], around;
-    uint32_t steps = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k), size = steps < REFINED_SIZES ? steps : REFINED_SIZES - 1;
-    uint32_t expected = of_differences;
-    if (steps == 0) {
-        uint32_t loud = loudness(prediction, axis, k);
-        expected = of_integers + 2 * loud;
-        around = loud == 0 ? 0 : loud < 3 ? 1 : 2;
-    } else {
-        around = of_integers < 12 * steps ? 0 : of_integers < 40 * steps ? 1 : 2;
-    }
-    uint32_t magnitude = code_unsigned(coder, &model->numbers[size][around], expected, magnitude_of(difference));
+    int32_t predicted = prediction->row[axis * prediction->frames + k];
+    int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
+    expected = !known ? expected + 2 * loudness(prediction, axis, k) : prediction->ratio > 1 ? 4 * prediction->ratio : expected;
+    uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));
     if (magnitude == 0) return 0;
     int negative = predicted < 0;
     if (predicted == 0)
@@ -107,13 +83,6 @@ static int32_t code_refined_difference(ath_coder *coder, refinement_model *model
     else
         negative ^= coder_bit(coder, &model->sign[magnitude == 1 ? 0 : magnitude < 4 ? 1 : 2], (difference < 0) != negative);
     return negative ? -(int32_t)magnitude : (int32_t)magnitude;
-}
-
-ATH_INLINE void shift_near(uint32_t near[3], int32_t value)
-{
-    near[2] = near[1];
-    near[1] = near[0];
-    near[0] = clipped(value);
 }
 
 /* As code_row; the row becomes its prediction and the differences that are coded. */
@@ -124,35 +93,31 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
     int32_t frames = prediction->frames;
     const int32_t *predicted = prediction->row;
     const uint32_t *history = model->history + (size_t)slot * (size_t)frames;
-    uint32_t *own_history = refinement->history + (size_t)slot * (size_t)frames;
-    const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE, *own_above = refinement->sums[model->turn] + SUMS_BEFORE;
-    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}}, own_last[3][3] = {{0}};
-    uint32_t *own_sums = refinement->sums[model->turn] + SUMS_BEFORE;
+    const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE;
+    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}};
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? differing_frequencies(row, predicted, frames) : 0);
     for (int32_t k = 0; k < count; k++) {
-        uint32_t beside = 0, own_beside = 0;
+        uint32_t over = above_count < 0 ? 0 : 2 * above[k] + above[k - 1] + above[k + 1];
+        uint32_t common = (2 * sums[k - 1] + sums[k - 2]) * 2 + over, beside = 0;
         for (int32_t axis = 0; axis < 3; axis++) {
             int32_t at = axis * frames + k;
-            uint32_t of_differences = expected_of(last[axis], sums, above, above_count, history[k], beside, axis, k);
-            uint32_t of_integers = expected_of(own_last[axis], own_sums, own_above, above_count, own_history[k], own_beside, axis, k);
-            int32_t difference = code_refined_difference(coder, refinement, prediction, axis, k, of_differences, of_integers,
-                                                         row[at] - predicted[at]);
+            uint32_t *near = last[axis];
+            uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
+            uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
+            int32_t difference = code_refined_difference(coder, refinement, prediction, axis, k, expected, row[at] - predicted[at]);
             if (!ENCODING) row[at] = predicted[at] + difference;
-            shift_near(last[axis], difference);
-            shift_near(own_last[axis], row[at]);
-            beside += last[axis][0];
-            own_beside += own_last[axis][0];
+            near[2] = near[1];
+            near[1] = near[0];
+            near[0] = clipped(difference);
+            beside += near[0];
         }
         sums[k] = beside;
-        own_sums[k] = own_beside;
     }
     for (int32_t axis = 0; axis < 3 && !ENCODING; axis++)
         memcpy(row + axis * frames + count, predicted + axis * frames + count, (size_t)(frames - count) * sizeof *row);
     memset(sums + count, 0, (size_t)(frames + 1 - count) * sizeof *sums);
-    memset(own_sums + count, 0, (size_t)(frames + 1 - count) * sizeof *own_sums);
     remember_row(model, slot, frames, count, sums);
-    for (int32_t k = 0; k < frames; k++) own_history[k] = own_history[k] - (own_history[k] + 3) / 4 + own_sums[k] * 4 / 3;
     return count;
 }
 
