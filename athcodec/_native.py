@@ -1,8 +1,8 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/ath.h, the public API that players use (core_file.py), and core/encode.h, which encoding uses (transform.py,
-entropy.py). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an array; they release the
-GIL, and hold no state.
+Mirrors core/ath.h, the public API that players use (core_file.py), and core/plan.h, motion.h and encode.h, which only
+encoding uses (athcodec.encoding). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an
+array; they release the GIL, and hold no state.
 """
 
 from __future__ import annotations

@@ -209,7 +209,7 @@ class AthFile:
 
     def _refusal(self, error: core_file.CoreError) -> FormatError:
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
-        return refused(f"{error}{getattr(self._source, 'doubt', '') if refused is BadChecksum else ''}")
+        return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
 
     def _check_length(self, strict: bool) -> None:
         expected, got = self.file_length, self.available_length
@@ -248,7 +248,8 @@ class AthFile:
 
     def _chunks_of(self, kind: int) -> list[Chunk]:
         rows = np.flatnonzero(self._table["kind"] == kind)
-        return list(map(Chunk, *(self._table[name][rows].tolist() for name in CHUNK_FIELDS), self._index[rows].tolist()))
+        fields = (self._table[name][rows].tolist() for name in CHUNK_FIELDS)
+        return list(map(Chunk, *fields, self._index[rows].tolist()))
 
     def find(self, kind: int) -> Chunk | None:
         """The first chunk of a kind, such as the only one of metadata."""

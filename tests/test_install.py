@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz.targets import CORE, decoder_sources
 
 import athcodec
 from athcodec._native import crc32c
-from fuzz.targets import CORE, decoder_sources
 
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]

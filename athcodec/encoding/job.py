@@ -76,8 +76,8 @@ class EncodingOptions:
 class Draft:
     """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
 
-    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `fingerprint` tells
-    a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. By
+    `fingerprint` a process notices that it found another hierarchy or rest pose than the one that made the draft.
     """
 
     settings: Settings
