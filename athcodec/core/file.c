@@ -19,7 +19,7 @@ static uint64_t scratch_size(const ath_header *header)
     return larger(larger(size, ath_prelude_model_size()), ATH_BASIS_WORK * sizeof(double));
 }
 
-/* Lays the file out behind its struct; with a null base only counts. */
+/* Places the file's arrays behind its struct; with a null base it only counts. Returns the bytes that they take. */
 static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
@@ -382,7 +382,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     return ATH_OK;
 }
 
-/* The header goes into the file, once that fits into the memory. */
+/* Parses header and tables into the file, once these are known to fit into the memory. */
 static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
                       ath_fault_info *fault)
 {
@@ -526,7 +526,8 @@ void ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t
     if (rms_error) *rms_error = first == last ? (double)errors[2 * first + 1] : ath_sqrt(squares / frames);
 }
 
-/* The last clip that begins at or before this frame, or segment: an offset of ath_clip says which is meant. */
+/* The last clip that begins at or before this frame or segment; `first`: the offset of first_frame or first_segment in
+ * ath_clip. */
 static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
 {
     int32_t low = 0, high = file->info.clip_count;
@@ -631,15 +632,15 @@ static void add_range(const ath_chunk *chunk, int all, uint64_t *end, ath_range 
     ranges[*count - 1].size = *end - ranges[*count - 1].offset;
 }
 
-/* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
- * chunks for each. */
+/* Visits the chunks of these levels and segments alone, so that asking for one segment after another stays linear in
+ * the number of chunks. */
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
                    ath_range *ranges, int32_t capacity)
 {
     int32_t count = 0;
     uint64_t end = 0;
     for (int32_t d = 0; d <= level; d++) {
-        if (first_segment > 0) /* shapes stand with segment 0 */
+        if (first_segment > 0) /* shapes are stored with segment 0 */
             add_range(ath_file_chunk(file, ATH_SHAPES, d, 0), all, &end, ranges, capacity, &count);
         uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first_segment);
         for (; i < file->header.chunk_count; i++) {

@@ -34,12 +34,12 @@ struct ath_file {
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
-/* Whether it stores the level behind the last lossy one. */
+/* Whether it stores the lossless level, which follows the last lossy one. */
 ATH_INLINE int ath_file_is_lossless(const ath_file *file)
 {
     return file->header.level_count > file->plan.height + 2;
 }
-/* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
+/* Whether decoding a segment at `level` takes the chunk of this kind and level d. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
 
 #endif
