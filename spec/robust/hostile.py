@@ -30,7 +30,7 @@ sys.path.append(str(ROOT / "tests"))  # what the tests have for making files and
 import hostile_files  # noqa: E402
 from files import with_checksum  # noqa: E402
 from fuzz import seeds  # noqa: E402
-from test_damage import mutations, spoilt_front, struct_fields, use  # noqa: E402
+from test_damage import corrupted_front, mutations, struct_fields, use  # noqa: E402
 
 VECTORS = ROOT / "spec" / "vectors" / "valid"
 SMALL = 4096
@@ -189,11 +189,11 @@ def table_changes(data: bytes) -> list[tuple]:
             for value in (0, 1, 256 ** struct.calcsize(code) - 2, 256 ** struct.calcsize(code) - 1)]
 
 
-def spoilt(data: bytes, seed: int) -> int:
+def corrupted(data: bytes, seed: int) -> int:
     """Fields of the front changed so that they mostly still fit each other, or contents of chunks."""
     rng = np.random.default_rng(seed)
     if seed % 2:
-        return within_limits(spoilt_front(rng, data))
+        return within_limits(corrupted_front(rng, data))
     parts = seeds.Parts.of(data)
     chunks = list(parts.chunks)
     for i in rng.integers(len(chunks), size=rng.integers(1, 3)):
@@ -278,8 +278,8 @@ def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
         (1.5, Cases("flipped bits", small, each(small, checked_bits), flipped_bit)),
         (2, Cases("flipped bits, checksums repaired", small, each(small, lambda d: range(8 * len(d))),
                   flipped_bit_repaired)),
-        (1.5, Cases("spoilt fronts and chunks, checksums repaired", small, each(small, lambda _: range(10_000)),
-                    spoilt)),
+        (1.5, Cases("corrupted fronts and chunks, checksums repaired", small, each(small, lambda _: range(10_000)),
+                    corrupted)),
         (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), flood, few=True)),
         (2, Cases("files made to be slow", files, made(hostile_files.SLOW), slow_file, few=True)),
     ]
