@@ -16,13 +16,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
 from athcodec import container as ct
 from athcodec.ath import Ath, Survey, Thresholds, survey
-from athcodec.clip import MotionClip
+from athcodec.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.decoder import Decoder
 from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
@@ -40,7 +40,6 @@ from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
 STATIC_METADATA = ("unit", "up_axis")
-WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def _completed(clip: MotionClip, found: Found | None,
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
     """The clip, which says where its weights are, and these as (N,) float64. Raises ClipError."""
-    name = weights if isinstance(weights, str) else WEIGHTS
+    name = weights if isinstance(weights, str) else ERROR_WEIGHTS
     attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
     if name not in attributes:
         raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
@@ -131,7 +130,7 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
     bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
     if bad.size:
         raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
-    return clip.replace(attributes=attributes, metadata=clip.metadata | {WEIGHTS: name}), values
+    return clip.replace(attributes=attributes, metadata=clip.metadata | {ERROR_WEIGHTS: name}), values
 
 
 def time_chunk(*times: np.ndarray) -> bytes:
@@ -252,7 +251,7 @@ class EncodingJob:
                 return math.inf
         return result.store.size(result.header)
 
-    def write(self, path: str | PathLike[str], out: BinaryIO, spool: BinaryIO, decided: _Decided,
+    def write(self, path: str | PathLike[str], out: BinaryIO, spool: IO[bytes], decided: _Decided,
               coded: Iterable[CodedSegment]) -> Summary:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
