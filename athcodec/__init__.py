@@ -1,6 +1,7 @@
 """athcodec: a codec and file format for the motion of plants, with levels of detail over the branch hierarchy."""
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from athcodec import errors
 from athcodec.ath import Ath, Thresholds, build_ath
@@ -18,21 +19,20 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
     from athcodec.sources import read, read_hdf5, sample_path
 
 __version__ = "0.1.0"
-__all__ = ["Ath", "AthFile", "ClipView", "Decoder", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode",
+__all__ = [
+           "Ath", "AthFile", "ClipView", "Decoder", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode",
            "errors", "find_branches", "join", "looped", "open", "read", "read_hdf5", "sample_path", "split", "truncate",
            "write", "write_hdf5"]
+_LAZY = {  # what decoding does not need, by module
+    "discovery": ("Found", "find_branches"),
+    "encoding": ("Summary", "encode"),
+    "exporters": ("write", "write_hdf5"),
+    "sources": ("read", "read_hdf5", "sample_path"),
+}
 
 
-def __getattr__(name: str):
-    # modules that decoding does not need
-    if name in ("Summary", "encode"):
-        from athcodec import encoding as module
-    elif name in ("Found", "find_branches"):
-        from athcodec import discovery as module
-    elif name in ("read", "read_hdf5", "sample_path"):
-        from athcodec import sources as module
-    elif name in ("write", "write_hdf5"):
-        from athcodec import exporters as module
-    else:
-        raise AttributeError(f"module 'athcodec' has no attribute {name!r}")
-    return getattr(module, name)
+def __getattr__(name: str) -> Any:
+    for module, names in _LAZY.items():
+        if name in names:
+            return getattr(import_module(f"athcodec.{module}"), name)
+    raise AttributeError(f"module 'athcodec' has no attribute {name!r}")

@@ -1,8 +1,8 @@
 """The C core as Python sees it: record layouts, signatures, and one checked wrapper per function.
 
-Mirrors core/ath.h, the public API that players use (core_file.py), and core/encode.h, which encoding uses (transform.py,
-entropy.py). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an array; they release the
-GIL, and hold no state.
+Mirrors core/ath.h, the public API that players use (core_file.py), and core/plan.h, motion.h and encode.h, which only
+encoding uses (athcodec.encoding). Wrappers check dtypes, shapes and contiguity, so that no call can write outside an
+array; they release the GIL, and hold no state.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ SHEET, LOOSE, WHOLE = 1, 2, 4
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
 PIECE = np.dtype(
     [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
-    + [(name, "<i4") for name in ("first count parent attach branch flags rank level low_level low_modes last_attached "
-                                  "reserved").split()]
+    + [(name, "<i4") for name in "first count parent attach branch flags rank level low_level low_modes".split()]
+    + [("last_attached", "<i4"), ("reserved", "<i4")]
 )
 NODE = np.dtype(
     [("whitening", "<f8", (9,))]
@@ -75,9 +75,12 @@ class Coarse(ctypes.Structure):
 class Integers(ctypes.Structure):
     """ath_integers."""
 
-    _fields_ = [(name, c_void_p) for name in ("coefficients", "tracks", "node_tracks", "node_steps", "predicted",
-                                              "predicted_tracks", "shape_counts",
-                                              "shape_first", "shapes", "duals")]
+    _fields_ = [
+        (name, c_void_p)
+        for name in (
+            "coefficients tracks node_tracks node_steps predicted predicted_tracks shape_counts shape_first shapes duals"
+        ).split()
+    ]
 
 
 _PLAYING = {  # core/ath.h
@@ -134,8 +137,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),
-    "ath_differences": (None, [c_int32, c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
-                               c_double, c_void_p, c_void_p, c_void_p]),
+    "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_analyse": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
     "ath_analyse_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,

@@ -512,6 +512,7 @@ def survey(
         gads.add(how.gads)
         if progress is not None:
             progress(extent.frame_count / clip.frame_count)
+    assert extent is not None and differences is not None  # a clip has frames
     return Survey(
         hierarchy=hierarchy, rest=rest, max_depth=max_depth, frame_count=extent.frame_count,
         low=extent.low, high=extent.high, rms_motion=extent.rms_motion(len(rest)), branches=branches,

@@ -19,7 +19,7 @@ from athcodec import container as ct
 from athcodec import core_file
 from athcodec._native import WHOLE, as_bytes
 from athcodec.atomic_files import is_url
-from athcodec.clip import check_stem_index
+from athcodec.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.container import Chunk, Limits
 from athcodec.errors import (
     BadChecksum,
@@ -209,7 +209,7 @@ class AthFile:
 
     def _refusal(self, error: core_file.CoreError) -> FormatError:
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
-        return refused(f"{error}{getattr(self._source, 'doubt', '') if refused is BadChecksum else ''}")
+        return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
 
     def _check_length(self, strict: bool) -> None:
         expected, got = self.file_length, self.available_length
@@ -248,18 +248,41 @@ class AthFile:
 
     def _chunks_of(self, kind: int) -> list[Chunk]:
         rows = np.flatnonzero(self._table["kind"] == kind)
-        return list(map(Chunk, *(self._table[name][rows].tolist() for name in CHUNK_FIELDS), self._index[rows].tolist()))
+        fields = (self._table[name][rows].tolist() for name in CHUNK_FIELDS)
+        return list(map(Chunk, *fields, self._index[rows].tolist()))
 
     def find(self, kind: int) -> Chunk | None:
-        """The first chunk of a kind, such as the only one of metadata."""
+        """The first chunk of a kind, such as the only one of metadata.
+
+        Parameters
+        ----------
+        kind : int
+            As in the chunk table (FORMAT.md, "Chunks").
+
+        Returns
+        -------
+        Chunk or None
+            None where the file has none.
+        """
         return next(iter(self._chunks_of(kind)), None)
 
     def is_available(self, chunk: Chunk) -> bool:
-        """Whether the chunk's bytes are there."""
+        """Whether the chunk's bytes are there.
+
+        Parameters
+        ----------
+        chunk : Chunk
+            One of `chunks`.
+        """
         return chunk.offset + chunk.length <= self.available_length
 
     def payload(self, chunk: Chunk) -> bytes:
         """A chunk's bytes as stored.
+
+        Parameters
+        ----------
+        chunk : Chunk
+            One of `chunks`.
 
         Raises
         ------
@@ -356,6 +379,11 @@ class AthFile:
     def clip_named(self, name: str) -> Clip:
         """The clip of this name.
 
+        Parameters
+        ----------
+        name : str
+            As in `clips`.
+
         Raises
         ------
         ClipUnavailable
@@ -373,13 +401,30 @@ class AthFile:
         return self.core.times()
 
     def segment_starts(self, clip: Clip) -> list[int]:
-        """The first frame of each segment of a clip, and that behind its last; counted over the whole file."""
+        """The first frame of each segment of a clip, and that behind its last.
+
+        Parameters
+        ----------
+        clip : Clip
+            One of `clips`.
+
+        Returns
+        -------
+        list of int
+            Counted over the whole file; one more than the clip has segments.
+        """
         return self.core.segment_starts(clip.segments)
 
     # ---- levels ----
 
     def available(self, level: int) -> bool:
-        """Whether all segments of all levels up to this one are there and undamaged."""
+        """Whether all segments of all levels up to this one are there and undamaged.
+
+        Parameters
+        ----------
+        level : int
+            0 is the coarsest.
+        """
         return level < self._first_lacking
 
     @cached_property
@@ -421,12 +466,29 @@ class AthFile:
         return int(self._ends[kept].max())
 
     def nodes_at(self, level: int) -> int:
-        """Parts that the plant is made of at a level: exact stems, and subtrees that move as one."""
+        """Parts that the plant is made of at a level: exact stems, and subtrees that move as one.
+
+        Parameters
+        ----------
+        level : int
+            One that is stored.
+        """
         parts = self.core.cut(level)
         return len(self.exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     def exact_branches(self, parts: np.ndarray) -> np.ndarray:
-        """Branches whose stems are exact in a cut (core_file.PART), ascending, in file order."""
+        """Branches whose stems are exact in a cut.
+
+        Parameters
+        ----------
+        parts : ndarray, (P,) core_file.PART
+            What the plant is made of at a level: `core.cut(level)`.
+
+        Returns
+        -------
+        ndarray, (K,) int64
+            Ascending, in file order.
+        """
         runs = parts[parts["branch"] < 0]
         run = np.searchsorted(runs["first"], self.branches["first"], "right") - 1
         ends = np.append(runs["first"] + runs["count"], 0)  # -1: before the first run
@@ -438,7 +500,13 @@ class AthFile:
         return self.levels_in(range(self.segment_count))
 
     def levels_in(self, segments: range) -> list[Level]:
-        """The stored levels, coarse to fine, with their errors in some segments of the file."""
+        """The stored levels, coarse to fine, with their errors in some segments of the file.
+
+        Parameters
+        ----------
+        segments : range
+            Counted over the whole file.
+        """
         return [Level(level, self.nodes_at(level), self._level_end(level), *self.core.level_error(level, segments),
                       self.available(level)) for level in range(self.level_count)]
 
@@ -577,7 +645,7 @@ class AthFile:
         Vertex v is within max_error_bound * error_weights[v] / error_weights.max() at the deepest level of the full
         file.
         """
-        name = self.metadata.get("error_weights")
+        name = self.metadata.get(ERROR_WEIGHTS)
         array = self.attributes.get(name) if isinstance(name, str) else None
         if array is None or array.size != self.vertex_count or array.dtype.kind not in "biuf":
             return None
@@ -591,7 +659,15 @@ class AthFile:
         return core_file.Work(self.core.work_size())
 
     def prefetch(self, segments: range, level: int) -> None:
-        """Fetches what these segments need at a level from a file that is far away."""
+        """Fetch what these segments need at a level from a remote file.
+
+        Parameters
+        ----------
+        segments : range
+            Counted over the whole file.
+        level : int
+            One that is stored.
+        """
         with self._lock:
             self._prefetch(self.core.missing(level, segments[0], segments[-1]))
 

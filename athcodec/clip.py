@@ -20,6 +20,7 @@ LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
 CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
+ERROR_WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
 RESERVED_NAMES = frozenset(
     ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 )

@@ -188,7 +188,17 @@ class ClipView:
                 yield start - frames.start + first, block
 
     def affines(self, frame: int) -> Affines:
-        """A frame of the view as matrices; see Decoder.affines.
+        """A frame of the view as matrices.
+
+        Parameters
+        ----------
+        frame : int
+            Counted from the view's first.
+
+        Returns
+        -------
+        Affines
+            As those of Decoder.affines.
 
         Raises
         ------

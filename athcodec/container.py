@@ -2,7 +2,7 @@
 
 A file is a header, a chunk table and an error table, then the chunks in table order without gaps, so that offsets are
 never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
-other attributes last. What the streams inside mean is the business of entropy.py. The C core parses files; only static
+other attributes last. The streams inside are written by encoding/streams.py. The C core parses files; only static
 arrays and metadata, which it hands over as stored, are parsed here.
 """
 
@@ -103,7 +103,7 @@ def is_prelude(kind: Any) -> Any:
 
 
 def is_motion(kind: Any) -> Any:
-    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known ones, and those reserved."""
+    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved ones."""
     return (kind & KIND_ID) // 16 == 1
 
 

@@ -1,7 +1,7 @@
 """From an .ath file back to motion: one of its clips at any level, any frames.
 
-A `Decoder` plays one clip; the `AthFile` behind it holds what all clips share, reads the bytes and has the C core decode
-segments. Only the segments and levels that frames ask for are read.
+A `Decoder` plays one clip; the `AthFile` behind it holds what all clips share, reads the bytes and has the C core
+decode segments. Only the segments and levels that frames ask for are read.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ class Decoder:
     """One clip of an .ath file, at any of its levels; a context manager.
 
     Positions come in the source's vertex order, in scene units. Frames, segments, times and errors are those of the
-    clip, counted from its first frame. What all clips of the file share is that of `file`, of which the most used stands
-    here too. Threads may share a decoder.
+    clip, counted from its first frame. What all clips of the file share is that of `file`; the most used members
+    stand here too. Threads may share a decoder.
 
     Parameters
     ----------

@@ -151,6 +151,7 @@ class Hierarchy:
 
 def hierarchy_of(clip: MotionClip) -> Hierarchy:
     """The hierarchy of a clip's branches; see build_hierarchy()."""
+    assert clip.vertex_branch is not None and clip.branch_parent is not None  # a MotionClip has set them
     return build_hierarchy(clip.vertex_branch, clip.branch_parent, clip.rest, clip.edges, clip.stem_index)
 
 
@@ -203,7 +204,7 @@ def branches_from_edges(
 
     Raises ClipError where the edges close a cycle (it names one edge of it) or root is not usable.
     """
-    edges = check_indices("edges", edges, vertex_count, width=2).astype(np.int64)
+    edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)
     roots = _choose_roots(tour.part, np.asarray(rest, np.float64), root, up_axis)
     parent, subtree_size = tour.rooted_at(roots)
@@ -385,12 +386,12 @@ def _preorder(branch_parent: np.ndarray, sibling_order: np.ndarray) -> np.ndarra
 
 
 def _subtree_sizes(parent: np.ndarray) -> np.ndarray:
-    sizes = [1] * len(parent)
+    counted = [1] * len(parent)
     parents = parent.tolist()
-    for branch in range(len(sizes) - 1, -1, -1):
+    for branch in range(len(counted) - 1, -1, -1):
         if parents[branch] >= 0:
-            sizes[parents[branch]] += sizes[branch]
-    sizes = np.array(sizes, np.int64)
+            counted[parents[branch]] += counted[branch]
+    sizes = np.array(counted, np.int64)
     stop = np.arange(len(parent)) + sizes
     bad = np.flatnonzero((parent >= 0) & (stop > stop[parent]))
     if bad.size:
@@ -440,10 +441,10 @@ def _attach_points(
     if edges is not None:
         branch, joint = _joining_edges(parent, np.repeat(np.arange(len(parent)), stem_count), rest, edges)
         attach[branch] = joint
-    for branch in np.flatnonzero((parent >= 0) & (attach < 0)).tolist():
-        start = first[parent[branch]]
-        stem = rest[start : start + stem_count[parent[branch]]]
-        attach[branch] = start + int(((stem - rest[first[branch]]) ** 2).sum(axis=1).argmin())
+    for lone in np.flatnonzero((parent >= 0) & (attach < 0)).tolist():
+        start = first[parent[lone]]
+        stem = rest[start : start + stem_count[parent[lone]]]
+        attach[lone] = start + int(((stem - rest[first[lone]]) ** 2).sum(axis=1).argmin())
     return attach
 
 

@@ -1,7 +1,7 @@
 """The error of decoded motion against its source: maximum, RMS, Karni-Gotsman and motion-normalised error.
 
-Blocks of frames are accumulated in float64, so clips larger than memory can be measured. The Karni-Gotsman error is that
-of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. Positions alone are measured.
+Blocks of frames are accumulated in float64, so clips larger than memory can be measured. The Karni-Gotsman error is
+that of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. Positions alone are measured.
 """
 
 from __future__ import annotations

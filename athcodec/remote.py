@@ -1,7 +1,7 @@
 """Files behind a URL, read in few requests: http and https with byte ranges, and whatever else fsspec knows.
 
 A `Remote` is a file object for decoder.open. It reads ahead at the front, so that header and prelude arrive
-together, and is told which ranges come next (`prefetch`), so that a run of chunks is one request. It asks
+together, and learns which ranges come next (`prefetch`), so that a run of chunks is one request. It asks
 again a few times where a server drops the connection, stalls or is overloaded, and raises RemoteError, in one
 line, where that does not help, where the file is no longer the one that was opened, and where a server that
 ignores ranges has a large one. It knows nothing of what the bytes mean: checksums are the container's
@@ -67,9 +67,9 @@ class Remote:
         self.size = self._source.size()
 
     @property
-    def doubt(self) -> str:
+    def change_hint(self) -> str:
         """What else than damage a wrong checksum may come from, to go behind an error message."""
-        return self._source.doubt
+        return self._source.change_hint
 
     def prefetch(self, ranges: list[Range]) -> None:
         """Fetches what is not there yet of these ascending ranges where it can be kept until it is read: one
@@ -178,7 +178,7 @@ class _AnySystem:
     """Any fsspec file system, as far as all of them go: nothing tells a file that has changed but its
     checksums."""
 
-    doubt = ", or the file has been changed since it was opened"
+    change_hint = ", or the file has been changed since it was opened"
 
     def __init__(self, remote: Remote, system, path: str, shown: str):
         self._remote, self._system, self._path, self._shown = remote, system, path, shown
@@ -199,7 +199,8 @@ class _AnySystem:
         for (offset, size), data in zip(ranges, parts, strict=True):
             self._remote.bytes += len(data)
             if len(data) != size:
-                raise RemoteError(f"{self._shown}: got {len(data)} bytes from {offset} on, expected {size}{self.doubt}")
+                raise RemoteError(f"{self._shown}: got {len(data)} bytes from {offset} on, "
+                                  f"expected {size}{self.change_hint}")
         return list(zip(starts, parts))
 
     def _try(self, ask, requests: int = 1):
@@ -226,7 +227,7 @@ class _Http:
         self._tags: dict[str, str] = {}
 
     @property
-    def doubt(self) -> str:
+    def change_hint(self) -> str:
         return "" if self._tags else ", or the file has been changed on the server, which says nothing of that"
 
     def size(self) -> int:
@@ -285,7 +286,7 @@ class _Http:
                 return await self._answered(answer, offset, size)
         except (aiohttp.InvalidURL, aiohttp.TooManyRedirects) as error:
             raise self._refusal(f"{type(error).__name__}: {without_secrets(self._remote.url)}") from error
-        except asyncio.TimeoutError:
+        except TimeoutError:
             raise _Again(f"no answer, or not all of it, within {patience:g} seconds") from None
         except (aiohttp.ClientError, ConnectionError) as error:
             raise _Again(f"the connection failed ({type(error).__name__}: {_one_line(error)})") from error

@@ -31,18 +31,18 @@ class ThreadPool:
         self.jobs = jobs
         self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
-    def map(self, function: Callable[..., Any], items: Sequence[tuple]) -> list:
+    def map(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> list[Any]:
         """function(*item) of all items, in order."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
         return list(self._executor.map(lambda item: function(*item), items))
 
-    def ordered(self, function: Callable[[Any], Any], items: Iterable, ahead: int) -> Iterator:
+    def ordered(self, function: Callable[[Any], Any], items: Iterable[Any], ahead: int) -> Iterator[Any]:
         """function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
         if self._executor is None:
             yield from map(function, items)
             return
-        pending: deque[Future] = deque()
+        pending: deque[Future[Any]] = deque()
         for item in items:
             pending.append(self._executor.submit(function, item))
             if len(pending) > ahead:

@@ -12,7 +12,7 @@ from athcodec.errors import LevelUnavailable, Truncated
 
 
 def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], level: int) -> int:
-    """Writes the levels 0 to `level` of an .ath file as a complete file of its own, which promises the error of `level`.
+    """Write the levels 0 to `level` of an .ath file as a complete file, whose error bound is that of `level`.
 
     Static data is kept. Nothing is decoded.
 

@@ -15,6 +15,7 @@ import re
 import secrets
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -208,7 +209,5 @@ def application(path: str | os.PathLike[str], place: str):
 
 def open_browser(address: str) -> None:
     """Opens the page where there is a browser; where there is none, its address has been printed."""
-    try:
+    with suppress(webbrowser.Error):
         webbrowser.open(address)
-    except webbrowser.Error:
-        pass

@@ -1,5 +1,5 @@
-/* Plays a forest for forest.py, which says what is measured and why. One thread, all files in memory, of which a decoder
- * is fed only what it asks for. Prints one JSON object. C11 and POSIX over ath.h alone. Judges nothing.
+/* Plays a forest for forest.py, which says what is measured and why. One thread, all files in memory, of which a
+ * decoder is fed only what it asks for. Prints one JSON object. C11 and POSIX over ath.h alone. Judges nothing.
  *
  *     forest units ROUNDS FILE.ath...       what one preparation, pose and choice of level costs: medians over ROUNDS
  *     forest play SCENE SECONDS RATE        all instances of a scene, at RATE pictures a second

@@ -194,4 +194,5 @@ class _Recoding:
             pieces["level"] = prelude.plan.level_count - 1
         learned_modes = self._search.learned_modes(prelude.plan, settings)
         of_shapes = sum(map(len, encode_learned_modes(prelude.plan, learned_modes).values()))
-        return of_shapes + sum(code_stems(prelude, settings, positions, learned_modes).bytes for positions in self._positions)
+        coded = (code_stems(prelude, settings, positions, learned_modes) for positions in self._positions)
+        return of_shapes + sum(stems.bytes for stems in coded)

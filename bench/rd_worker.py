@@ -14,6 +14,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -38,7 +39,7 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
         runs: list[float] = []
         while not runs or (runs[0] < QUICK_ENCODE and len(runs) < ENCODES):
             source = _loaded(clip)  # a new one, since codecs may cache results in it
-            seconds, data = _timed(lambda: codec.encode(source, bound))
+            seconds, data = _timed(partial(codec.encode, source, bound))
             runs.append(seconds)
     peak = peak_bytes()
     file.write_bytes(data)

@@ -1017,7 +1017,7 @@ def tridiagonalise(a: np.ndarray):
 def diagonalise(q: np.ndarray, d: list[float], e: list[float]) -> None:
     """The implicit QL method: afterwards row i of q belongs to the eigenvalue d[i]."""
     n = len(d)
-    for l in range(n):
+    for l in range(n):  # noqa: E741
         for _ in range(50):
             m = l
             while m < n - 1 and abs(e[m]) > (abs(d[m]) + abs(d[m + 1])) * 1e-16:
@@ -1955,7 +1955,7 @@ class AthFile:
                     "LIMIT_EXCEEDED")
             require(name not in arrays, "two attributes have the same name")
             arrays[name] = array
-            total = sum(each.nbytes for each in arrays.values())
+            total = sum(array.nbytes for array in arrays.values())
             require(total <= self.limits.memory_bytes, "attributes are too large", "LIMIT_EXCEEDED")
         return arrays
 

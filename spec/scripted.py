@@ -11,7 +11,7 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -154,10 +154,8 @@ def write(function: Callable, script: Script | list, *arguments) -> bytes:
     It ends at a value that the function refuses."""
     script = script if isinstance(script, Script) else Script(*script)
     with scripted(script) as made, np.errstate(all="ignore"):
-        try:
+        with suppress(rd.AthError):
             function(b"", *arguments)
-        except rd.AthError:
-            pass
     return made[0].stream()
 
 
@@ -328,9 +326,9 @@ def hierarchy_chunk(stream: bytes, epsilon: float = 0.5, xi: float = 0.25, eta: 
     return struct.pack("<ffII", epsilon, xi, eta, lam) + stream
 
 
-def rest_chunk(stream: bytes, *, exact: int = 0, wide: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25,
+def rest_chunk(stream: bytes, *, exact: int = 0, rest_type: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25,
                reserved: int = 0) -> bytes:
-    return struct.pack("<BBH3dd", exact, wide, reserved, *origin, step) + stream
+    return struct.pack("<BBH3dd", exact, rest_type, reserved, *origin, step) + stream
 
 
 def clip_entry(frames: int, segments: int = 1, name: bytes | str = b"", seams: Sequence[float] | None = None, *,
@@ -385,7 +383,7 @@ class Plant:
     time: bytes | None = None  # TIME
     branch_source: list | None = None
     vertex_source: list | None = None
-    wide: bool = False
+    is_float64: bool = False
     scripts: dict = field(default_factory=dict)
     heads: dict = field(default_factory=dict)  # of STEMS
     default_head: bytes = stems_head()
@@ -418,7 +416,7 @@ class Plant:
         levels = self.plan.height + 2
         return Draft(dict(vertex_count=vertices, branch_count=len(self.stems), frame_count=sum(lengths),
                           segment_count=len(lengths), level_count=levels, full_level_count=levels,
-                          clip_count=len(clips), flags=int(self.wide)), tuple(entries))
+                          clip_count=len(clips), flags=int(self.is_float64)), tuple(entries))
 
     def file(self) -> bytes:
         return self.draft().file()
@@ -429,7 +427,7 @@ class Plant:
         points = grown(self.stems) if self.points is None else self.points
         script = rest_script(branches, points)
         return rest_chunk(write(rd.decode_rest, script, branches, 1.0), origin=self.origin, step=self.step,
-                          wide=int(self.wide))
+                          rest_type=int(self.is_float64))
 
     def _set_rest(self, branches: list, chunk: bytes) -> None:
         origin = np.array(struct.unpack_from("<3d", chunk, 4))

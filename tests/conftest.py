@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-import athcodec
-from athcodec import core_file
-from athcodec.clip import MotionClip
-from athcodec.sources import read_hdf5, sample_path
 from blender import INSTALL, Blender, build_extension
 from counting import CountedCore
 from plants import awkward, plant
 from programs import blender_python
 from s3 import S3Server
+
+import athcodec
+from athcodec import core_file
+from athcodec.clip import MotionClip
+from athcodec.sources import read_hdf5, sample_path
 
 
 @pytest.fixture

@@ -9,8 +9,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from athcodec import _native
 from fuzz.targets import COMMON, CORE, compiler, decoder_sources
+
+from athcodec import _native
 
 # Hidden, because functions that choose among clones call it while the library is still being loaded.
 COUNTER = """

@@ -344,7 +344,7 @@ def test_inputs_behind_urls_are_fetched_and_known_again(clips, served, tmp_path,
     assert reasons(items, out) == {"a.h5": "other input", "long.h5": "", "c.h5": "", "none.h5": "failed before"}
 
 
-def test_an_input_without_a_modification_time_is_recognised_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
+def test_an_input_without_a_modification_time_is_known_by_its_content(clips, served, tmp_path, cluster, monkeypatch):
     monkeypatch.setattr(Quiet, "unsaid", "Last-Modified")
     out = tmp_path / "out"
     items = batch.find([f"{served}/a.h5"], out, settings=FAST)
@@ -475,7 +475,7 @@ def test_a_scheduler_that_goes_away_ends_the_run_and_not_what_was_done(clips, tm
 
     class Close(batch.show.Show):
         def finished(self, item, record) -> None:
-            if len(seen := [line for line in lines(out)]) == 1:
+            if len(seen := list(lines(out))) == 1:
                 assert seen[0]["status"] == "done"
                 threading.Thread(target=own.close).start()
 

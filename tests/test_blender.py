@@ -26,7 +26,7 @@ for frame in args["frames"]:
     shown.append(points.reshape(-1, 3))
 save(shown=np.array(shown), world=world(obj.name), rate=scene.render.fps / scene.render.fps_base,
      range=[scene.frame_start, scene.frame_end], edges=len(obj.data.edges),
-     names=[each.name for each in obj.data.attributes])
+     names=[attribute.name for attribute in obj.data.attributes])
 """
 
 
@@ -89,7 +89,7 @@ bpy.ops.wm.save_as_mainfile(filepath=args["blend"])
 fresh()
 bpy.ops.wm.open_mainfile(filepath=args["blend"])
 save(shown=np.array(shown), names=names, changed=changed, problem=problem,
-     kept=sorted(each.ath.clip for each in bpy.data.objects))
+     kept=sorted(obj.ath.clip for obj in bpy.data.objects))
 """
 
 
@@ -131,7 +131,7 @@ assert bpy.context.active_object.ath.filepath.startswith("//../here/"), bpy.cont
     shown = extended_blender.run("""
 fresh()
 bpy.ops.wm.open_mainfile(filepath=args["blend"])
-obj = next(each for each in bpy.data.objects if each.ath.filepath)
+obj = next(found for found in bpy.data.objects if found.ath.filepath)
 bpy.context.scene.frame_set(33)
 save(shown=world(obj.name), level=obj.ath.level, start=obj.ath.frame_offset)
 """, blend=there / "scene.blend")
@@ -229,7 +229,7 @@ for frame in range(11, 31):
         obj.location = (0, 0, 0)
         bpy.context.view_layer.update()
     shown.append(world(obj.name))
-save(shown=np.array(shown), faces=[list(each.vertices) for each in obj.data.polygons])
+save(shown=np.array(shown), faces=[list(polygon.vertices) for polygon in obj.data.polygons])
 """
 
 
@@ -258,7 +258,7 @@ other, again = bpy.context.active_object, []
 for frame in range(11, 31):
     scene.frame_set(frame)
     again.append(world(other.name))
-save(shown=np.array(shown), again=np.array(again), faces=[list(each.vertices) for each in other.data.polygons],
+save(shown=np.array(shown), again=np.array(again), faces=[list(polygon.vertices) for polygon in other.data.polygons],
      range=[scene.frame_start, scene.frame_end])
 """, ath=tmp_path / "a.ath", options={})
     assert np.abs(found["again"] - found["shown"]).max() < 2e-3 and found["range"].tolist() == [11, 30]

@@ -1,5 +1,5 @@
-"""A constant of the format has the same value wherever it is written: the headers of the C core define it; Python, JavaScript
-and FORMAT.md repeat it."""
+"""A constant of the format has the same value wherever it is written: the headers of the C core define it; Python,
+JavaScript and FORMAT.md repeat it."""
 
 from __future__ import annotations
 

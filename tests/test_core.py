@@ -28,12 +28,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from files import Parts, with_header
 
 import athcodec
 from athcodec import container as ct
 from athcodec import errors
 from athcodec._library import load_library
-from files import Parts, with_header
 
 OK, BAD_CHECKSUM, LIMIT_EXCEEDED = 0, 5, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
@@ -239,7 +239,7 @@ class Player:
 
     def after(self, frame: int) -> int:
         """The frame that it blends into: behind the last one of a clip that is the clip's first."""
-        clip = next(each for each in self.clips if frame < each.first_frame + each.frame_count)
+        clip = next(clip for clip in self.clips if frame < clip.first_frame + clip.frame_count)
         return frame + 1 if frame + 1 < clip.first_frame + clip.frame_count else clip.first_frame
 
     def start_of(self, segment: int) -> int:
@@ -826,7 +826,7 @@ def test_a_distance_asks_for_the_coarsest_level_whose_error_is_not_seen(player):
     def level_for(segments, distance, pixels=1.0):
         return core.ath_level_for(player.address, *segments, distance, 1.0, 1080.0, pixels)
 
-    for segments in ((0, player.segments[-1]), *((each, each) for each in player.segments)):
+    for segments in ((0, player.segments[-1]), *((segment, segment) for segment in player.segments)):
         error = c_double()
         worst = []
         for level in player.levels:

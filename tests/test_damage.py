@@ -12,10 +12,11 @@ import re
 import struct
 import sys
 import tracemalloc
+from contextlib import suppress
 from dataclasses import astuple, fields, replace
 from io import BytesIO
-from pathlib import Path
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -390,7 +391,7 @@ def some_limits(rng: np.random.Generator) -> Limits:
     """Mostly those by default; else one of the core's that may be too narrow, or wide."""
     if rng.random() < 0.8:
         return Limits()
-    names = [each.name for each in fields(Limits) if hasattr(core_file.Limits, each.name)]
+    names = [field.name for field in fields(Limits) if hasattr(core_file.Limits, field.name)]
     return Limits(**{rng.choice(names): int(rng.choice([5, 12, 20, 200])) << int(rng.choice([0, 0, 20]))})
 
 
@@ -684,10 +685,8 @@ def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
     """Cut short anywhere a stream is refused or means something else, with more behind it it is refused."""
     assert decode(stream).tobytes() == whole.tobytes()
     for size in range(len(stream)):
-        try:
+        with suppress(BadChunk):
             assert decode(stream[:size]).tobytes() != whole.tobytes()
-        except BadChunk:
-            pass
     for more in (b"\x00", b"\x01" * 12):
         with pytest.raises(BadChunk):
             decode(stream + more)
@@ -835,7 +834,7 @@ def test_limits_that_just_hold_the_file_accept_it(data, parts):
 
 
 def test_limits_that_no_file_reaches_accept_it(data):
-    check(data, limits=Limits(**{each.name: 1 << 80 for each in fields(Limits)}))
+    check(data, limits=Limits(**{field.name: 1 << 80 for field in fields(Limits)}))
 
 
 def test_a_segment_that_takes_more_memory_than_the_limit_is_not_decoded(data):

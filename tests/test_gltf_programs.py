@@ -118,7 +118,7 @@ def test_files_beside_each_other_by_gltf_transform_are_the_same_clip(three_file,
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
-def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(animation, leafy_ath, node, played,  # noqa: F811
+def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(animation, leafy_ath, node, played,
                                                                              tmp_path):
     path = tmp_path / "a.glb"
     with athcodec.open(leafy_ath) as decoder:
@@ -132,7 +132,7 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(ani
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
-def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(animation, seasons, seasons_ath,  # noqa: F811
+def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(animation, seasons, seasons_ath,
                                                                           node, played, tmp_path):
     path = tmp_path / "a.glb"
     with athcodec.open(seasons_ath) as decoder:
@@ -172,7 +172,7 @@ def structure(path):
     return data[20 : 20 + int.from_bytes(data[12:16], "little")]
 
 
-def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):  # noqa: F811
+def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):
     with athcodec.read_hdf5(athcodec.sample_path()) as sample:
         write(sample, tmp_path / "lines.glb", animation="joints")
         write(sample.replace(edges=None), tmp_path / "points.glb")
@@ -185,7 +185,7 @@ def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path): 
 
 
 @pytest.mark.parametrize("half", [True, False])
-def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath, node, tmp_path, half):  # noqa: F811
+def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath, node, tmp_path, half):
     with athcodec.open(leafy_ath) as decoder:
         write(ClipView(decoder), tmp_path / "a.vat", half=half)
         write(ClipView(decoder), tmp_path / "a.openvat")

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz.targets import CORE, decoder_sources
 
 import athcodec
 from athcodec._native import crc32c
-from fuzz.targets import CORE, decoder_sources
 
 C_COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 CXX_COMPILERS = [name for name in ("g++", "clang++") if shutil.which(name)] or ["c++"]
@@ -244,7 +244,8 @@ def test_the_example_plays_the_same_again(played, engine, sample_ath):
     (lambda data: data[:200], r"chunk table: got 136 bytes; expected \d+"),
     (lambda data: b"PK" + data, "file: got first bytes 0x504b8941; expected 0x89415448"),
     (lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:],
-     "preparing: chunk STEMS of level 2, segment 1 at byte 8329: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
+     "preparing: chunk STEMS of level 2, segment 1 at byte 8329: "
+     "got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
 ], ids=["empty", "cut off", "another file", "damaged"])
 def test_the_example_says_in_one_line_what_is_wrong_with_a_file(damage, says, engine, sample_ath, tmp_path):
     (tmp_path / "bad.ath").write_bytes(damage(sample_ath.read_bytes()))

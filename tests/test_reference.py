@@ -135,9 +135,9 @@ def test_lossless_files_have_the_same_bits(dtype, tmp_path):
     assert_same_bits(encoded(clip, tmp_path, rel_error=1e-3, lossless=True, segment_frames=16))
 
 
-@pytest.mark.parametrize("seed, wide, exact", [(1, False, None), (4, True, np.float64)])
-def test_every_feature_has_the_same_bits(seed, wide, exact):
-    assert_same_bits(HandMade(seed, wide, exact).file())
+@pytest.mark.parametrize("seed, is_float64, exact", [(1, False, None), (4, True, np.float64)])
+def test_every_feature_has_the_same_bits(seed, is_float64, exact):
+    assert_same_bits(HandMade(seed, is_float64, exact).file())
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for spec, which is not installed
 
 from bad_cases import behave  # noqa: E402
+
 from spec import robustness  # noqa: E402
 from spec.robust import Row, _cases  # noqa: E402
 

@@ -345,7 +345,7 @@ def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
         for prim in prims:
             wanted = UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), code)
             assert np.allclose(wanted, UsdGeom.Boundable(prim).GetExtentAttr().Get(code), atol=1e-5)
-    for attribute in (each for prim in prims for each in prim.GetAttributes() if each.GetNumTimeSamples()):
+    for attribute in (found for prim in prims for found in prim.GetAttributes() if found.GetNumTimeSamples()):
         assert attribute.GetName() in ("points", "extent")
 
 

@@ -147,7 +147,7 @@ def test_the_page_allows_no_scripts_but_its_own():
     text = (WEB / "index.html").read_text("utf-8")
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
     scripts = re.findall(r"<script(?: [^>]*)?>([^<]+)</script>", text)
-    digests = [f"'sha256-{base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()}'" for each in scripts]
+    digests = [f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'" for script in scripts]
     assert re.search(r"script-src ([^;]*);", policy)[1].split() == ["'self'", "'wasm-unsafe-eval'", *digests]
     assert "unsafe-inline" not in policy and not re.search(r'\son\w+="|style="', text)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-import athcodec
 from moving_meshes import assert_same_mesh, assert_same_motion, mixed_clip, quad_clip
 from programs import run_script, vtk_python
+
+import athcodec
 
 pytestmark = pytest.mark.programs
 

@@ -123,10 +123,9 @@ def _stem(name: str, path: str) -> str:
 def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]]:
     for given in inputs:
         given = os.fspath(given)
-        count = 0
-        for count, pair in enumerate(_remote(given) if is_url(given) else _local(given), 1):
-            yield pair
-        if not count:
+        pairs = list(_remote(given) if is_url(given) else _local(given))
+        yield from pairs
+        if not pairs:
             raise ClipError(f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits "
                             "some")
 

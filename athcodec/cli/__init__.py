@@ -26,7 +26,7 @@ INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv` (default: that of the process) and return its exit code.
 
-    Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 when told to terminate.
+    Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 on SIGTERM.
     """
     args = make_parser().parse_args(argv)
     if hasattr(sys.stdout, "reconfigure"):

@@ -46,8 +46,8 @@ def make_parser() -> argparse.ArgumentParser:
     ))
     _batch_arguments(verb(
         "batch", verbs.batch, "compress many motions, by several processes",
-        "An interrupted run goes on where it ended when the command is given again. Exit code 1 where a clip failed; "
-        "the others are done all the same.",
+        "An interrupted run goes on where it ended when the command is given again. "
+        "Exit code 1 where a clip failed; the others are done all the same.",
     ))
     _decode_arguments(verb(
         "decode", verbs.decode, "write the motion of an .ath file in another format",

@@ -48,7 +48,7 @@ static int32_t busy_neighbours(const int32_t *quantised, int32_t T, int32_t rank
     return count;
 }
 
-/* A lone 1 costs many bits and removes little error: it must be larger than one in company. */
+/* An isolated 1 costs many bits and removes little error: its threshold is higher than that of one with neighbours. */
 static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_FRAMES], const int32_t *predicted,
                            int32_t *quantised)
 {
@@ -103,8 +103,8 @@ static void to_quaternion(const double R[9], double q[4])
     for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
 }
 
-/* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its vertices relative to
- * the attach point, in the predicted frame. */
+/* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
+ * vertices relative to the attach point, in the predicted frame. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local, double *omega)
 {
     const double *a = ath_rest_attach(plan, piece);
@@ -122,13 +122,13 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
         for (int32_t k = 0; k < 9; k++) H[k] += 1e-6 * size2 * R[k];
         for (int32_t step = 0; size2 > 0.0 && step < ROTATION_STEPS; step++) ath_turn_towards(H, size2, R);
         to_quaternion(R, q);
-        if (q[0] < -0.9) /* beyond about 310 degrees: wind back */
+        if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
             for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
         for (int32_t k = 0; k < 3; k++) omega[k * T + t] = 4.0 * q[k + 1] / (1.0 + q[0]);
     }
 }
 
-/* Replaces the tracks of the first modes by those of the shapes; there is nothing in the rows that are left over. */
+/* Replaces the tracks of the first modes by those of the shapes, and sets the remaining rows to 0. */
 static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, const double *duals,
                       const ath_scratch *scratch)
 {
@@ -253,7 +253,7 @@ void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
     for (int32_t m = 0; m < ATH_SHAPE_MODES; m++) weights[m] = ath_mode_weight(flags, m);
 }
 
-/* Means over the subtree of what the attach frame leaves, e = R'(x - c) - d: tracks r < rank become the mean of
+/* Means over the subtree of the residual in the attach frame, e = R'(x - c) - d: tracks r < rank become the mean of
  * e * w_r, track 3 the mean of e, `centre` the mean of w. */
 static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
                          const double *source, double *tracks, double centre[3])

@@ -1,6 +1,7 @@
 /* athcodec: plays .ath files. This header is the whole public C API; FORMAT.md describes the files.
  *
  *     ath_front -> ath_open -> ath_build        once per file: header, hierarchy, rest pose
+ *     ath_fault_text                            why a file is refused, in a sentence
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
@@ -10,13 +11,13 @@
  * aligned to 16, and keeps them while they are in use. Objects are freed by freeing their memory. An ath_file holds
  * pointers into the bytes that it was fed: these stay where they are until they are fed anew or dropped.
  *
- * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time;
- * any number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop run alone among those
+ * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time; any
+ * number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop run alone among those
  * that look at bytes: preparations and the functions on chunks and ranges; playing may go on.
  *
- * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need
- * no more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over
- * are trusted, unless a function says what it returns for bad ones.
+ * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need no
+ * more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over are
+ * trusted, unless a function says what it returns for bad ones.
  *
  * Units and layout. Positions and errors are in the file's scene units, time is in seconds, frames count from 0.
  * Matrices are 3x4, row-major: x' = m[0] x + m[1] y + m[2] z + m[3] and so on. Vertices, branches and nodes come in
@@ -76,7 +77,7 @@ typedef enum ath_result {
 /* The code's name in FORMAT.md, such as "BAD_CHUNK"; "UNKNOWN" for no code. */
 ATH_API const char *ath_result_name(int result);
 
-/* ---- constants of the format --------------------------------------------------------------------------------------- */
+/* ---- constants of the format ------------------------------------------------------------------------------------- */
 
 enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 5 };
 
@@ -104,12 +105,13 @@ enum { ATH_NO_LEVEL = 255 }; /* level of a chunk that is of no level */
 /* The kind's name, such as "STEMS"; null for an unknown one. */
 ATH_API const char *ath_kind_name(int kind);
 
-/* Max_Memory_Bytes limits vertices * (ATH_BYTES_PER_FRAME * F + ATH_BYTES_PER_VERTEX), F: frames of the longest segment. */
+/* Max_Memory_Bytes limits vertices * (ATH_BYTES_PER_FRAME * F + ATH_BYTES_PER_VERTEX), F: frames of the longest
+ * segment. */
 enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512 };
 
-/* ---- faults --------------------------------------------------------------------------------------------------------- */
+/* ---- faults ------------------------------------------------------------------------------------------------------ */
 
-/* What a fault is about. The names in capitals are fields of FORMAT.md. */
+/* What a fault is about; most are fields of FORMAT.md: ATH_FIELD_VERTEX_COUNT is Vertex_Count. */
 typedef enum ath_field {
     ATH_FIELD_NONE,
     ATH_FIELD_MAGIC,            /* the four bytes of which one is wrong, as a number whose high byte comes first */
@@ -160,8 +162,8 @@ typedef struct ath_fault_info {
     double found, least, most;  /* the value found, the values allowed: integers below 2^53 are exact */
 } ath_fault_info;
 
-/* Writes the fault as one line of English, "where: got this; expected that", with a zero behind it, into at most `capacity`
- * bytes. Returns its length without the zero, also where it does not fit. ATH_FAULT_TEXT bytes hold any. */
+/* Writes the fault as one line of English, "where: got this; expected that", with a zero behind it, into at most
+ * `capacity` bytes. Returns its length without the zero, also where it does not fit. ATH_FAULT_TEXT bytes hold any. */
 enum { ATH_FAULT_TEXT = 256 };
 ATH_API size_t ath_fault_text(const ath_fault_info *fault, char *text, size_t capacity);
 
@@ -270,15 +272,15 @@ ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
-/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's numbers were floats:
- * what the file's arithmetic has as doubles is rounded to them. */
+/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's numbers
+ * were floats: what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
 /* The rest pose of a level's layer: the one above for levels of the first layer. ATH_BAD_ARGUMENT where it is not built. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
-/* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result may be
- * null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
+/* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result
+ * may be null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
 ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment,
                              double *max_error, double *rms_error);
 
@@ -289,8 +291,8 @@ ATH_API const float *ath_errors(const ath_file *file);
 ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
 ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);
 
-/* The chunk table, in file order, unknown optional kinds included. Payloads: FORMAT.md. Static data (METADATA, FACES, EDGES, ATTRIBUTE) is
- * handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
+/* The chunk table, in file order, unknown optional kinds included. Payloads: FORMAT.md. Static data (METADATA,
+ * FACES, EDGES, ATTRIBUTE) is handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
 typedef struct ath_chunk {
     const uint8_t *bytes; /* null: not fed */
     uint64_t offset;
@@ -307,8 +309,8 @@ ATH_API int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info 
 
 /* ---- bytes ------------------------------------------------------------------------------------------------------- */
 
-/* `bytes` are the file's from `offset` on, `size` of them. Chunks that lie wholly inside can be used from now on, others
- * are left alone: for a download that grows or arrives in pieces, feed the joined piece again. Any order. */
+/* `bytes` are the file's from `offset` on, `size` of them. Chunks that lie wholly inside can be used from now on,
+ * others are left alone: for a download that grows or arrives in pieces, feed the joined piece again. Any order. */
 ATH_API void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size);
 /* Forgets chunks that touch this range, so that their bytes can go: not those that a preparation has begun to read. */
 ATH_API void ath_drop(ath_file *file, uint64_t offset, uint64_t size);
@@ -350,11 +352,12 @@ ATH_API size_t ath_segment_size(const ath_file *file, int32_t level);
  * ATH_BAD_ARGUMENT. */
 ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
                               void *memory, size_t memory_bytes);
-/* Goes on for `steps` steps, each a bounded piece of work: at most 64 vertices, or one matrix, over the segment's frames.
- * ATH_MORE until it is done: ATH_OK, and the segment can be played. ATH_BAD_CHECKSUM, ATH_BAD_CHUNK: it cannot be, and
- * further steps are an ATH_BAD_ARGUMENT. */
+/* Goes on for `steps` steps, each a bounded piece of work: at most 64 vertices, or one matrix, over the segment's
+ * frames. ATH_MORE until it is done: ATH_OK, and the segment can be played. ATH_BAD_CHECKSUM, ATH_BAD_CHUNK: it
+ * cannot be, and further steps are an ATH_BAD_ARGUMENT. */
 ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
-/* What the error of the preparation is about, and which bytes ATH_MISSING: of _start once it had its memory, of _step. */
+/* What the error of the preparation is about, and which bytes ATH_MISSING: of _start once it had its memory, of
+ * _step. */
 ATH_API void ath_work_fault(const ath_work *work, ath_fault_info *fault);
 /* How many steps that takes in all. */
 ATH_API int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level);
@@ -371,8 +374,8 @@ ATH_API int32_t ath_segment_level(const ath_segment *segment);
 /* ATH_AS_MARKED: ATH_LOOP for clips that are loops, else ATH_CLAMP. */
 typedef enum ath_wrap { ATH_CLAMP = 0, ATH_LOOP = 1, ATH_PING_PONG = 2, ATH_AS_MARKED = 3 } ath_wrap;
 
-/* Where on the file's frames a time, in seconds since the clip's first frame, is: from that to the clip's last and, for a
- * loop, on to the frame behind it, as the last frame blends into the first over the mean frame time. */
+/* Where on the file's frames a time, in seconds since the clip's first frame, is: from that to the clip's last and,
+ * for a loop, on to the frame behind it, as the last frame blends into the first over the mean frame time. */
 ATH_API double ath_frame_at(const ath_file *file, int32_t clip, double seconds, ath_wrap wrap);
 
 /* The frames that a place on the frames lies between, and the weight of the second; the same one twice where that is 0.
@@ -406,17 +409,17 @@ ATH_API int ath_exact(const ath_file *file, const ath_segment *const *segments, 
                       float *xyz, size_t stride);
 ATH_API int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                            double frame, double *xyz, size_t stride);
-/* The level that these show, which says how many matrices and exact vertices there are; -1: none has the frame. */
+/* The level that these show, which tells how many matrices and exact vertices there are; -1: none has the frame. */
 ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                                 double frame);
 
 /* ---- level of detail --------------------------------------------------------------------------------------------- */
 
-/* The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of view of
- * `fov` (radians) on a screen of `height` pixels, is at most `pixels` in these segments; the deepest level where none
- * is. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than
- * the one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang and
- * Peng 2011: the view-dependent choice.) */
+/* The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of view
+ * of `fov` (radians) on a screen of `height` pixels, is at most `pixels` in these segments; the deepest level where
+ * none is. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than the
+ * one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang
+ * and Peng 2011: the view-dependent choice.) */
 ATH_API int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance,
                               double fov, double height, double pixels);
 

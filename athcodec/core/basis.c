@@ -152,8 +152,8 @@ void ath_rest_basis(int32_t n, double *basis, double *work)
     cantilever(n, even, 100.0, 0.0, basis, work);
 }
 
-/* Adds `candidate` to the `count` orthonormal rows of `basis` after removing what they hold of it, twice for
- * accuracy. Returns the new count: unchanged when less than `keep` of its squared length is left. */
+/* Adds `candidate` to the `count` orthonormal rows of `basis`, its projections on them subtracted, twice for
+ * accuracy. Returns the new count: unchanged where less than `keep` of its squared length remains. */
 static int32_t append_orthonormal(int32_t n, double *basis, int32_t count, double *candidate, double keep)
 {
     double before = 0.0, after = 0.0;

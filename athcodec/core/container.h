@@ -1,4 +1,5 @@
-/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, which writes them, the only place that knows offsets. */
+/* The bytes of an .ath file (FORMAT.md, "File"): with container.py, which writes them, the only place that knows
+ * offsets. */
 #ifndef ATH_CONTAINER_H
 #define ATH_CONTAINER_H
 
@@ -17,7 +18,8 @@ typedef struct {
 int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
 int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 
-/* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the prelude. */
+/* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the
+ * prelude. */
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
                     ath_fault_info *fault);
 /* What is between a valid header and the first chunk: fills, unless null, chunk_count chunks and level_count x
@@ -68,7 +70,7 @@ typedef struct {
 
 int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
-/* The entry at the front of `chunk`, which becomes what is behind it. */
+/* Parses the entry at the front of `chunk`, and moves `chunk` past it. */
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);
 float ath_seam(const ath_clip_entry *entry, int32_t level);
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body);

@@ -1,4 +1,4 @@
-/* Streams of the prelude, read: streams.h compiled for decoding. */
+/* Decodes the streams of the prelude: streams.h compiled for decoding. */
 #include "decode.h"
 #include "streams.h"
 

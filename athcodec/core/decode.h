@@ -1,4 +1,4 @@
-/* Streams of the prelude, and of a learned time basis, to what they hold. */
+/* Decodes the streams of the prelude and of a learned time basis. */
 #ifndef ATH_DECODE_H
 #define ATH_DECODE_H
 
@@ -16,7 +16,7 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
 /* Positions as stored, floats or (is_float64) doubles, the origin not taken off. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, int is_float64, double *rest);
-/* Finite; whether they increase is for the caller to see. */
+/* All are finite; the caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
 /* rank x frames integers; `limit` stands for 1. */
 int ath_decode_temporal(void *model, const uint8_t *bytes, size_t size, int32_t rank, int32_t frames, int32_t limit,

@@ -1,4 +1,4 @@
-/* Streams, written: streams.h compiled for encoding. */
+/* Encodes streams: streams.h compiled for encoding. */
 #define ATH_ENCODING
 #include "encode.h"
 #include "motion_streams.h"
@@ -15,7 +15,7 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
     coder_start(&coder, bytes, capacity);
     int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, (ath_branch *)branches,
                                (int32_t *)branch_source, (int32_t *)vertex_source);
-    ath_count_pieces((ath_branch *)branches, branch_count, vertex_count); /* `subtree` served as memory */
+    ath_count_pieces((ath_branch *)branches, branch_count, vertex_count); /* restores `subtree`, which served as scratch memory */
     return written(&coder, valid);
 }
 

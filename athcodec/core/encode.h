@@ -73,19 +73,19 @@ ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32
 ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
                         int32_t source_count, int is_float64, const void *source, const double origin[3], double *out);
 
-/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between.
- * source: vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of
- * its number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
- * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment, each with
- * scratch memory of its own, once the pieces that theirs hang on are done. */
+/* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
+ * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
+ * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
+ * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
+ * each with scratch memory of its own, once the pieces that theirs hang on are done. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                          int32_t first, int32_t stop, const double *source, double dead_zone);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                int32_t first, int32_t stop, const double *source, const double *level_steps,
                                double dead_zone);
 
-/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64) double.
- * By ranges of pieces, which keep the rule above, and then of nodes. */
+/* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
+ * double. By ranges of pieces, which keep the rule above, and then of nodes. */
 ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                       int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,

@@ -1,4 +1,4 @@
-/* Numbers as they are, by how far they are from what is known of them (FORMAT.md, "Exact numbers"). Compiled once for
+/* Exact numbers, coded as differences from a prediction (FORMAT.md, "Exact numbers"). Compiled once for
  * each direction. */
 #ifndef ATH_EXACT_MODEL_H
 #define ATH_EXACT_MODEL_H
@@ -78,7 +78,7 @@ static uint64_t code_difference(ath_coder *coder, exact_model *model, int32_t bi
     return coder_raw_bit(coder, negative) ? 0 - magnitude : magnitude;
 }
 
-/* A number under what it is expected to be; `length`: that of the difference before. */
+/* Codes a number by its difference from `expected`; `length`: bits of the difference before. */
 static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length, double *number)
 {
     uint64_t sign = (uint64_t)1 << (is_float64 ? 63 : 31), bits = bits_of(expected, is_float64);

@@ -154,7 +154,7 @@ static const char *const sentences[] = {
     "%p: got Reserved %f%a",
     "%p: got level %f%a",
     "%p: got segment %f%a",
-    "%p: got entry %f of the chunk table; expected an earlier one, in file order, each once",
+    "%p: got entry %f of the chunk table; expected an earlier one, in file order, each chunk once",
     "%p: got a chunk that the hierarchy does not ask for; expected none",
     "%p: got checksum %f%a",
     "%p: got branches %f deep%a",

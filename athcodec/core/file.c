@@ -31,7 +31,7 @@ static void carve_layers(ath_file *file, const ath_header *header, ath_arena *ar
     }
 }
 
-/* Lays the file out behind its struct; with a null base only counts. */
+/* Places the file's arrays behind its struct; with a null base it only counts. Returns the bytes that they take. */
 static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
@@ -419,7 +419,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     return ATH_OK;
 }
 
-/* The header goes into the file, once that fits into the memory. */
+/* Parses header and tables into the file, once these are known to fit into the memory. */
 static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
                       ath_fault_info *fault)
 {
@@ -667,7 +667,8 @@ void ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t
     if (rms_error) *rms_error = first == last ? (double)errors[2 * first + 1] : ath_sqrt(squares / frames);
 }
 
-/* The last clip that begins at or before this frame, or segment: an offset of ath_clip says which is meant. */
+/* The last clip that begins at or before this frame or segment; `first`: the offset of first_frame or first_segment in
+ * ath_clip. */
 static const ath_clip *clip_at(const ath_file *file, size_t first, int32_t place)
 {
     int32_t low = 0, high = file->info.clip_count;

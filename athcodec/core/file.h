@@ -68,7 +68,7 @@ ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer)
 {
     return layer > 0 ? &file->layers[layer].plan : &file->plan;
 }
-/* Whether showing `level` of a segment takes the chunk of this kind and level d, and there is to be one. */
+/* Whether decoding a segment at `level` takes the chunk of this kind and level d. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
 
 #endif

@@ -65,8 +65,8 @@ enum {
 ATH_INLINE int32_t ath_min(int32_t a, int32_t b) { return a < b ? a : b; }
 ATH_INLINE int32_t ath_max(int32_t a, int32_t b) { return a > b ? a : b; }
 
-/* Rounded to float. GCC 12 at -O2 puts two of these side by side into one vector and forgets to round; volatile keeps it
- * from that. */
+/* Rounded to float. GCC 12 at -O2 puts two of these side by side into one vector and forgets to round; volatile
+ * keeps it from that. */
 ATH_INLINE double ath_single(double x)
 {
     volatile float rounded = (float)x;

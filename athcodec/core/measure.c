@@ -1,4 +1,4 @@
-/* What the encoder decodes to measure, what it measures, and the corrections that keep its promise. */
+/* How the encoder decodes and measures what it has coded, and the corrections that keep the error bound. */
 #include "encode.h"
 
 enum { TILE = 16 }; /* of what is worked on at once */

@@ -96,7 +96,7 @@ ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, cons
 ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const double *from, const double *to,
                                    const double *parent, double *out)
 {
-    double turned[9][TURN_LANES]; /* out of reach of the pointers, or compilers would not use SIMD */
+    double turned[9][TURN_LANES]; /* a local copy, which no pointer aliases: else compilers would not use SIMD */
     int32_t count;
     for (int32_t start = 0; start < T; start += count, from += count, to += count, parent += count, out += count) {
         count = ath_min(TURN_LANES, T - start);

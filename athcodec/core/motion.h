@@ -131,7 +131,8 @@ void ath_turn_towards(const double H[9], double size2, double R[9]);
 double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
-/* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all 0. */
+/* Shapes of unit length from the integers that a stream holds of each, 3 x ATH_SHAPE_MODES. 0: those of one are all
+ * 0. */
 ATH_ENCODER_API int ath_unit_shapes(int32_t count, const int32_t *integers, double *shapes);
 /* The stream that node maps use: cosines, the node's own step. */
 ath_stream ath_node_stream(const ath_motion *motion, double step);
@@ -163,8 +164,8 @@ ATH_INLINE int ath_is_shape_row(const ath_piece *piece, const ath_piece_rows *ro
     return rows->shape_count > 0 && r < ath_shape_modes(piece);
 }
 
-/* Steps of modes over that of their stream. Modes of a cantilever are quantised finer the more of the motion they carry:
- * what the first ones get wrong, the pieces that hang on this one would have to code again. */
+/* Steps of modes over that of their stream. Modes of a cantilever are quantised finer the more of the motion they
+ * carry: an error of the first ones would have to be corrected by the pieces that hang on this one. */
 ATH_INLINE double ath_mode_weight(int32_t flags, int32_t m)
 {
     static const double weight[4] = {0.75, 0.875, 0.9375, 1.0};
@@ -182,7 +183,7 @@ ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)
     return rows + (size_t)row * 3 * (size_t)frames;
 }
 
-/* The one place where a correction meets a position. */
+/* Adds a correction to a position; nothing else does. */
 ATH_INLINE double ath_corrected(double position, int32_t steps, double step)
 {
     return position + (double)steps * step;

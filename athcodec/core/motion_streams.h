@@ -270,8 +270,8 @@ static void code_corrected_frames(ath_coder *coder, correction_model *model, int
     }
 }
 
-/* The next vertex, whose corrections are in, or come into, the row returned, which is valid until the vertex after it;
- * null: it has none. Encoding, the row is to be filled before (next_row). */
+/* Codes the corrections of the next vertex. Returns its row, which stays valid until the vertex after it; null: it
+ * has none. When encoding, the row is filled before (next_row). */
 static correction_row *next_row(correction_model *model) { return &model->row[model->turn]; }
 
 static const correction_row *code_vertex(ath_coder *coder, correction_model *model, int32_t frames, int any)

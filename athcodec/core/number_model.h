@@ -25,7 +25,7 @@ ATH_INLINE int32_t bit_length(uint32_t x)
 
 ATH_INLINE uint32_t magnitude_of(int32_t value) { return (uint32_t)(value < 0 ? -value : value); }
 
-/* What the contexts see of a value. */
+/* The magnitude that contexts use. */
 ATH_INLINE uint32_t clipped(int32_t value)
 {
     uint32_t magnitude = magnitude_of(value);

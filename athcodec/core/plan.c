@@ -76,8 +76,8 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
     }
 }
 
-/* Attach caches on a stack: in depth-first order those on top are done with first. One goes when its last piece has been
- * attached, before that piece is kept itself, so that a long chain never holds more than one. */
+/* Attach caches on a stack: in depth-first order those on top are done with first. One goes when its last piece has
+ * been attached, before that piece is kept itself, so that a long chain never holds more than one. */
 static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stack, int keep)
 {
     int64_t used = 0;

@@ -53,8 +53,8 @@ ATH_ENCODER_API int32_t ath_count_pieces(ath_branch *branches, int32_t branch_co
 ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t branch_count);
 
 /* Fills pieces and nodes, and height, longest and attach_cache_rows of `plan`, whose branches and counts are set.
- * Attach caches are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has come.
- * `memory`: scratch, vertex_count. */
+ * Attach caches are kept for the whole pass over the pieces (keep), or until the last piece that hangs on them has
+ * been attached. `memory`: scratch, vertex_count. */
 ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */

@@ -188,7 +188,7 @@ ATH_HOT static void move_block(const double *x0, size_t count, const double m[AT
     }
 }
 
-/* A file's positions are what its own type holds. */
+/* Rounds positions to float, the type of the file. */
 ATH_HOT static void round_block(double *block, size_t count)
 {
     for (size_t i = 0; i < count; i++) block[i] = ath_single(block[i]);

@@ -1,5 +1,5 @@
-/* From the chunks of a segment to what is played of it: all levels' streams are read side by side, piece by piece, each
- * piece placed as soon as its integers are there, so that only what hangs on it is kept. */
+/* Decodes the chunks of a segment into what is played: the streams of all levels side by side, piece by piece. A
+ * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
 #include "decode.h"
 #include "exact_model.h"
 #include "motion_streams.h"

@@ -89,7 +89,7 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
 static int code_number_of(ath_coder *coder, hierarchy_model *model, int regular, int32_t expected, int32_t count,
                           int32_t *source)
 {
-    int32_t given = ENCODING ? *source - expected : 0; /* what stands there is not to be looked at when decoding */
+    int32_t given = ENCODING ? *source - expected : 0; /* when decoding, it is not initialised */
     int64_t value = regular ? expected : (int64_t)expected + code_signed(coder, &model->source, 16, given);
     if (value < 0 || value >= count) return 0;
     *source = (int32_t)value;
@@ -218,7 +218,7 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
-/* Steps in a value: `half` (0.5: the nearest) and more of one count as a whole. */
+/* A value in steps, rounded; fractions of at least `half` (0.5: to the nearest) count as a step. */
 static int32_t steps_in(double value, double step, double half)
 {
     double units = value / step;

@@ -16,13 +16,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
 from athcodec import container as ct
 from athcodec.ath import Ath, Survey, Thresholds, survey
-from athcodec.clip import MotionClip
+from athcodec.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.decoder import Decoder
 from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
@@ -41,7 +41,6 @@ from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
 STATIC_METADATA = ("unit", "up_axis")
-WEIGHTS = "error_weights"  # metadata: name of the attribute that holds factors on the bound; or that attribute
 
 
 @dataclass(frozen=True)
@@ -78,8 +77,8 @@ class EncodingOptions:
 class Draft:
     """All that is decided about a file before its motion is coded, without the motion. It can be pickled.
 
-    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. `fingerprint` tells
-    a process that arrives at another hierarchy or rest pose for it than the one that made the draft.
+    With the same clip, which may have been opened again elsewhere, it goes to `code_segments` and `write`. By
+    `fingerprint` a process notices that it found another hierarchy or rest pose than the one that made the draft.
     """
 
     settings: Settings
@@ -121,7 +120,7 @@ def _completed(clip: MotionClip, found: Found | None,
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
     """The clip, which says where its weights are, and these as (N,) float64. Raises ClipError."""
-    name = weights if isinstance(weights, str) else WEIGHTS
+    name = weights if isinstance(weights, str) else ERROR_WEIGHTS
     attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
     if name not in attributes:
         raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
@@ -133,7 +132,7 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
     bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
     if bad.size:
         raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
-    return clip.replace(attributes=attributes, metadata=clip.metadata | {WEIGHTS: name}), values
+    return clip.replace(attributes=attributes, metadata=clip.metadata | {ERROR_WEIGHTS: name}), values
 
 
 def time_chunk(*times: np.ndarray) -> bytes:
@@ -260,7 +259,7 @@ class EncodingJob:
                 return math.inf
         return result.store.size(result.header)
 
-    def write(self, path: str | PathLike[str], out: BinaryIO, spool: BinaryIO, decided: _Decided,
+    def write(self, path: str | PathLike[str], out: BinaryIO, spool: IO[bytes], decided: _Decided,
               coded: Iterable[CodedSegment]) -> Summary:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)

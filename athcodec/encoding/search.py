@@ -85,7 +85,7 @@ def _moved(source: Source, segment: int) -> float:
 
 def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
            jobs: int | None = None) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
-    """Settings, and what follows from them: hierarchy and rest pose as coded, learned learned_modes."""
+    """Settings, and what follows from them: hierarchy and rest pose as coded, learned modes."""
     search = Search.of(source, ath, bound, effort, report, jobs)
     settings = search.found()
     prelude = search.prelude(settings)

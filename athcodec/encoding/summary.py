@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from athcodec.ath_file import Level
 
@@ -63,10 +64,10 @@ class Summary:
     raw_bytes: int
     max_error_bound: float
     relative_bound: float
-    table1: dict
+    table1: dict[str, float]
     levels: list[Level]
     chunk_bytes: dict[str, int]
-    choices: dict
+    choices: dict[str, Any]
     seams: tuple[Seam, ...] = ()
     found_branches: str | None = None
 

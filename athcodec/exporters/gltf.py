@@ -195,8 +195,8 @@ def _channels(glb: Glb, nodes: list[int], take: Take, poses: list[np.ndarray], u
 
 
 def _unit(quaternion: np.ndarray) -> list[float]:
-    wide = quaternion.astype(np.float64)
-    return (wide / np.linalg.norm(wide)).tolist()
+    exact = quaternion.astype(np.float64)
+    return (exact / np.linalg.norm(exact)).tolist()
 
 
 class _Morphed:
@@ -226,7 +226,7 @@ class _Morphed:
                      count: int) -> list[list[dict]]:
         """The accessors, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
-        for frame in range(self._motion.frame_count):
+        for _ in range(self._motion.frame_count):
             accessors.append([])
             for mesh, shape in zip(meshes, found):
                 index = glb.accessor(view, np.dtype(np.float32), len(shape.source), 3, byteOffset=place,

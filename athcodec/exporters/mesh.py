@@ -160,7 +160,7 @@ class PlyWriter:
             self._rows[name] = values
         face_header, faces = _ply_faces(motion)
         edge_count = 0 if motion.edges is None else len(motion.edges)
-        edge_header = ["element edge %d" % edge_count, "property int vertex1", "property int vertex2"]
+        edge_header = [f"element edge {edge_count}", "property int vertex1", "property int vertex2"]
         self._tail = faces + (np.asarray(motion.edges, "<i4").tobytes() if edge_count else b"")
         lines = ["ply", "format binary_little_endian 1.0", f"element vertex {motion.vertex_count}",
                  *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),

@@ -77,14 +77,15 @@ def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
-    if isinstance(names, list) and counts is not None and counts.dtype.kind in "iu" and counts.shape == (len(names),):
-        if (counts >= 0).all() and counts.sum(dtype=np.int64) == count and _fits(motion, counts):
-            if not isinstance(kinds, list) or len(kinds) != len(names):
-                kinds = [_kind(motion, counts, i) for i in range(len(names))]
-            details = metadata.get("part_usd")
-            if not isinstance(details, list) or len(details) != len(names):
-                details = [{}] * len(names)
-            return [str(name) for name in names], counts.astype(np.int64), kinds, details
+    described = (isinstance(names, list) and counts is not None and counts.dtype.kind in "iu"
+                 and counts.shape == (len(names),) and (counts >= 0).all() and counts.sum(dtype=np.int64) == count)
+    if described and _fits(motion, counts):
+        if not isinstance(kinds, list) or len(kinds) != len(names):
+            kinds = [_kind(motion, counts, i) for i in range(len(names))]
+        details = metadata.get("part_usd")
+        if not isinstance(details, list) or len(details) != len(names):
+            details = [{}] * len(names)
+        return [str(name) for name in names], counts.astype(np.int64), kinds, details
     return ["plant"], np.array([count]), [_kind(motion, np.array([count]), 0)], [{}]
 
 

@@ -407,10 +407,10 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
 def _descriptor(text: str) -> ArrayDescriptor:
     """That of a JSON text; an empty one where it cannot be parsed."""
     try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()) else {}
+        found = ArrayDescriptor(**json.loads(text))
+    except (ValueError, TypeError, RecursionError):
+        return ArrayDescriptor()
+    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
 
 
 # ---- positions ----

@@ -432,7 +432,7 @@ class _Binary:
 
 def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, np.ndarray]:
     """{property: (count,) values, or (counts, values) of a list}."""
-    none = {name: 0 for name in element.lists}
+    none = dict.fromkeys(element.lists, 0)
     if not element.properties or not element.count:
         return {}
     if source.rest() < element.count:
@@ -454,7 +454,7 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, n
 def _first_lengths(source: _Text | _Binary, element: PlyElement) -> dict[str, int]:
     """How long the lists of the next row are: each says it behind those before it."""
     lengths: dict[str, int] = {}
-    for position, (name, dtype, counted_by) in enumerate(element.properties):
+    for position, (name, _, counted_by) in enumerate(element.properties):
         if counted_by:
             until = PlyElement(element.name, element.count, [*element.properties[:position], (name, counted_by, "")])
             length = int(source.rows(until, 1, lengths)[name][0])

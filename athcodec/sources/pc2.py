@@ -3,7 +3,7 @@
 PC2 says at which frame the cache starts and how many frames there are from sample to sample, but no rate: that is
 options.fps. Without it frames come DEFAULT_FPS (30) a second, and the clip states a rate only where samples are not one
 frame apart. The faces come from a mesh beside it (see cached_mesh). Coordinates are taken as they are: Blender's own
-OBJ export turns its axes unless told not to, its point caches have the axes of the object.
+OBJ export turns its axes unless an option says otherwise, its point caches have the axes of the object.
 """
 
 from __future__ import annotations

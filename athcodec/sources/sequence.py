@@ -58,9 +58,9 @@ class Numbering:
         found = {}
         for name in os.listdir(self.folder):
             digits = name[len(self.prefix): len(name) - len(self.suffix)]
-            if digits.isascii() and digits.isdigit() and len(digits) <= len(str(LARGEST_NUMBER)):
-                if name == self.path(int(digits)).name:
-                    found[int(digits)] = self.folder / name
+            is_number = digits.isascii() and digits.isdigit() and len(digits) <= len(str(LARGEST_NUMBER))
+            if is_number and name == self.path(int(digits)).name:
+                found[int(digits)] = self.folder / name
         return dict(sorted(found.items()))
 
 

@@ -70,9 +70,9 @@ def _files(path: Path, options: ReadOptions) -> tuple[list[Path], np.ndarray, di
 def _index_of(path: Path) -> Path | None:
     """A .pvd beside a file that lists it."""
     for index in sorted(path.parent.glob("*.pvd")):
-        if path.is_file() and index.stat().st_size < 1 << 28 and path.name.encode() in index.read_bytes():
-            if path in [file for file, _ in _datasets(index)]:
-                return index
+        may_list = path.is_file() and index.stat().st_size < 1 << 28 and path.name.encode() in index.read_bytes()
+        if may_list and path in [file for file, _ in _datasets(index)]:
+            return index
     return None
 
 

@@ -13,7 +13,8 @@
  *     const xyz = file.positions(segments, file.frameAt(seconds, "loop", 0));
  *
  * Units and layout. Positions and errors are in the file's scene units, time is in seconds. Frames and segments
- * count from 0 over the whole file, whose clips come one after the other. Positions are x, y, z of one vertex after the other. Matrices are 3x4, row-major, 12 numbers:
+ * count from 0 over the whole file, whose clips come one after the other. Positions are x, y, z of one vertex
+ * after the other. Matrices are 3x4, row-major, 12 numbers:
  * x' = m[0] x + m[1] y + m[2] z + m[3] and so on. Order "file": every subtree of the plant is one range of
  * vertices; branches and parts refer to it. Order "source": as in the clip that was encoded; FACES and EDGES
  * refer to it.
@@ -29,7 +30,8 @@ export const supported: boolean;
  * `supported` is false. */
 export const ready: Promise<void>;
 
-/** What is wrong with a file, or missing of it. */
+/** What is wrong with a file, or missing of it; `message` says where, what was found and what is allowed, in the words
+ * of C and Python. */
 export class AthError extends Error {
   /** Number in FORMAT.md, "Errors", if below 64; 66: bytes are missing; 68: the host has no memory left. */
   readonly code: number;

@@ -13,8 +13,9 @@ const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
 const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
-  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32", levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", isFloat64: "i32", epsilon: "f32",
-  xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
+  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
+  levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", isFloat64: "i32",
+  epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
 };
 const INFO_SIZE = 112;
 const CLIP = {
@@ -28,7 +29,7 @@ const CHUNK = {
 const CHUNK_SIZE = 32;
 const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth"];
 const PART = ["first", "count", "branch", "index"];
-const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // and what the sentence says
+const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
 const FAULT_SIZE = 56, FAULT_TEXT = 256;
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
@@ -61,7 +62,7 @@ async function compile() {
 }
 
 export const ready = compile();
-ready.catch(() => {}); // who awaits it sees it
+ready.catch(() => {}); // whoever awaits `ready` gets the error
 
 export class AthError extends Error {
   constructor(code, codeName, message, { chunk = -1, needed = 0 } = {}) {
@@ -378,7 +379,7 @@ export class AthFile {
     if (code !== OK) throw this.#core.error(code, what);
   }
 
-  // What `call` returns, given room for a fault, unless it is an error that the fault tells.
+  // What `call` returns, given the address of a fault; throws what it filled in unless the code is `allowed`.
   #checkFault(call, allowed = OK) {
     return this.#core.with(FAULT_SIZE, (fault) => {
       const code = call(fault);

@@ -1,5 +1,5 @@
 /* What the C decoder needs in WebAssembly beside its own sources: the memory functions, which become one
- * instruction each, and a look that ath.h's structs are as ath_decoder.template.mjs reads them. */
+ * instruction each, and checks that ath.h's structs are as ath_decoder.template.mjs reads them. */
 #include "ath.h"
 
 void *memcpy(void *restrict to, const void *restrict from, size_t size)

@@ -31,7 +31,7 @@ sys.path.append(str(ROOT / "tests"))  # for making files and reading them comple
 import hostile_files  # noqa: E402
 from files import with_checksum  # noqa: E402
 from fuzz import seeds  # noqa: E402
-from test_damage import mutations, spoilt_front, struct_fields, use  # noqa: E402
+from test_damage import corrupted_front, mutations, struct_fields, use  # noqa: E402
 
 VECTORS = ROOT / "spec" / "vectors" / "valid"
 SMALL = 4096
@@ -194,7 +194,7 @@ def corrupted(data: bytes, seed: int) -> int:
     """Changed fields of the front that are mostly consistent with each other, or changed contents of chunks."""
     rng = np.random.default_rng(seed)
     if seed % 2:
-        return within_limits(spoilt_front(rng, data))
+        return within_limits(corrupted_front(rng, data))
     parts = seeds.Parts.of(data)
     chunks = list(parts.chunks)
     for i in rng.integers(len(chunks), size=rng.integers(1, 3)):

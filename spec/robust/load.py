@@ -394,7 +394,7 @@ def run(budget: float) -> list[Row]:
             many(files[0], 1_000),
             budgets(files[0]),
             failing_allocations(files[1], budget / 3),
-            little_space(files[1], [*range(0, 8), *range(8, 40, 4)], time.monotonic() + budget / 3),
+            little_space(files[1], [*range(8), *range(8, 40, 4)], time.monotonic() + budget / 3),
         ]
 
 

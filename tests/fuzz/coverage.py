@@ -33,9 +33,9 @@ def _tool(name: str, clang: str) -> str | None:
     version = subprocess.run([clang, "--version"], capture_output=True, text=True).stdout
     major = re.search(r"version (\d+)", version)
     folder = Path(os.path.realpath(shutil.which(clang) or clang)).parent
-    for each in (f"{folder}/{name}", f"{name}-{major[1]}" if major else name, name):
-        if shutil.which(each):
-            return each
+    for program in (f"{folder}/{name}", f"{name}-{major[1]}" if major else name, name):
+        if shutil.which(program):
+            return program
     return None
 
 
@@ -91,16 +91,16 @@ def _parse(lcov: str) -> list[Covered]:
 
 def as_text(files: list[Covered]) -> str:
     lines = [f"{'file':<22} {'lines':>6} {'missed':>6} {'%':>6}"]
-    for each in files:
-        lines.append(f"{each.name:<22} {each.lines:>6} {len(each.missed):>6} {100 * each.share:>6.1f}")
-        source = (targets.CORE / each.name).read_text().splitlines()
-        lines += [f"    {line}: {source[line - 1].strip()}" for line in each.missed]
+    for file in files:
+        lines.append(f"{file.name:<22} {file.lines:>6} {len(file.missed):>6} {100 * file.share:>6.1f}")
+        source = (targets.CORE / file.name).read_text().splitlines()
+        lines += [f"    {line}: {source[line - 1].strip()}" for line in file.missed]
     whole = total(files)
     lines.append(f"{'all':<22} {whole.lines:>6} {len(whole.missed):>6} {100 * whole.share:>6.1f}")
     return "\n".join(lines)
 
 
 def total(files: list[Covered]) -> Covered:
-    return Covered("all", sum(each.lines for each in files), tuple(line for each in files for line in each.missed))
+    return Covered("all", sum(file.lines for file in files), tuple(line for file in files for line in file.missed))
 
 

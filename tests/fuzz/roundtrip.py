@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-
 from plants import awkward_plants
 from test_roundtrip import assert_comes_back
 

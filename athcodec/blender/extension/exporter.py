@@ -137,7 +137,8 @@ def _unit(scene, world: bool) -> dict:
     if scene.unit_settings.system == "NONE" or not world:
         return {}
     scale = scene.unit_settings.scale_length
-    return {"unit": symbol for symbol, metres in METRES.items() if math.isclose(metres, scale, rel_tol=1e-5)}
+    symbols = [symbol for symbol, metres in METRES.items() if math.isclose(metres, scale, rel_tol=1e-5)]
+    return {"unit": symbols[-1]} if symbols else {}
 
 
 def _static(mesh, obj) -> dict:
