@@ -144,11 +144,11 @@ static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, co
     memcpy(scratch->rows, tracks, rows * frames * sizeof *tracks);
 }
 
-static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
-                     const double *source, double *local)
+static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at, const double *source, double *local)
 {
     for (int32_t i = 0; i < piece->count; i++)
-        ath_into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
+        ath_into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T,
+                            local + (size_t)i * 3 * (size_t)T);
 }
 
 /* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. */
@@ -164,10 +164,10 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
         const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
         double step = ath_shift_step(piece, base);
-        for (int32_t i = 0; i < 3 * T; i++)
-            scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
-        if (before) ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift,
-                                       rows->coarse_shift, rows->predicted_shift);
+        for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
+        if (before)
+            ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->coarse_shift,
+                              rows->predicted_shift);
         code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
         ath_move_point(T, scratch->track, scratch->at.point);
         if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
@@ -194,7 +194,8 @@ static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t
     memcpy(decoded->tracks + (size_t)p * 6 * T, scratch->rotation, 3 * T * sizeof(double));
     memcpy(decoded->tracks + (size_t)p * 6 * T + 3 * T, scratch->shift, 3 * T * sizeof(double));
     int32_t *extents = decoded->extents + 2 * p;
-    extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames), ath_row_extent(rows->rotation, motion->frames, motion->frames));
+    extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames),
+                         ath_row_extent(rows->rotation, motion->frames, motion->frames));
     extents[1] = 0;
     for (int32_t r = 0; r < piece->rank; r++) {
         int32_t count = ath_row_extent(ath_row(rows->modes, r, motion->frames), motion->frames, motion->frames);
@@ -208,7 +209,8 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     const ath_coarse *layer = motion->before;
     size_t T = (size_t)motion->frames;
     ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
-                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p], layer->extents[2 * p + 1]};
+                               layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p],
+                               layer->extents[2 * p + 1]};
     int cosines = layer->in_cosines[p] && motion->streams[plan->pieces[p].level].temporal == motion->cosines;
     if (!cosines && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
@@ -226,7 +228,8 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
         ath_coarse_rows(motion, piece, p, &rows);
     }
     if (motion->decoded) memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
-    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, dead_zone, scratch->placed);
+    analyse_tracks(plan, motion, piece, motion->before ? &before : 0, &rows, scratch, source, dead_zone,
+                   scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
     ath_to_local(plan, T, piece, &scratch->at, source + (size_t)piece->first * 3 * (size_t)T, scratch->placed);
     ath_project(plan, T, piece, piece->rank, scratch->placed, scratch->rows);
@@ -244,8 +247,7 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
                  int32_t stop, const double *source, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
-    for (int32_t p = first; p < stop; p++)
-        analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+    for (int32_t p = first; p < stop; p++) analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
 }
 
 void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
@@ -306,8 +308,8 @@ static int32_t half_octaves(double step)
 }
 
 static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
-                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source,
-                         double level_step, double dead_zone)
+                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double level_step,
+                         double dead_zone)
 {
     const ath_piece *piece = plan->pieces + node->piece;
     int32_t T = motion->frames;

@@ -67,7 +67,8 @@ static int check_memory(const ath_header *header, const ath_limits *limits, uint
 
 static int check_least_memory(const ath_header *header, const ath_limits *limits, ath_fault_info *fault)
 {
-    return check_memory(header, limits, (header->frame_count + header->segment_count - 1) / header->segment_count, fault);
+    return check_memory(header, limits, (header->frame_count + header->segment_count - 1) / header->segment_count,
+                        fault);
 }
 
 static ath_limits limits_or_default(const ath_limits *limits)
@@ -420,8 +421,8 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
 }
 
 /* Parses header and tables into the file, once these are known to fit into the memory. */
-static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
-                      ath_fault_info *fault)
+static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                      const ath_limits *limits, ath_fault_info *fault)
 {
     ath_header header;
     uint64_t needed;
@@ -515,8 +516,9 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
-        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                                 layer_rest_steps(file, q - 1), layer_rest(file, q - 1), layer->rest_steps, layer->rest);
+        result =
+            ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
+                            layer_rest_steps(file, q - 1), layer_rest(file, q - 1), layer->rest_steps, layer->rest);
     return result != ATH_OK ? result : all_finite(layer->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
@@ -527,7 +529,8 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
     const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, ath_level_of_layer(file, q), 0);
     layer->plan.rest = layer_rest(file, q - 1);
     if (!chunk) {
-        memcpy(layer->rest_steps, layer_rest_steps(file, q - 1), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
+        memcpy(layer->rest_steps, layer_rest_steps(file, q - 1),
+               3 * (size_t)file->header.vertex_count * sizeof(int32_t));
         return ATH_OK;
     }
     ath_bytes content = {chunk->bytes, chunk->length};
@@ -572,7 +575,8 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
         double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double) + 16);
         if (layer->bases_count > 0) {
             ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
-            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (double *)file->scratch, bases);
+            ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (double *)file->scratch,
+                           bases);
             layer->plan.bases = bases;
         } else {
             const ath_piece *before = ath_layer_plan(file, q - 1)->pieces;
@@ -590,7 +594,8 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
 int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride)
 {
     int32_t layer = last_layer(file, level);
-    if (level < 0 || level >= file->info.level_count || (layer > 0 && !file->layers[layer].rest_known)) return ATH_BAD_ARGUMENT;
+    if (level < 0 || level >= file->info.level_count || (layer > 0 && !file->layers[layer].rest_known))
+        return ATH_BAD_ARGUMENT;
     if (layer == 0 || layer_rest(file, layer) == file->rest) {
         ath_rest_float64(file, order, xyz, stride);
         return ATH_OK;
@@ -704,7 +709,8 @@ int32_t ath_segment_of(const ath_file *file, int32_t frame)
     const ath_clip *clip = ath_file_clip(file, frame);
     int64_t within = frame - clip->first_frame;
     int32_t segment = clip->first_segment + (int32_t)(within * clip->segment_count / clip->frame_count);
-    while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame) segment++;
+    while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame)
+        segment++;
     return segment;
 }
 
@@ -718,7 +724,8 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     uint32_t found = chunk->bytes ? ath_crc32c(0, chunk->bytes, chunk->length) : 0;
     why->code = ATH_OK;
-    if (!chunk->bytes) ath_refuse(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, 0, chunk->length, chunk->length);
+    if (!chunk->bytes)
+        ath_refuse(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, 0, chunk->length, chunk->length);
     else if (found != chunk->checksum)
         ath_refuse(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, found, chunk->checksum, chunk->checksum);
     return ath_fault_at(why, chunk, index);
@@ -756,7 +763,8 @@ void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size
 
 void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
 {
-    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count && file->chunks[i].offset < offset + size; i++)
+    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count && file->chunks[i].offset < offset + size;
+         i++)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 

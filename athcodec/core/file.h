@@ -8,9 +8,9 @@
 /* A refinement: the plant at a finer precision. Its pieces are all of its level's; a layer that refines no rest pose has that of
  * the layer before, and its bases. */
 typedef struct {
-    ath_plan plan;        /* plan.bases null: not built yet */
+    ath_plan plan; /* plan.bases null: not built yet */
     ath_piece *pieces;
-    double *rest;         /* null: that of the layer before */
+    double *rest; /* null: that of the layer before */
     int32_t *rest_steps;
     uint64_t bases_count; /* 0: those of the layer before, or not known yet */
     int32_t rest_known;
@@ -21,26 +21,26 @@ struct ath_file {
     ath_info info;
     ath_plan plan;
     ath_chunk *chunks;
-    float *errors;               /* level_count x segment_count x (max, rms) */
+    float *errors; /* level_count x segment_count x (max, rms) */
     ath_clip *clips;
-    char *names;                 /* of the clips, NAME_BYTES each */
-    float *seams;                /* clip_count x full_level_count */
+    char *names;  /* of the clips, NAME_BYTES each */
+    float *seams; /* clip_count x full_level_count */
     ath_branch *branches;
     int32_t *branch_source, *vertex_source;
     double *times;
-    double *rest;                /* relative to the origin */
-    double *stored_rest;         /* as stored, where the file holds it exactly, else null */
+    double *rest;        /* relative to the origin */
+    double *stored_rest; /* as stored, where the file holds it exactly, else null */
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
-    void *scratch;               /* of opening and building */
-    double *bases;               /* null until ath_build */
-    int32_t *rest_steps;         /* null where no layer refines the rest pose */
-    ath_layer layers[ATH_LAYERS]; /* 1 to layer_count - 1 */
+    void *scratch;                           /* of opening and building */
+    double *bases;                           /* null until ath_build */
+    int32_t *rest_steps;                     /* null where no layer refines the rest pose */
+    ath_layer layers[ATH_LAYERS];            /* 1 to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
-    int32_t longest;             /* frames of the longest segment */
-    uint32_t stems_levels;       /* bit d: level d has STEMS */
+    int32_t longest;                    /* frames of the longest segment */
+    uint32_t stems_levels;              /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };
 

@@ -13,7 +13,10 @@ size_t ath_motion_work(int32_t longest, int32_t frames)
     return 2 * scratch_rows(longest, frames) + (3 + 9 + 3 + 6) * (size_t)frames;
 }
 
-size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames) { return (size_t)attach_cache_rows * 3 * (size_t)frames; }
+size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames)
+{
+    return (size_t)attach_cache_rows * 3 * (size_t)frames;
+}
 
 ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
 {
@@ -410,7 +413,8 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     ath_attach(plan, motion, piece, scratch->at);
     memset(scratch->rotation, 0, 6 * (size_t)T * sizeof(double));
     if (ath_has_shift(piece)) {
-        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->shift);
+        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift,
+                      scratch->shift);
         ath_move_point(T, scratch->shift, scratch->at.point);
     }
     if (rotation_step > 0.0) {
@@ -671,7 +675,8 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
         for (; k + PREDICTED <= count; k += PREDICTED) {
             double sums[PREDICTED];
             project_waves(T, stream->temporal + (size_t)k * (size_t)T, row, sums);
-            for (int32_t i = 0; i < PREDICTED; i++) predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, least);
+            for (int32_t i = 0; i < PREDICTED; i++)
+                predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, least);
         }
         for (; k < count; k++)
             predicted[axis * T + k] =
@@ -723,8 +728,8 @@ ATH_HOT void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece
     }
 }
 
-void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
-                        ath_piece_rows *rows)
+void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                        const ath_piece_before *before, ath_piece_rows *rows)
 {
     const ath_stream *stream = ath_base_stream(motion, piece);
     double step = ath_rotation_step(plan, piece, stream);
@@ -749,8 +754,8 @@ static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows
         }
 }
 
-void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
-                       const ath_scratch *scratch, ath_piece_rows *rows)
+void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
 {
     int32_t T = motion->frames, modes = before->frequencies > 0 ? before->modes : 0;
     if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
@@ -769,7 +774,8 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
                           rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0,
                           ath_row(rows->predicted_modes, r, T));
     }
-    for (int32_t r = modes; r < piece->rank; r++) memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
+    for (int32_t r = modes; r < piece->rank; r++)
+        memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
 }
 
 int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)

@@ -6,19 +6,19 @@
 
 /* How the integers of one level and segment are to be read. */
 typedef struct ath_stream {
-    double step;             /* quantisation step, scene units */
+    double step;                 /* quantisation step, scene units */
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
-    const double *temporal;  /* temporal_rank x frames, orthonormal rows */
+    const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
     int32_t reserved;
 } ath_stream;
 
 /* The layer before, from which a refinement predicts: what all pieces have become there. */
 typedef struct ath_coarse {
-    double *placed;   /* vertex_count x 3 x frames: positions less the origin */
+    double *placed;                           /* vertex_count x 3 x frames: positions less the origin */
     const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
-    const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
-    const uint8_t *in_cosines;   /* piece_count: whether all rows of a piece are in cosines */
+    const int32_t *shape_counts;              /* piece_count; null: no piece has shapes */
+    const uint8_t *in_cosines;                /* piece_count: whether all rows of a piece are in cosines */
     double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
     int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
 } ath_coarse;
@@ -32,7 +32,7 @@ typedef struct ath_motion {
     const ath_coarse *before;  /* of a refinement; else null */
     ath_coarse *decoded;       /* encoder: filled for the next layer; may be null */
     int32_t frames;
-    int32_t ratio;             /* of a refinement: the steps of the layer before over this one's */
+    int32_t ratio; /* of a refinement: the steps of the layer before over this one's */
 } ath_motion;
 
 /* Rows of integers over temporal frequency, 3 x frames each. */
@@ -43,25 +43,27 @@ enum { ATH_SHAPE_MODES = 16, ATH_SHAPE_NUMBERS = 3 * ATH_SHAPE_MODES };
 
 /* The integers of one piece. */
 typedef struct {
-    int32_t *modes;        /* rank rows */
+    int32_t *modes; /* rank rows */
     int32_t *rotation, *shift;
-    int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
-    int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
-    const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
-    int32_t *predicted_modes, *predicted_rotation, *predicted_shift; /* of a refinement, as large as the rows; else null */
-    const int32_t *coarse_modes, *coarse_rotation, *coarse_shift;    /* rows of the layer before; null: of other functions */
+    int32_t *counts;      /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
+    int32_t shape_count;  /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
+    const double *shapes; /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
+    int32_t *predicted_modes, *predicted_rotation,
+        *predicted_shift; /* of a refinement, as large as the rows; else null */
+    const int32_t *coarse_modes, *coarse_rotation,
+        *coarse_shift; /* rows of the layer before; null: of other functions */
 } ath_piece_rows;
 
 /* A piece as the layer before has it. */
 typedef struct {
-    const double *placed;            /* count x 3 x frames */
-    const double *rotation, *shift;  /* 3 x frames */
-    int32_t frequencies, modes;      /* that its rows reach; 0 frequencies: nothing is predicted from it */
+    const double *placed;           /* count x 3 x frames */
+    const double *rotation, *shift; /* 3 x frames */
+    int32_t frequencies, modes;     /* that its rows reach; 0 frequencies: nothing is predicted from it */
 } ath_piece_before;
 
 /* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
 typedef struct {
-    int32_t *rows;         /* 4 rows */
+    int32_t *rows; /* 4 rows */
     int32_t *step;
 } ath_node_rows;
 
@@ -75,7 +77,7 @@ typedef struct {
     double *rows;   /* of the longest piece, or of a map, x 3 x frames: coefficients over time */
     double *placed; /* as many: positions */
     ath_frames at;
-    double *track;  /* 3 x frames */
+    double *track;            /* 3 x frames */
     double *rotation, *shift; /* 3 x frames: what a refinement is to know of these tracks, one behind the other */
 } ath_scratch;
 
@@ -108,21 +110,21 @@ void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, con
 void ath_predict_track(const ath_stream *stream, int32_t frames, int32_t frequencies, double step, int32_t ratio,
                        const double *track, const int32_t *coarse, int32_t *predicted);
 /* Those of a piece's tracks, which make its attach frame. */
-void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
-                        ath_piece_rows *rows);
+void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                        const ath_piece_before *before, ath_piece_rows *rows);
 /* The same for the modes of a piece, from its vertices in the layer before seen from its attach frame now (scratch->at). */
-void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
-                       const ath_scratch *scratch, ath_piece_rows *rows);
+void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
 /* out = R^T (x - c), 3 x frames */
 void ath_into_rest_space(int32_t frames, const ath_frames *at, const double *x, double *out);
 /* Vertices of a piece in its attach frame, less those of the rest pose. */
-void ath_to_local(const ath_plan *plan, int32_t frames, const ath_piece *piece, const ath_frames *at, const double *placed,
-                  double *local);
+void ath_to_local(const ath_plan *plan, int32_t frames, const ath_piece *piece, const ath_frames *at,
+                  const double *placed, double *local);
 /* Tracks of `count` modes from that, 3 x frames each. */
 void ath_project(const ath_plan *plan, int32_t frames, const ath_piece *piece, int32_t count, const double *local,
                  double *rows);
-void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step, const int32_t *quantised,
-                          double *row);
+void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step,
+                          const int32_t *quantised, double *row);
 /* x := c + R x, 3 x frames. */
 void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
@@ -184,9 +186,6 @@ ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)
 }
 
 /* Adds a correction to a position; nothing else does. */
-ATH_INLINE double ath_corrected(double position, int32_t steps, double step)
-{
-    return position + (double)steps * step;
-}
+ATH_INLINE double ath_corrected(double position, int32_t steps, double step) { return position + (double)steps * step; }
 
 #endif

@@ -34,7 +34,8 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
         most = 3 * ath_shape_modes(piece);
     }
     int32_t given = ath_min(count, most) - from;
-    int32_t own = (int32_t)code_unsigned(coder, &model->count, (uint32_t)model->count_before[part] * 16, (uint32_t)given);
+    int32_t own =
+        (int32_t)code_unsigned(coder, &model->count, (uint32_t)model->count_before[part] * 16, (uint32_t)given);
     model->count_before[part] = own;
     if (own > most - from) return -1;
     for (int32_t s = from; s < from + own; s++)
@@ -57,8 +58,9 @@ static void refined_shape_model_init(refined_shape_model *model)
 
 /* All shapes of a piece in a refinement: those that the layer before has too, `coarse`, are coded about theirs, times
  * 2 ^ shift. Returns their number, -1 where it cannot be. */
-static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model, const ath_piece *piece, int32_t coarse_count,
-                                   const int32_t *coarse, int32_t shift, int32_t count, int32_t *integers)
+static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model, const ath_piece *piece,
+                                   int32_t coarse_count, const int32_t *coarse, int32_t shift, int32_t count,
+                                   int32_t *integers)
 {
     static const int32_t nothing[ATH_SHAPE_NUMBERS];
     int32_t modes = ath_shape_modes(piece), above_count = -1;
@@ -69,7 +71,8 @@ static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model,
         int32_t predicted[ATH_SHAPE_NUMBERS];
         row_prediction prediction = {predicted, known, 0, ATH_SHAPE_MODES, 1u << shift};
         for (int32_t i = 0; i < ATH_SHAPE_NUMBERS; i++) predicted[i] = shifted(known[i], shift);
-        above_count = code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
+        above_count =
+            code_refined_row(coder, &model->rows, modes, s, above_count, &prediction, integers + s * ATH_SHAPE_NUMBERS);
     }
     return model->rows.rows.invalid ? -1 : own;
 }
@@ -107,25 +110,29 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
 
 /* What the stream of a refinement holds of a piece, once its predictions are known: tracks first, then modes, whose
  * predictions need the attach frame that the tracks make. */
-static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
-                               int32_t slot, const int32_t *predicted, const int32_t *coarse, const ath_piece_rows *rows, int32_t *row)
+static void code_refined_track(ath_coder *coder, refinement_model *model, const ath_stream *stream,
+                               const ath_motion *motion, int32_t slot, const int32_t *predicted, const int32_t *coarse,
+                               const ath_piece_rows *rows, int32_t *row)
 {
     row_prediction prediction = {predicted, coarse, 0, motion->frames, (uint32_t)motion->ratio};
     code_refined_row(coder, model, stream->temporal_rank, slot, -1, &prediction, row);
     note_count(rows, slot, ath_row_extent(row, motion->frames, motion->frames));
 }
 
-static void code_refined_tracks(ath_coder *coder, refinement_model *model, const ath_plan *plan, const ath_stream *stream,
-                                const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows)
+static void code_refined_tracks(ath_coder *coder, refinement_model *model, const ath_plan *plan,
+                                const ath_stream *stream, const ath_motion *motion, const ath_piece *piece,
+                                const ath_piece_rows *rows)
 {
     if (ath_has_shift(piece))
-        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows->coarse_shift, rows, rows->shift);
+        code_refined_track(coder, model, stream, motion, SHIFT_SLOT, rows->predicted_shift, rows->coarse_shift, rows,
+                           rows->shift);
     if (ath_rotation_step(plan, piece, stream) > 0.0)
-        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows->coarse_rotation, rows, rows->rotation);
+        code_refined_track(coder, model, stream, motion, ROTATION_SLOT, rows->predicted_rotation, rows->coarse_rotation,
+                           rows, rows->rotation);
 }
 
-static void code_refined_modes(ath_coder *coder, refinement_model *model, const ath_stream *stream, const ath_motion *motion,
-                               const ath_piece *piece, const ath_piece_rows *rows)
+static void code_refined_modes(ath_coder *coder, refinement_model *model, const ath_stream *stream,
+                               const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows)
 {
     int32_t T = motion->frames, above_count = -1;
     row_prediction prediction = {0, 0, 0, T, (uint32_t)motion->ratio};
@@ -135,7 +142,8 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)m * 3 * (size_t)T : 0;
         prediction.coarse = coarse;
         prediction.below = m + 1 < piece->rank ? (coarse ? coarse : prediction.row) + 3 * T : 0;
-        above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction, ath_row(rows->modes, m, T));
+        above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction,
+                                       ath_row(rows->modes, m, T));
         note_count(rows, m, ath_row_extent(ath_row(rows->modes, m, T), T, T));
     }
 }
@@ -186,7 +194,7 @@ typedef struct {
     number_model size;
     correction_row row[2]; /* of the vertex before and of this one; which is which: `turn` */
     int32_t turn;
-    int32_t before;        /* whether the two vertices before had any */
+    int32_t before; /* whether the two vertices before had any */
 } correction_model;
 
 static void correction_model_init(correction_model *model)
@@ -244,24 +252,27 @@ static void code_correction(ath_coder *coder, correction_model *model, const int
     }
 }
 
-static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames, const correction_row *above,
-                                  correction_row *row)
+static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames,
+                                  const correction_row *above, correction_row *row)
 {
     int any = 0, block_before = 0;
     for (int32_t from = 0, b = 1; from < frames; from += CORRECTION_BLOCK, b++) {
         int32_t to = ath_min(from + CORRECTION_BLOCK, frames);
         const uint8_t *blocks = above->blocks + b;
         int beside = (blocks[0] != 0) + 2 * ((blocks[-1] | blocks[0] | blocks[1]) != 0);
-        int block = to == frames && !any ? 1
-                    : coder_bit(coder, &model->block[block_before][beside], row->blocks[b] != 0);
+        int block =
+            to == frames && !any ? 1 : coder_bit(coder, &model->block[block_before][beside], row->blocks[b] != 0);
         int found = 0;
         block_before = block;
         any |= block;
         for (int32_t t = from; block && t < to; t++) {
             int earlier = has_correction(row, t - 1) ? 2 : has_correction(row, t - 2) ? 1 : 0;
-            int near = has_correction(above, t) ? 2 : has_correction(above, t - 1) | has_correction(above, t + 1) ? 1 : 0;
-            int here = t == to - 1 && !found ? 1
-                       : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
+            int near = has_correction(above, t)                                      ? 2
+                       : has_correction(above, t - 1) | has_correction(above, t + 1) ? 1
+                                                                                     : 0;
+            int here = t == to - 1 && !found
+                           ? 1
+                           : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
             if (!here) continue;
             found = 1;
             code_correction(coder, model, earlier == 2 ? row->q[t - 1] : above->q[t], row->q[t]);

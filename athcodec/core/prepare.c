@@ -20,7 +20,7 @@ typedef struct {
 typedef struct {
     ath_coder coder;
     coefficient_model *model;
-    refinement_model *refined;    /* of a refinement, in its place */
+    refinement_model *refined; /* of a refinement, in its place */
     uint32_t *history;
     double *temporal;
     const ath_chunk *chunk; /* null: the level has none, or it is not wanted */
@@ -72,10 +72,10 @@ struct ath_work {
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
-    int32_t index, level;    /* of the segment in preparation */
-    int32_t layer;           /* the last one that it takes */
-    int32_t next;            /* level of CHECKSUMS and HEADS, piece of PIECES */
-    int32_t next_kind;       /* of CHECKSUMS */
+    int32_t index, level; /* of the segment in preparation */
+    int32_t layer;        /* the last one that it takes */
+    int32_t next;         /* level of CHECKSUMS and HEADS, piece of PIECES */
+    int32_t next_kind;    /* of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
@@ -272,7 +272,8 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     ath_segment *segment = (ath_segment *)segment_memory;
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
-    if (!file->bases || !ath_layer_plan(file, ath_layer_of(file, level))->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (!file->bases || !ath_layer_plan(file, ath_layer_of(file, level))->bases
+        || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     int32_t frames = ath_file_frames(file, index);
@@ -325,7 +326,8 @@ static int check_some(ath_work *work)
 {
     const ath_chunk *chunk = chunk_to_check(work);
     if (chunk && work->crc_at < chunk->length) {
-        uint32_t left = chunk->length - work->crc_at, size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+        uint32_t left = chunk->length - work->crc_at,
+                 size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
         work->crc = ath_crc32c(work->crc, chunk->bytes + work->crc_at, size);
         work->crc_at += size;
     }
@@ -342,8 +344,8 @@ static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reade
     int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1);
     size_t count = (size_t)head->rank * (size_t)frames;
     int32_t *integers = (int32_t *)(void *)reader->temporal + count;
-    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames, limit,
-                                     integers);
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames,
+                                     limit, integers);
     double unit = 1.0 / (double)limit;
     for (size_t i = 0; result == ATH_OK && i < count; i++) reader->temporal[i] = (double)integers[i] * unit;
     stream->temporal = reader->temporal;
@@ -425,8 +427,7 @@ static int open_level(ath_work *work)
 
 static void clear_row(int32_t *row, int32_t frames, int32_t *count)
 {
-    for (int32_t axis = 0; axis < 3 && *count > 0; axis++)
-        memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
+    for (int32_t axis = 0; axis < 3 && *count > 0; axis++) memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
     *count = 0;
 }
 
@@ -474,8 +475,8 @@ static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
     shapes_reader *reader = work->shapes + piece->level;
     layer_work *layer = work->layers + q, *before = layer - 1;
     if (!reader->chunk) return ATH_OK;
-    int32_t count = code_refined_shapes(&reader->coder, reader->refined, piece, before->rows.shape_count, before->shape_integers,
-                                        reader->shift, 0, layer->shape_integers);
+    int32_t count = code_refined_shapes(&reader->coder, reader->refined, piece, before->rows.shape_count,
+                                        before->shape_integers, reader->shift, 0, layer->shape_integers);
     if (count < 0 || !ath_unit_shapes(count, layer->shape_integers, layer->unit_shapes))
         return blame(work, reader->chunk, ATH_BAD_CHUNK);
     layer->rows.shape_count = count;
@@ -489,7 +490,8 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     const layer_work *coarse = layer - 1;
     const ath_piece *piece = coarse->plan->pieces + p;
     ath_piece_before *before = &layer->before;
-    int32_t T = layer->motion.frames, cosines = work->streams[layer->plan->pieces[p].level].temporal == layer->motion.cosines;
+    int32_t T = layer->motion.frames,
+            cosines = work->streams[layer->plan->pieces[p].level].temporal == layer->motion.cosines;
     before->placed = placed;
     before->rotation = coarse->scratch.rotation;
     before->shift = coarse->scratch.shift;
@@ -596,8 +598,9 @@ static int read_exact_point(ath_work *work, size_t at)
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
         known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
-                                       : (double)((const float *)work->segment->positions)[at + k];
-    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number)) return 0;
+                                             : (double)((const float *)work->segment->positions)[at + k];
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
+        return 0;
     for (size_t k = 0; k < 3; k++) {
         if (work->segment->is_float64)
             ((double *)work->segment->positions)[at + k] = number[k];

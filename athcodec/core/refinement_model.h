@@ -31,7 +31,10 @@ ATH_INLINE int32_t shifted(int32_t coarse, int32_t shift)
 }
 
 /* Steps of the layer before that a prediction stands for. */
-ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio) { return (magnitude_of(predicted) + ratio / 2) / ratio; }
+ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
+{
+    return (magnitude_of(predicted) + ratio / 2) / ratio;
+}
 
 /* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */
 typedef struct {
@@ -69,25 +72,31 @@ static int32_t differing_frequencies(const int32_t *row, const int32_t *predicte
 }
 
 /* expected: of the differences around this one, in 1/16. */
-static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction, int32_t axis,
-                                       int32_t k, uint32_t expected, int32_t difference)
+static int32_t code_refined_difference(ath_coder *coder, refinement_model *model, const row_prediction *prediction,
+                                       int32_t axis, int32_t k, uint32_t expected, int32_t difference)
 {
     int32_t predicted = prediction->row[axis * prediction->frames + k];
     int known = coarse_at(prediction, prediction->coarse ? prediction->coarse : prediction->row, axis, k) > 0;
-    expected = !known ? expected + 2 * loudness(prediction, axis, k) : prediction->ratio > 1 ? 4 * prediction->ratio : expected;
+    expected = !known                  ? expected + 2 * loudness(prediction, axis, k)
+               : prediction->ratio > 1 ? 4 * prediction->ratio
+                                       : expected;
     uint32_t magnitude = code_unsigned(coder, &model->numbers[known], expected, magnitude_of(difference));
     if (magnitude == 0) return 0;
     int negative = predicted < 0;
     if (predicted == 0)
         negative = coder_raw_bit(coder, difference < 0);
     else
-        negative ^= coder_bit(coder, &model->sign[magnitude == 1 ? 0 : magnitude < 4 ? 1 : 2], (difference < 0) != negative);
+        negative ^= coder_bit(coder,
+                              &model->sign[magnitude == 1  ? 0
+                                           : magnitude < 4 ? 1
+                                                           : 2],
+                              (difference < 0) != negative);
     return negative ? -(int32_t)magnitude : (int32_t)magnitude;
 }
 
 /* As code_row; the row becomes its prediction and the differences that are coded. */
-static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, int32_t rank, int32_t slot, int32_t above_count,
-                                const row_prediction *prediction, int32_t *row)
+static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, int32_t rank, int32_t slot,
+                                int32_t above_count, const row_prediction *prediction, int32_t *row)
 {
     coefficient_model *model = &refinement->rows;
     int32_t frames = prediction->frames;
@@ -105,7 +114,8 @@ static int32_t code_refined_row(ath_coder *coder, refinement_model *refinement, 
             uint32_t *near = last[axis];
             uint32_t around = axis == 0 ? history[k] : (beside * 16 / (uint32_t)axis + history[k]) / 2;
             uint32_t expected = ((2 * near[0] + near[1] + near[2]) * 16 + common + around * 8) / 16;
-            int32_t difference = code_refined_difference(coder, refinement, prediction, axis, k, expected, row[at] - predicted[at]);
+            int32_t difference =
+                code_refined_difference(coder, refinement, prediction, axis, k, expected, row[at] - predicted[at]);
             if (!ENCODING) row[at] = predicted[at] + difference;
             near[2] = near[1];
             near[1] = near[0];

@@ -29,8 +29,7 @@ static void hierarchy_model_init(hierarchy_model *model)
 static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
 {
     int32_t coded = 0;
-    for (int32_t i = 0; i < 3; i++)
-        coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
+    for (int32_t i = 0; i < 3; i++) coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
     return coded;
 }
 
@@ -171,7 +170,7 @@ enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1
 typedef struct {
     const int32_t *coarse; /* null: nothing is known */
     const double *before;
-    int32_t *steps;        /* filled for the next layer; may be null */
+    int32_t *steps; /* filled for the next layer; may be null */
 } rest_layer;
 
 typedef struct {
@@ -228,8 +227,8 @@ static int32_t steps_in(double value, double step, double half)
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
-static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch, int32_t i,
-                             double step, const double *source, double *rest)
+static void code_rest_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
+                             int32_t i, double step, const double *source, double *rest)
 {
     double predicted[3], *out = rest + 3 * (size_t)(branch->first + i);
     int32_t starting = i < 2;
@@ -260,8 +259,8 @@ static const double *rest_basis(rest_model *model, int32_t n)
     return basis;
 }
 
-static void steps_of_run(int32_t n, const double *basis, double step, double half, const double base[3], const double *run,
-                         int32_t *row)
+static void steps_of_run(int32_t n, const double *basis, double step, double half, const double base[3],
+                         const double *run, int32_t *row)
 {
     for (int32_t k = 0; k < 3; k++)
         for (int32_t m = 0; m < n; m++) {
@@ -308,13 +307,14 @@ static void code_rest_run(ath_coder *coder, rest_model *model, const rest_layer 
 }
 
 /* A beam is cut into runs of like length, each of which hangs on the vertex before it. */
-static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch, double step,
-                           const double *source, double *rest)
+static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
+                           double step, const double *source, double *rest)
 {
     int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
     if (from) code_rest_vertex(coder, model, layer, branch, 0, step, source, rest);
     for (int32_t r = 0; r < runs; r++) {
-        int32_t start = from + (int32_t)((int64_t)left * r / runs), end = from + (int32_t)((int64_t)left * (r + 1) / runs);
+        int32_t start = from + (int32_t)((int64_t)left * r / runs),
+                end = from + (int32_t)((int64_t)left * (r + 1) / runs);
         size_t before = start > 0 ? (size_t)(branch->first + start - 1) : (size_t)branch->attach;
         double base[3] = {rest[3 * before], rest[3 * before + 1], rest[3 * before + 2]};
         code_rest_run(coder, model, layer, branch->first + start, end - start, base, step, source, rest);

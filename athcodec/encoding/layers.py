@@ -64,22 +64,32 @@ def layer_digits(ladder: Sequence[float] | None, bound: float, diagonal: float) 
     return [most for i, most in enumerate(digits) if i == 0 or digits[i - 1] - most <= MOST_DIGITS]
 
 
-def layers_of(source: Source, prelude: CodedPrelude, settings: Settings, modes: LearnedModes | None,
-              digits: Sequence[int]) -> list[Layer]:
+def layers_of(
+    source: Source, prelude: CodedPrelude, settings: Settings, modes: LearnedModes | None, digits: Sequence[int]
+) -> list[Layer]:
     """The layers for settings and a prelude that were found for the last of them."""
     rests = _rests(source, prelude, digits)
     layers: list[Layer] = []
     for i, coarser in enumerate(digits):
-        plan = prelude.plan if coarser == 0 and i == 0 else Plan(prelude.plan.branches.copy(), source.hierarchy.vertex_count,
-                                                                source.pool, refined=i > 0)
+        plan = (
+            prelude.plan
+            if coarser == 0 and i == 0
+            else Plan(prelude.plan.branches.copy(), source.hierarchy.vertex_count, source.pool, refined=i > 0)
+        )
         if plan is not prelude.plan:
             plan.set_rest(rests[i][1])
         step = qz.single(settings.step * 2.0**coarser)
         limit = settings.limit if coarser == 0 else None
         own = replace(settings if i == 0 else _uniform(prelude.plan, settings), step=step, limit=limit)
-        layers.append(Layer(plan, own,
-                            modes if coarser == 0 or modes is None else nested(plan, modes, coarser),
-                            digits[i - 1] - coarser if i else 0, rests[i][0]))
+        layers.append(
+            Layer(
+                plan,
+                own,
+                modes if coarser == 0 or modes is None else nested(plan, modes, coarser),
+                digits[i - 1] - coarser if i else 0,
+                rests[i][0],
+            )
+        )
     return layers
 
 
@@ -88,9 +98,12 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
     levels = np.bincount(plan.base_level, plan.pieces["low_modes"], plan.level_count)
     levels += np.bincount(plan.pieces["level"], plan.pieces["rank"] - plan.pieces["low_modes"], plan.level_count)
     main = int(levels.argmax())
-    return replace(settings, level_steps=np.full(plan.level_count, settings.level_steps[levels > 0].min()),
-                   rotation_step_factors=(settings.rotation_step_factors[main],) * plan.level_count,
-                   learned_bases=(settings.learned_bases[main],) * plan.level_count)
+    return replace(
+        settings,
+        level_steps=np.full(plan.level_count, settings.level_steps[levels > 0].min()),
+        rotation_step_factors=(settings.rotation_step_factors[main],) * plan.level_count,
+        learned_bases=(settings.learned_bases[main],) * plan.level_count,
+    )
 
 
 def _rests(source: Source, prelude: CodedPrelude, digits: Sequence[int]) -> list[tuple]:
@@ -110,7 +123,9 @@ def _rests(source: Source, prelude: CodedPrelude, digits: Sequence[int]) -> list
 def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
     """What all segments share of the layers: {(level, kind): payload}."""
     first, *finer = layers
-    chunks = {(level, ct.SHAPES): stream for level, stream in streams.encode_learned_modes(first.plan, first.modes).items()}
+    chunks = {
+        (level, ct.SHAPES): stream for level, stream in streams.encode_learned_modes(first.plan, first.modes).items()
+    }
     before = first
     for level, layer in enumerate(finer, first.plan.level_count):
         modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, layer.digits)
@@ -150,11 +165,13 @@ class _SegmentCoder:
     def refine(self, layer: Layer, before: SegmentMotion, level: int) -> SegmentMotion:
         """One further level."""
         settings, last = layer.settings, layer.plan.level_count - 1
-        segment, bases = analyse(layer.plan, settings, self._positions, layer.modes, before, 1 << layer.digits,
-                                 layered=True)
+        segment, bases = analyse(
+            layer.plan, settings, self._positions, layer.modes, before, 1 << layer.digits, layered=True
+        )
         head = stems_head(settings, last, bases)
-        self.chunks[level, ct.STEMS] = ct.pack_refined_stems(1 << layer.digits, head,
-                                                             streams.encode_refinement(segment, last))
+        self.chunks[level, ct.STEMS] = ct.pack_refined_stems(
+            1 << layer.digits, head, streams.encode_refinement(segment, last)
+        )
         self._finish_with(segment, layer, level)
         return segment
 
@@ -174,8 +191,9 @@ class _SegmentCoder:
         return largest, math.sqrt(squares / (self._positions.shape[0] * self._positions.shape[2]))
 
 
-def code_segment(prelude: CodedPrelude, layers: Sequence[Layer], positions: np.ndarray,
-                 exact: np.ndarray | None = None) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
+def code_segment(
+    prelude: CodedPrelude, layers: Sequence[Layer], positions: np.ndarray, exact: np.ndarray | None = None
+) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
     """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.

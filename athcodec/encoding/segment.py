@@ -18,13 +18,7 @@ from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import (
-    LevelStream,
-    Plan,
-    SegmentMotion,
-    gather,
-    temporal_basis,
-)
+from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather, temporal_basis
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.segmentation import split_segments
@@ -63,10 +57,15 @@ class Source:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.sheet_like = ~_thin_branches(self)
-        self.clip_range_segments = [[(start + a, start + b) for a, b in
-                               split_segments(stop - start, self.clip.vertex_count, self.segment_frames,
-                                              ct.Limits.memory_bytes)]
-                              for start, stop in self.clip.clip_range_frames]
+        self.clip_range_segments = [
+            [
+                (start + a, start + b)
+                for a, b in split_segments(
+                    stop - start, self.clip.vertex_count, self.segment_frames, ct.Limits.memory_bytes
+                )
+            ]
+            for start, stop in self.clip.clip_range_frames
+        ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
     @property
@@ -193,7 +192,7 @@ def lags(source: Source, step: float) -> np.ndarray:
     for b in np.flatnonzero(source.sheet_like):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
-        lags[b] = qz.rest_lag(source.rest[first: first + count], source.rest[attach] if attach >= 0 else None, step)
+        lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
     return lags
 
 
@@ -238,14 +237,16 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
     """Second moments over time, (T, T), of those tracks of one level's stream that do not quantise to nothing, in units
     of their steps, and how many they are; of a segment that was analysed finely, in cosines."""
     pieces, slots = segment.plan.pieces, []
-    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]),
-                          (pieces["low_modes"], pieces["count"], pieces["level"])):
+    for low, high, at in (
+        (0, pieces["low_modes"], pieces["low_level"]),
+        (pieces["low_modes"], pieces["count"], pieces["level"]),
+    ):
         for piece in np.flatnonzero(at == level):
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     moments, count = np.zeros((segment.frames, segment.frames)), 0
-    parts = (segment.coefficients[chosen[at: at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
+    parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     for part in (*parts, segment.tracks[segment.plan.base_level == level]):
         rows = part.reshape(-1, segment.frames) / FINER
         rows = rows[(rows**2).sum(axis=1) > qz.DEAD_ZONE**2]
@@ -268,8 +269,7 @@ def _learn_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE)
-             for level in levels}
+    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE) for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
 
 
@@ -297,9 +297,15 @@ class Coded:
         return ct.pack_corrections(self.correction_step, stream)
 
 
-def analyse(plan: Plan, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None,
-            before: SegmentMotion | None = None, ratio: int = 1,
-            layered: bool = False) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
+def analyse(
+    plan: Plan,
+    settings: Settings,
+    positions: np.ndarray,
+    learned_modes: LearnedModes | None,
+    before: SegmentMotion | None = None,
+    ratio: int = 1,
+    layered: bool = False,
+) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
     """The integers of the stems, and the time bases of the levels that learn theirs; before, ratio, layered: as
     SegmentMotion has them."""
     bases = _learn_bases(plan, settings, positions)
@@ -332,8 +338,9 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, np
     return stems, heads
 
 
-def correct(decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings,
-            pool: ThreadPool) -> tuple[np.ndarray, float]:
+def correct(
+    decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings, pool: ThreadPool
+) -> tuple[np.ndarray, float]:
     """Corrections (K, 5) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
     factor = 1.0
     while True:
@@ -343,12 +350,14 @@ def correct(decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, sett
             return corrections, step
         factor *= 0.5
         if factor < 1e-3:
-            raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "
-                             f"{decoded.dtype.name} numbers")
+            raise BoundError(
+                f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {decoded.dtype.name} numbers"
+            )
 
 
-def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
-               learned_modes: LearnedModes | None) -> Coded:
+def code_stems(
+    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None
+) -> Coded:
     """Streams of the stems of a single layer and the corrections that keep the limit."""
     segment, bases = analyse(prelude.plan, settings, positions, learned_modes)
     stems, heads = stem_streams(segment, settings, bases)
