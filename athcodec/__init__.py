@@ -20,9 +20,29 @@ if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
 
 __version__ = "0.1.0"
 __all__ = [
-           "Ath", "AthFile", "ClipView", "Decoder", "Found", "MotionClip", "Summary", "Thresholds", "build_ath", "encode",
-           "errors", "find_branches", "join", "looped", "open", "read", "read_hdf5", "sample_path", "split", "truncate",
-           "write", "write_hdf5"]
+    "Ath",
+    "AthFile",
+    "ClipView",
+    "Decoder",
+    "Found",
+    "MotionClip",
+    "Summary",
+    "Thresholds",
+    "build_ath",
+    "encode",
+    "errors",
+    "find_branches",
+    "join",
+    "looped",
+    "open",
+    "read",
+    "read_hdf5",
+    "sample_path",
+    "split",
+    "truncate",
+    "write",
+    "write_hdf5",
+]
 _LAZY = {  # what decoding does not need, by module
     "discovery": ("Found", "find_branches"),
     "encoding": ("Summary", "encode"),

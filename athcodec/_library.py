@@ -28,9 +28,7 @@ def library_path() -> Path:
         if candidate.is_file():
             return candidate
     looked_in = ", ".join(dict.fromkeys(map(str, directories)))
-    raise ImportError(
-        f"athcodec's C core is missing: no {LIBRARY_NAME} in {looked_in}; pip install builds it"
-    )
+    raise ImportError(f"athcodec's C core is missing: no {LIBRARY_NAME} in {looked_in}; pip install builds it")
 
 
 def load_library() -> ctypes.CDLL:

@@ -8,18 +8,7 @@ array; they release the GIL, and hold no state.
 from __future__ import annotations
 
 import ctypes
-from ctypes import (
-    POINTER,
-    c_char_p,
-    c_double,
-    c_int,
-    c_int32,
-    c_int64,
-    c_size_t,
-    c_uint32,
-    c_uint64,
-    c_void_p,
-)
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 
@@ -37,8 +26,7 @@ PIECE = np.dtype(
     + [("last_attached", "<i4"), ("reserved", "<i4")]
 )
 NODE = np.dtype(
-    [("whitening", "<f8", (9,))]
-    + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
+    [("whitening", "<f8", (9,))] + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
 )
 
 
@@ -53,8 +41,13 @@ class CorePlan(ctypes.Structure):
 class Stream(ctypes.Structure):
     """ath_stream."""
 
-    _fields_ = [("step", c_double), ("rotation_step_factor", c_double), ("temporal", c_void_p), ("temporal_rank", c_int32),
-                ("reserved", c_int32)]
+    _fields_ = [
+        ("step", c_double),
+        ("rotation_step_factor", c_double),
+        ("temporal", c_void_p),
+        ("temporal_rank", c_int32),
+        ("reserved", c_int32),
+    ]
 
 
 class Motion(ctypes.Structure):
@@ -126,16 +119,27 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_model_size": (c_size_t, []),
     "ath_differences": (None, [*[c_int32] * 3, *[c_void_p] * 6, c_double, *[c_void_p] * 3]),
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
-    "ath_analyse": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double]),
-    "ath_analyse_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p,
-                                 c_void_p, c_double]),
-    "ath_pose": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int,
-                        c_void_p]),
-    "ath_pose_nodes": (None, [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p,
-                              c_int, c_void_p]),
+    "ath_analyse": (
+        None,
+        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double],
+    ),
+    "ath_analyse_nodes": (
+        None,
+        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_void_p, c_double],
+    ),
+    "ath_pose": (
+        None,
+        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
+    ),
+    "ath_pose_nodes": (
+        None,
+        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
+    ),
     "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_find_corrections": (
-        c_int64, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_void_p, c_int64]),
+        c_int64,
+        [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_void_p, c_int64],
+    ),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_encode_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p]),
@@ -144,13 +148,19 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_int32, c_void_p]),
     "ath_unit_shapes": (c_int, [c_int32, c_void_p, c_void_p]),
-    "ath_encode_shapes": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_void_p, c_void_p,
-                                    c_int32]),
+    "ath_encode_shapes": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int32],
+    ),
     "ath_encode_exact": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int, c_void_p, c_void_p]),
-    "ath_encode_stems": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
-                                   c_int32]),
-    "ath_encode_affines": (c_int64, [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers),
-                                     c_int32]),
+    "ath_encode_stems": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
+    ),
+    "ath_encode_affines": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
+    ),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
 }
 
@@ -174,8 +184,10 @@ def address(array: np.ndarray | None, dtype, size: int) -> int | None:
     if array is None:
         return None
     if array.dtype != np.dtype(dtype) or not array.flags.c_contiguous or array.size < size:
-        raise TypeError(f"C core: got {array.dtype} {array.shape}, contiguous={array.flags.c_contiguous}; "
-                        f"expected at least {size} contiguous {np.dtype(dtype)}")
+        raise TypeError(
+            f"C core: got {array.dtype} {array.shape}, contiguous={array.flags.c_contiguous}; "
+            f"expected at least {size} contiguous {np.dtype(dtype)}"
+        )
     return array.ctypes.data
 
 

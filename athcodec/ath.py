@@ -31,11 +31,11 @@ MIN_STRETCH = 0.1
 the best fit flattens a subtree would otherwise have no inverse, or residuals many times as long as the
 map's error."""
 
-_LEAST_SCALE = 1e-2         # MIN_STRETCH is relative to this at least: a subtree may shrink to a point
-_SMALLEST_EXTENT = 1e-100    # squares of what is smaller have no inverse
-_POINT_EXTENT = 1e-12       # of the plant's: below it a subtree is one point
-_READ_VALUES = 3 << 21      # numbers read from the clip at once
-_WORK_VERTICES = 1 << 17    # vertex-frames in work at once, of one thread
+_LEAST_SCALE = 1e-2  # MIN_STRETCH is relative to this at least: a subtree may shrink to a point
+_SMALLEST_EXTENT = 1e-100  # squares of what is smaller have no inverse
+_POINT_EXTENT = 1e-12  # of the plant's: below it a subtree is one point
+_READ_VALUES = 3 << 21  # numbers read from the clip at once
+_WORK_VERTICES = 1 << 17  # vertex-frames in work at once, of one thread
 
 
 @dataclass(frozen=True)
@@ -155,8 +155,13 @@ class Ath:
         """
         thresholds = self.thresholds
         return {
-            "depth": self.height + 1, "nodes": self.node_count, "leaves": int((~self.is_inner).sum()),
-            "epsilon": thresholds.epsilon, "eta": thresholds.eta, "xi": thresholds.xi, "lam": thresholds.lam,
+            "depth": self.height + 1,
+            "nodes": self.node_count,
+            "leaves": int((~self.is_inner).sum()),
+            "epsilon": thresholds.epsilon,
+            "eta": thresholds.eta,
+            "xi": thresholds.xi,
+            "lam": thresholds.lam,
         }
 
     def cut(self, level: int) -> list[CutPiece]:
@@ -514,10 +519,18 @@ def survey(
             progress(extent.frame_count / clip.frame_count)
     assert extent is not None and differences is not None  # a clip has frames
     return Survey(
-        hierarchy=hierarchy, rest=rest, max_depth=max_depth, frame_count=extent.frame_count,
-        low=extent.low, high=extent.high, rms_motion=extent.rms_motion(len(rest)), branches=branches,
-        largest_gads=gads.rows(), largest_distance=differences.largest_distance,
-        xi=xi, most_beyond_xi=None if xi is None else differences.most_beyond_xi,
+        hierarchy=hierarchy,
+        rest=rest,
+        max_depth=max_depth,
+        frame_count=extent.frame_count,
+        low=extent.low,
+        high=extent.high,
+        rms_motion=extent.rms_motion(len(rest)),
+        branches=branches,
+        largest_gads=gads.rows(),
+        largest_distance=differences.largest_distance,
+        xi=xi,
+        most_beyond_xi=None if xi is None else differences.most_beyond_xi,
     )
 
 
@@ -572,9 +585,7 @@ def build_ath(
     return surveyed.ath(thresholds)
 
 
-def _thresholds(
-    epsilon: float | None, eta: int, xi: float | None, lam: int, max_error: float | None
-) -> Thresholds:
+def _thresholds(epsilon: float | None, eta: int, xi: float | None, lam: int, max_error: float | None) -> Thresholds:
     if max_error is not None:
         if epsilon is not None or xi is not None:
             raise ValueError("ATH thresholds: got max_error beside epsilon or xi, expected one or the other")
@@ -602,8 +613,12 @@ class _Extent:
         return cls(low, high, frames.shape[1], float(moved.sum()))
 
     def __or__(self, other: _Extent) -> _Extent:
-        return _Extent(np.minimum(self.low, other.low), np.maximum(self.high, other.high),
-                       self.frame_count + other.frame_count, self.square_sum + other.square_sum)
+        return _Extent(
+            np.minimum(self.low, other.low),
+            np.maximum(self.high, other.high),
+            self.frame_count + other.frame_count,
+            self.square_sum + other.square_sum,
+        )
 
     def rms_motion(self, vertex_count: int) -> float:
         return float(np.sqrt(self.square_sum / (self.frame_count * vertex_count)))
@@ -624,8 +639,11 @@ class _Differences:
 
     def __or__(self, other: _Differences) -> _Differences:
         """Both together, but for the GADs."""
-        return _Differences(other.gads, np.maximum(self.largest_distance, other.largest_distance),
-                            np.maximum(self.most_beyond_xi, other.most_beyond_xi))
+        return _Differences(
+            other.gads,
+            np.maximum(self.largest_distance, other.largest_distance),
+            np.maximum(self.most_beyond_xi, other.most_beyond_xi),
+        )
 
 
 class _Largest:
@@ -656,8 +674,9 @@ def stem_maps(hierarchy: Hierarchy, rest: np.ndarray, frames: np.ndarray) -> np.
     rest is (N,3) and frames (k,N,3), both in file order; B branches in file order.
     """
     every = np.arange(hierarchy.branch_count)
-    pieces = _Pieces(hierarchy, np.asarray(rest, float), every, every + 1, hierarchy.branch_parent,
-                     hierarchy.branch_depth)
+    pieces = _Pieces(
+        hierarchy, np.asarray(rest, float), every, every + 1, hierarchy.branch_parent, hierarchy.branch_depth
+    )
     return pieces.fit(_seen_from(pieces.origin, np.moveaxis(np.asarray(frames), 2, 0))).matrices()
 
 
@@ -669,9 +688,7 @@ def _tested_pieces(hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray)
     return _Pieces.subtrees(hierarchy, rest, branches, parent, hierarchy.branch_depth[branches])
 
 
-def _prune(
-    hierarchy: Hierarchy, thresholds: Thresholds, rest: np.ndarray, accepted: np.ndarray, max_depth: int
-) -> Ath:
+def _prune(hierarchy: Hierarchy, thresholds: Thresholds, rest: np.ndarray, accepted: np.ndarray, max_depth: int) -> Ath:
     """Keep the branches above which no subtree was accepted."""
     depth, parent = hierarchy.branch_depth, hierarchy.branch_parent
     kept = depth == 0
@@ -748,12 +765,7 @@ class _Pieces:
 
     @classmethod
     def subtrees(
-        cls,
-        hierarchy: Hierarchy,
-        rest: np.ndarray,
-        branches: np.ndarray,
-        parent: np.ndarray,
-        level: np.ndarray,
+        cls, hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray, parent: np.ndarray, level: np.ndarray
     ) -> _Pieces:
         stop_branch = branches + hierarchy.subtree_branches[branches]
         return cls(hierarchy, rest, branches, stop_branch, parent, level)
@@ -772,7 +784,7 @@ class _Pieces:
         count = len(self.first)
         self.centroid = np.empty((count, 3))
         covariance = np.empty((count, 3, 3))
-        for some in self.levels:    # level by level, since the pieces of one level do not overlap
+        for some in self.levels:  # level by level, since the pieces of one level do not overlap
             vertices, counts = self.vertices(some), self.counts[some]
             points = self.rest[:, vertices]
             centroid = np.add.reduceat(points, _starts(counts), axis=1) / counts
@@ -871,12 +883,21 @@ class _Fit:
         inverse, offset = self.inverse_maps()
         count = len(pieces.first)
         found = _Differences(np.empty((frames, count)), np.empty(count), np.empty(count, np.int32))
-        lib.ath_differences(vertices, frames, count, address(pieces.first, np.int64, count),
-                            address(pieces.stop, np.int64, count), address(inverse, np.float64, frames * count * 9),
-                            address(offset, np.float64, frames * count * 3),
-                            address(pieces.rest, np.float64, 3 * vertices),
-                            address(self.frames, np.float64, self.frames.size), xi, found.gads.ctypes.data,
-                            found.largest_distance.ctypes.data, found.most_beyond_xi.ctypes.data)
+        lib.ath_differences(
+            vertices,
+            frames,
+            count,
+            address(pieces.first, np.int64, count),
+            address(pieces.stop, np.int64, count),
+            address(inverse, np.float64, frames * count * 9),
+            address(offset, np.float64, frames * count * 3),
+            address(pieces.rest, np.float64, 3 * vertices),
+            address(self.frames, np.float64, self.frames.size),
+            xi,
+            found.gads.ctypes.data,
+            found.largest_distance.ctypes.data,
+            found.most_beyond_xi.ctypes.data,
+        )
         return found
 
 

@@ -136,8 +136,14 @@ class AthFile:
         Where it cannot be read.
     """
 
-    def __init__(self, path: str | os.PathLike[str] | BinaryIO, *, strict: bool = False, allow_partial: bool = False,
-                 limits: Limits | None = None):
+    def __init__(
+        self,
+        path: str | os.PathLike[str] | BinaryIO,
+        *,
+        strict: bool = False,
+        allow_partial: bool = False,
+        limits: Limits | None = None,
+    ):
         self.limits = limits or Limits()
         self.bytes_read = 0
         self._lock = threading.Lock()
@@ -370,11 +376,21 @@ class AthFile:
     @cached_property
     def clips(self) -> tuple[Clip, ...]:
         """All that the file holds, in its order."""
-        return tuple(Clip(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment,
-                          clip.segment_count, bool(clip.loop), clip.duration,
-                          tuple(self.core.seam_error(index, level) for level in range(self.full_level_count))
-                          if clip.loop else ())
-                     for index, clip in enumerate(self.core.clips()))
+        return tuple(
+            Clip(
+                clip.name.decode(),
+                clip.first_frame,
+                clip.frame_count,
+                clip.first_segment,
+                clip.segment_count,
+                bool(clip.loop),
+                clip.duration,
+                tuple(self.core.seam_error(index, level) for level in range(self.full_level_count))
+                if clip.loop
+                else (),
+            )
+            for index, clip in enumerate(self.core.clips())
+        )
 
     def clip_named(self, name: str) -> Clip:
         """The clip of this name.
@@ -507,8 +523,16 @@ class AthFile:
         segments : range
             Counted over the whole file.
         """
-        return [Level(level, self.nodes_at(level), self._level_end(level), *self.core.level_error(level, segments),
-                      self.available(level)) for level in range(self.level_count)]
+        return [
+            Level(
+                level,
+                self.nodes_at(level),
+                self._level_end(level),
+                *self.core.level_error(level, segments),
+                self.available(level),
+            )
+            for level in range(self.level_count)
+        ]
 
     @cached_property
     def errors(self) -> np.ndarray:
@@ -524,22 +548,45 @@ class AthFile:
         is_node = np.cumsum(inside)[:-1] == 0
         leaf = is_node & (whole | (branches["subtree"] == 1))
         epsilon, eta, xi, lam = self.thresholds
-        return {"depth": int(branches["depth"][is_node].max()) + 1, "nodes": self.core.info.node_count,
-                "leaves": int(leaf.sum()), "epsilon": epsilon, "eta": eta, "xi": xi, "lam": lam}
+        return {
+            "depth": int(branches["depth"][is_node].max()) + 1,
+            "nodes": self.core.info.node_count,
+            "leaves": int(leaf.sum()),
+            "epsilon": epsilon,
+            "eta": eta,
+            "xi": xi,
+            "lam": lam,
+        }
 
     def info(self) -> dict[str, Any]:
         """What `athcodec info --json` prints: of the whole file, all clips together."""
         first = self.clips[0]
         return {
-            "vertices": self.vertex_count, "frames": self.frame_count, "fps": median_rate(self.time[: first.frame_count]),
-            "branches": self.branch_count, "segments": self.segment_count, "nodes": self.core.info.node_count,
-            "bytes": self.file_length, "available_bytes": self.available_length,
-            "max_error_bound": self.max_error_bound, "complete": self.complete,
-            "full_level_count": self.full_level_count, "format": f"{ct.MAJOR}.{ct.MINOR}", "ath": self.table1(),
-            "clips": [{"name": clip.name, "frames": clip.frame_count, "segments": clip.segment_count,
-                       "seconds": clip.duration, "loop": clip.loop, "seam_errors": list(clip.seam_errors),
-                       "max_errors": [level.max_error for level in self.levels_in(clip.segments)]}
-                      for clip in self.clips],
+            "vertices": self.vertex_count,
+            "frames": self.frame_count,
+            "fps": median_rate(self.time[: first.frame_count]),
+            "branches": self.branch_count,
+            "segments": self.segment_count,
+            "nodes": self.core.info.node_count,
+            "bytes": self.file_length,
+            "available_bytes": self.available_length,
+            "max_error_bound": self.max_error_bound,
+            "complete": self.complete,
+            "full_level_count": self.full_level_count,
+            "format": f"{ct.MAJOR}.{ct.MINOR}",
+            "ath": self.table1(),
+            "clips": [
+                {
+                    "name": clip.name,
+                    "frames": clip.frame_count,
+                    "segments": clip.segment_count,
+                    "seconds": clip.duration,
+                    "loop": clip.loop,
+                    "seam_errors": list(clip.seam_errors),
+                    "max_errors": [level.max_error for level in self.levels_in(clip.segments)],
+                }
+                for clip in self.clips
+            ],
             "levels": [asdict(level) for level in self.levels],
         }
 
@@ -553,8 +600,13 @@ class AthFile:
     @cached_property
     def hierarchy(self) -> Hierarchy:
         """The branches in file order and how they hang on each other."""
-        return Hierarchy.from_parts(self.branches["parent"], self.branches["count"], self.branches["attach"],
-                                    self.core.vertex_source(), self.core.branch_source())
+        return Hierarchy.from_parts(
+            self.branches["parent"],
+            self.branches["count"],
+            self.branches["attach"],
+            self.core.vertex_source(),
+            self.core.branch_source(),
+        )
 
     @property
     def rest(self) -> np.ndarray:
@@ -600,9 +652,13 @@ class AthFile:
         head, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
         if array is None and kind == ct.EDGES:
             return derived_edges(self.hierarchy).astype(self._derived_dtype(head))
-        if array is None or array.ndim != 2 or array.dtype.kind not in "iu" or (
-                kind == ct.EDGES and array.shape[1] != 2) or (
-                array.size and (array.min() < 0 or array.max() >= self.vertex_count)):
+        if (
+            array is None
+            or array.ndim != 2
+            or array.dtype.kind not in "iu"
+            or (kind == ct.EDGES and array.shape[1] != 2)
+            or (array.size and (array.min() < 0 or array.max() >= self.vertex_count))
+        ):
             raise BadChunk(f"{name}: got {ct.brief(head)}; expected rows of vertex numbers")
         return array
 
@@ -634,8 +690,9 @@ class AthFile:
             result[name] = array
             total = sum(array.nbytes for array in result.values())
             if total > self.limits.memory_bytes:
-                raise LimitExceeded(f"{chunk}: got {total} bytes of attributes; the limit is "
-                                    f"{self.limits.memory_bytes}")
+                raise LimitExceeded(
+                    f"{chunk}: got {total} bytes of attributes; the limit is {self.limits.memory_bytes}"
+                )
         return result
 
     @property
@@ -707,8 +764,10 @@ class AthFile:
     def _decode(self, segment: int, level: int, ready: core_file.Segment) -> None:
         missing = self.core.missing(level, segment)
         if any(offset + size > self.available_length for offset, size in missing):
-            raise LevelUnavailable(f"level {level}, segment {segment}: not in the file; it is cut off at "
-                                   f"{self.available_length} of {self.file_length} bytes")
+            raise LevelUnavailable(
+                f"level {level}, segment {segment}: not in the file; it is cut off at "
+                f"{self.available_length} of {self.file_length} bytes"
+            )
         self._prefetch(missing)
         pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in missing]
         try:

@@ -393,8 +393,10 @@ def check_finite(frames: np.ndarray, start: int = 0) -> None:
     usable = np.abs(frames) <= LARGEST_COORDINATE
     frame, vertex = np.argwhere(~usable.all(axis=2))[0]
     point = _point(frames[frame, vertex])
-    raise ClipError(f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers up to "
-                    f"{LARGEST_COORDINATE:g}")
+    raise ClipError(
+        f"positions: frame {start + frame}, vertex {vertex} is {point}, expected finite numbers up to "
+        f"{LARGEST_COORDINATE:g}"
+    )
 
 
 def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]:
@@ -415,8 +417,9 @@ def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> Non
     for name in names:
         size = len(name.encode("utf-8", "surrogatepass"))
         if not (name or len(clip_ranges) == 1) or size > NAME_BYTES or not is_name(name):
-            raise ClipError(f"clip names: got {name!r}, expected 1 to {NAME_BYTES} bytes of text without control "
-                            f"characters")
+            raise ClipError(
+                f"clip names: got {name!r}, expected 1 to {NAME_BYTES} bytes of text without control characters"
+            )
     if len(set(names)) < len(names):
         raise ClipError(f"clip names: got {', '.join(names)}, expected each once")
     if len(clip_ranges) > CLIP_RANGES:
@@ -500,23 +503,17 @@ def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: in
     check_indices("face_vertex_indices", indices[:, None], vertex_count)
 
 
-def check_branches(
-    vertex_branch: Any, branch_parent: Any, vertex_count: int
-) -> tuple[np.ndarray, np.ndarray]:
+def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """(N,) and (B,) int32 labels and parents; ClipError unless a forest of branches that have vertices."""
     branch_parent = _integers("branch_parent", branch_parent)
     branch_count = len(branch_parent)
     vertex_branch = _integers("vertex_branch", vertex_branch)
     if len(vertex_branch) != vertex_count:
-        raise ClipError(
-            f"vertex_branch: got {len(vertex_branch)} entries, expected {vertex_count}, one per vertex"
-        )
+        raise ClipError(f"vertex_branch: got {len(vertex_branch)} entries, expected {vertex_count}, one per vertex")
     bad = np.flatnonzero((vertex_branch < 0) | (vertex_branch >= branch_count))
     if bad.size:
         got = vertex_branch[bad[0]]
-        raise ClipError(
-            f"vertex_branch: vertex {bad[0]} is on branch {got}, expected 0 to {branch_count - 1}"
-        )
+        raise ClipError(f"vertex_branch: vertex {bad[0]} is on branch {got}, expected 0 to {branch_count - 1}")
     vertex_branch = vertex_branch.astype(np.int32)
     empty = np.flatnonzero(np.bincount(vertex_branch, minlength=branch_count) == 0)
     if empty.size:
@@ -533,9 +530,7 @@ def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray |
         return None
     stem_index = _integers("stem_index", stem_index)
     if stem_index.shape != vertex_branch.shape:
-        raise ClipError(
-            f"stem_index: got {len(stem_index)} entries, expected {len(vertex_branch)}, one per vertex"
-        )
+        raise ClipError(f"stem_index: got {len(stem_index)} entries, expected {len(vertex_branch)}, one per vertex")
     stem_index = stem_index.astype(np.int64)
     places = source_stem_index(vertex_branch)
     order = np.lexsort((stem_index, vertex_branch))
@@ -586,9 +581,7 @@ def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
     on_cycle = _branch_on_cycle(branch_parent)
     if on_cycle is not None:
         got = branch_parent[on_cycle]
-        raise ClipError(
-            f"branch_parent: branch {on_cycle} (parent {got}) is its own ancestor, expected no cycle"
-        )
+        raise ClipError(f"branch_parent: branch {on_cycle} (parent {got}) is its own ancestor, expected no cycle")
     return branch_parent
 
 

@@ -40,8 +40,9 @@ class ClipView:
         Where the level or the frames do not exist.
     """
 
-    def __init__(self, decoder: Decoder, level: int | None = None, frames: range | None = None, *,
-                 all_clips: bool = False):
+    def __init__(
+        self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
+    ):
         self.decoder = decoder
         self.level = decoder.deepest if level is None else level
         if not 0 <= self.level < decoder.level_count:
@@ -52,8 +53,10 @@ class ClipView:
     @property
     def clip_ranges(self) -> tuple[ClipRange, ...]:
         """The clips; frames of a loop that are not all it has are no loop."""
-        return tuple(ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
-                     for decoder, frames in self._runs)
+        return tuple(
+            ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
+            for decoder, frames in self._runs
+        )
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:

@@ -22,12 +22,7 @@ import zstandard
 
 from athcodec._native import crc32c
 from athcodec.clip import ClipRange
-from athcodec.errors import (
-    BadChunk,
-    ClipError,
-    FormatError,
-    LimitExceeded,
-)
+from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 4
@@ -39,9 +34,21 @@ METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 CLIPS = 7
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
 ATTRIBUTE = OPTIONAL | 32
-KIND_NAMES = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES", EDGES: "EDGES",
-              CLIPS: "CLIPS", STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
-              EXACT: "EXACT", ATTRIBUTE: "ATTRIBUTE"}
+KIND_NAMES = {
+    HIERARCHY: "HIERARCHY",
+    REST: "REST",
+    TIME: "TIME",
+    METADATA: "METADATA",
+    FACES: "FACES",
+    EDGES: "EDGES",
+    CLIPS: "CLIPS",
+    STEMS: "STEMS",
+    AFFINES: "AFFINES",
+    CORRECTIONS: "CORRECTIONS",
+    SHAPES: "SHAPES",
+    EXACT: "EXACT",
+    ATTRIBUTE: "ATTRIBUTE",
+}
 
 _HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
 _CHUNK = struct.Struct("<HBBIII")
@@ -131,9 +138,24 @@ class Chunk:
 
 
 def _pack_header(header: Header, checksum: int) -> bytes:
-    return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, header.file_length, header.chunk_count, header.vertex_count,
-                        header.branch_count, header.frame_count, header.segment_count, header.level_count,
-                        header.full_level_count, header.clip_count, int(header.is_float64), header.max_error, 0)
+    return _HEADER.pack(
+        MAGIC,
+        MAJOR,
+        MINOR,
+        checksum,
+        header.file_length,
+        header.chunk_count,
+        header.vertex_count,
+        header.branch_count,
+        header.frame_count,
+        header.segment_count,
+        header.level_count,
+        header.full_level_count,
+        header.clip_count,
+        int(header.is_float64),
+        header.max_error,
+        0,
+    )
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
@@ -266,8 +288,9 @@ def _steady_step(method: int, time: np.ndarray) -> float | None:
         return next(fit, None)
 
 
-def pack_clips(clip_ranges: Sequence[ClipRange], segment_counts: Sequence[int],
-               seams: Sequence[Sequence[float] | None]) -> bytes:
+def pack_clips(
+    clip_ranges: Sequence[ClipRange], segment_counts: Sequence[int], seams: Sequence[Sequence[float] | None]
+) -> bytes:
     """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32."""
     entries = []
     for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
@@ -358,10 +381,20 @@ def _is_type(description: object, nesting: int = 16) -> bool:
     """Whether a type follows the grammar of FORMAT.md: a plain one, or a record's [name, type(, shape)] entries."""
     if isinstance(description, str):
         return _PLAIN_TYPE.fullmatch(description) is not None
-    return isinstance(description, list) and nesting > 0 and bool(description) and all(
-        isinstance(entry, list) and 2 <= len(entry) <= 3 and isinstance(entry[0], str)
-        and (entry[0] or (len(entry) == 2 and str(entry[1]).startswith("|V")))
-        and _is_type(entry[1], nesting - 1) and all(map(_is_shape, entry[2:])) for entry in description)
+    return (
+        isinstance(description, list)
+        and nesting > 0
+        and bool(description)
+        and all(
+            isinstance(entry, list)
+            and 2 <= len(entry) <= 3
+            and isinstance(entry[0], str)
+            and (entry[0] or (len(entry) == 2 and str(entry[1]).startswith("|V")))
+            and _is_type(entry[1], nesting - 1)
+            and all(map(_is_shape, entry[2:]))
+            for entry in description
+        )
+    )
 
 
 def _is_shape(shape: object) -> bool:
@@ -370,8 +403,10 @@ def _is_shape(shape: object) -> bool:
 
 def _as_numpy(description: list) -> list:
     """Record entries as NumPy wants them: tuples."""
-    return [(name, _as_numpy(kind) if isinstance(kind, list) else kind, *map(tuple, shape))
-            for name, kind, *shape in description]
+    return [
+        (name, _as_numpy(kind) if isinstance(kind, list) else kind, *map(tuple, shape))
+        for name, kind, *shape in description
+    ]
 
 
 def _dtype_from(description: object, what: str) -> np.dtype:
@@ -424,7 +459,7 @@ def _array_head(data: bytes, what: str) -> tuple[dict, bytes]:
     (length,) = _ARRAY.unpack_from(data)
     if length > len(data) - _ARRAY.size:
         raise BadChunk(f"{what}: got a head of {length} bytes; expected at most what the chunk holds")
-    return _parse_json(data[_ARRAY.size: _ARRAY.size + length], what), data[_ARRAY.size + length:]
+    return _parse_json(data[_ARRAY.size : _ARRAY.size + length], what), data[_ARRAY.size + length :]
 
 
 def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:

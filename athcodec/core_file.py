@@ -36,16 +36,28 @@ OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
 
 PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
-CHUNK = np.dtype([("bytes", "<u8"), ("offset", "<u8"), ("length", "<u4"), ("checksum", "<u4"), ("segment", "<u4"),
-                  ("kind", "<u2"), ("level", "u1"), ("reserved", "u1")])
+CHUNK = np.dtype(
+    [
+        ("bytes", "<u8"),
+        ("offset", "<u8"),
+        ("length", "<u4"),
+        ("checksum", "<u4"),
+        ("segment", "<u4"),
+        ("kind", "<u2"),
+        ("level", "u1"),
+        ("reserved", "u1"),
+    ]
+)
 """ath_chunk"""
 
 
 class Limits(Structure):
     """ath_limits."""
 
-    _fields_ = [(name, c_uint32) for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes "
-                                              "reserved").split()]
+    _fields_ = [
+        (name, c_uint32)
+        for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved").split()
+    ]
     _fields_ += [("memory_bytes", c_uint64)]
 
     @classmethod
@@ -58,28 +70,53 @@ class Limits(Structure):
 class Info(Structure):
     """ath_info."""
 
-    _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
-                ("origin", c_double * 3)]
-    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
-                                              "level_count full_level_count node_count chunk_count is_float64").split()]
-    _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lam", c_uint32),
-                 ("rest_is_float64", c_int32)]
+    _fields_ = [
+        ("file_length", c_uint64),
+        ("prelude_length", c_uint64),
+        ("max_error", c_double),
+        ("origin", c_double * 3),
+    ]
+    _fields_ += [
+        (name, c_int32)
+        for name in (
+            "vertex_count branch_count frame_count segment_count clip_count "
+            "level_count full_level_count node_count chunk_count is_float64"
+        ).split()
+    ]
+    _fields_ += [
+        ("epsilon", c_float),
+        ("xi", c_float),
+        ("eta", c_uint32),
+        ("lam", c_uint32),
+        ("rest_is_float64", c_int32),
+    ]
 
 
 class Clip(Structure):
     """ath_clip."""
 
     _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
-                                              "reserved").split()]
+    _fields_ += [
+        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
+    ]
 
 
 class Fault(Structure):
     """ath_fault_info; its text is one line of English."""
 
-    _fields_ = [("code", c_int32), ("field", c_int32), ("chunk", c_int32), ("kind", c_uint16), ("level", c_uint8),
-                ("reserved", c_uint8), ("segment", c_uint32), ("offset", c_uint64), ("found", c_double),
-                ("least", c_double), ("most", c_double)]
+    _fields_ = [
+        ("code", c_int32),
+        ("field", c_int32),
+        ("chunk", c_int32),
+        ("kind", c_uint16),
+        ("level", c_uint8),
+        ("reserved", c_uint8),
+        ("segment", c_uint32),
+        ("offset", c_uint64),
+        ("found", c_double),
+        ("least", c_double),
+        ("most", c_double),
+    ]
 
     def __str__(self) -> str:
         text = ctypes.create_string_buffer(FAULT_TEXT)
@@ -97,7 +134,7 @@ def aligned(size: int) -> np.ndarray:
     """Uninitialised bytes whose address is a multiple of ALIGNMENT."""
     block = np.empty(size + ALIGNMENT, np.uint8)
     start = -block.ctypes.data % ALIGNMENT
-    return block[start: start + size]
+    return block[start : start + size]
 
 
 class CoreError(Exception):
@@ -143,8 +180,12 @@ class File:
     def __init__(self, prelude: bytes, memory: int, limits: Limits):
         self._prelude, self._memory, fault = as_bytes(prelude), aligned(memory), Fault()
         self._file = self._memory.ctypes.data
-        self._check(lib.ath_open(self._file, memory, self._prelude.ctypes.data, len(self._prelude), byref(limits),
-                                 byref(fault)), fault)
+        self._check(
+            lib.ath_open(
+                self._file, memory, self._prelude.ctypes.data, len(self._prelude), byref(limits), byref(fault)
+            ),
+            fault,
+        )
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self._build: np.ndarray | None = None
@@ -269,14 +310,18 @@ class File:
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
         show = lib.ath_positions_float64 if out.dtype == np.float64 else lib.ath_positions
-        self._check(show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data,
-                         out.strides[0]))
+        self._check(
+            show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data, out.strides[0])
+        )
 
     def matrices(self, segment: Segment, frame: float, node_count: int) -> np.ndarray:
         """(nodes, 3, 4) float64: maps of the cut's nodes from rest positions to positions."""
         out = np.empty((node_count, 3, 4))
-        self._check(lib.ath_matrices_float64(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame,
-                                          out.ctypes.data, 12 * out.itemsize))
+        self._check(
+            lib.ath_matrices_float64(
+                self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, out.ctypes.data, 12 * out.itemsize
+            )
+        )
         return out
 
     def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:

@@ -53,8 +53,14 @@ class Affines:
     matrices: np.ndarray
 
 
-def open(path: str | os.PathLike[str] | BinaryIO, *, clip: str | None = None, strict: bool = False,
-         allow_partial: bool = False, limits: Limits | None = None) -> Decoder:
+def open(
+    path: str | os.PathLike[str] | BinaryIO,
+    *,
+    clip: str | None = None,
+    strict: bool = False,
+    allow_partial: bool = False,
+    limits: Limits | None = None,
+) -> Decoder:
     """Opens an .ath file for playing one of its clips.
 
     Parameters
@@ -206,7 +212,7 @@ class Decoder:
     @property
     def time(self) -> np.ndarray:
         """Seconds, (T,) float64."""
-        return self.file.time[self.clip.first_frame: self.clip.first_frame + self.clip.frame_count]
+        return self.file.time[self.clip.first_frame : self.clip.first_frame + self.clip.frame_count]
 
     @property
     def fps(self) -> float:
@@ -257,8 +263,9 @@ class Decoder:
 
     # ---- motion ----
 
-    def positions(self, frames: int | slice | None = None, level: int | None = None,
-                  dtype: npt.DTypeLike | None = None) -> np.ndarray:
+    def positions(
+        self, frames: int | slice | None = None, level: int | None = None, dtype: npt.DTypeLike | None = None
+    ) -> np.ndarray:
         """Positions of all vertices in one or several frames.
 
         Parameters
@@ -294,8 +301,9 @@ class Decoder:
         out = shown.astype(dtype, copy=False)
         return out if frames is None or isinstance(frames, slice) else out[0]
 
-    def blocks(self, level: int | None = None, dtype: npt.DTypeLike | None = None,
-               frames: int | slice | None = None) -> Iterator[tuple[int, np.ndarray]]:
+    def blocks(
+        self, level: int | None = None, dtype: npt.DTypeLike | None = None, frames: int | slice | None = None
+    ) -> Iterator[tuple[int, np.ndarray]]:
         """The same, one segment in memory at a time.
 
         Parameters
@@ -431,8 +439,9 @@ class Decoder:
         """The segments that hold the frames first to last - 1; what they need is there, if they are more than one."""
         segments = range(self._segment_of(first), self._segment_of(last - 1) + 1) if first < last else range(0)
         if len(segments) > 1:
-            self.file.prefetch(range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop),
-                               level)
+            self.file.prefetch(
+                range(self.clip.first_segment + segments.start, self.clip.first_segment + segments.stop), level
+            )
         return segments
 
     def _segment_of(self, frame: int) -> int:

@@ -74,8 +74,10 @@ class Found:
         orders = branch_orders(self.branch_parent)
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
-        return (f"{len(self.branch_parent):,} branches by {self.method}: {roots:,} without a parent, up to order "
-                f"{orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each")
+        return (
+            f"{len(self.branch_parent):,} branches by {self.method}: {roots:,} without a parent, up to order "
+            f"{orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
+        )
 
 
 def candidates(clip: MotionClip) -> list[Found]:
@@ -157,8 +159,9 @@ def _first_found(seen: _Seen, methods: Sequence[str], root: int | None) -> Found
 
 def with_branches(clip: MotionClip, found: Found) -> MotionClip:
     """The clip on branches that were found. Raises ClipError where they are for another number of vertices."""
-    return clip.replace(vertex_branch=found.vertex_branch, branch_parent=found.branch_parent,
-                        stem_index=found.stem_index)
+    return clip.replace(
+        vertex_branch=found.vertex_branch, branch_parent=found.branch_parent, stem_index=found.stem_index
+    )
 
 
 # ---- results that a user keeps, edits and uses again ----
@@ -180,8 +183,10 @@ def save(found: Found, path: str | os.PathLike[str]) -> None:
     """
     order = _stem_order(found.vertex_branch, found.stem_index)
     bounds = np.searchsorted(found.vertex_branch[order], np.arange(len(found.branch_parent) + 1))
-    lines = [json.dumps({"branch": branch, "parent": int(parent), "vertices": _runs(order[first:last])})
-             for branch, (parent, first, last) in enumerate(zip(found.branch_parent, bounds[:-1], bounds[1:]))]
+    lines = [
+        json.dumps({"branch": branch, "parent": int(parent), "vertices": _runs(order[first:last])})
+        for branch, (parent, first, last) in enumerate(zip(found.branch_parent, bounds[:-1], bounds[1:]))
+    ]
     with new_file(path) as file:
         file.write(f'{{"vertex_count": {len(order)}, "method": {json.dumps(found.method)}, "branches": [\n'.encode())
         file.write(",\n".join(lines).encode() + b"\n]}\n")
@@ -214,13 +219,17 @@ def load(path: str | os.PathLike[str]) -> Found:
             parent = np.array([numbers.get(branch["parent"], -1) for branch in branches], np.int64)
             stems = [_vertices(branch["vertices"], vertex_count) for branch in branches]
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise ClipError(f"{os.fspath(path)}: got no branches ({type(error).__name__}: {error}), expected the JSON "
-                            "that athcodec hierarchy --save writes") from None
+            raise ClipError(
+                f"{os.fspath(path)}: got no branches ({type(error).__name__}: {error}), expected the JSON "
+                "that athcodec hierarchy --save writes"
+            ) from None
     labels = np.repeat(np.arange(len(stems)), [len(stem) for stem in stems])
     order = np.concatenate(stems) if stems else np.zeros(0, np.int64)
     if len(numbers) != len(branches) or not np.array_equal(np.sort(order), np.arange(vertex_count)):
-        raise ClipError(f"{os.fspath(path)}: got vertices or branches twice or not at all, expected each of "
-                        f"{vertex_count} vertices once")
+        raise ClipError(
+            f"{os.fspath(path)}: got vertices or branches twice or not at all, expected each of "
+            f"{vertex_count} vertices once"
+        )
     vertex_branch = np.empty(vertex_count, np.int64)
     vertex_branch[order] = labels
     place = np.concatenate([np.arange(len(stem)) for stem in stems])
@@ -241,7 +250,7 @@ def find_or_load(clip: MotionClip, hierarchy: str) -> Found:
 
 
 def _runs(vertices: np.ndarray) -> str:
-    """"0-5 9 7" for 0 1 2 3 4 5 9 7."""
+    """ "0-5 9 7" for 0 1 2 3 4 5 9 7."""
     breaks = np.flatnonzero(np.diff(vertices) != 1) + 1
     firsts, lasts = vertices[np.append(0, breaks)], vertices[np.append(breaks, len(vertices)) - 1]
     return " ".join(f"{a}-{b}" if a != b else f"{a}" for a, b in zip(firsts.tolist(), lasts.tolist()))
@@ -265,8 +274,9 @@ def _by_attributes(seen: _Seen, root: int | None) -> Found | None:
     """Labels that the source has under a usual name, for vertices or faces, and their parents if it has those too."""
     clip = seen.clip
     named = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): array for name, array in clip.attributes.items()}
-    labels = next((label for label in (_vertex_labels(clip, named.get(name)) for name in LABEL_NAMES)
-                   if label is not None), None)
+    labels = next(
+        (label for label in (_vertex_labels(clip, named.get(name)) for name in LABEL_NAMES) if label is not None), None
+    )
     if labels is None:
         return None
     names, vertex_branch = np.unique(labels, return_inverse=True)
@@ -364,21 +374,26 @@ def _patches(seen: _Seen, patch_vertices: int) -> np.ndarray:
 
 
 _FINDERS: dict[str, Callable[[_Seen, int | None], Found | None]] = {
-    "attributes": _by_attributes, "skeleton": _by_skeleton, "edges": _by_edges, "components": _by_components,
+    "attributes": _by_attributes,
+    "skeleton": _by_skeleton,
+    "edges": _by_edges,
+    "components": _by_components,
     "motion": _by_motion,
 }
 _EXPECTED = {
     "attributes": f"an attribute per vertex or face named as one of {', '.join(LABEL_NAMES)}",
-    "skeleton": "joints with weights", "edges": "edges without cycles and no faces",
-    "components": "faces or edges in several separate pieces", "motion": "vertices", "auto": "vertices",
+    "skeleton": "joints with weights",
+    "edges": "edges without cycles and no faces",
+    "components": "faces or edges in several separate pieces",
+    "motion": "vertices",
+    "auto": "vertices",
 }
 
 
 # ---- what the methods share ----
 
 
-def _arranged(seen: _Seen, label: np.ndarray, root: int | None, method: str,
-              parent: np.ndarray | None = None) -> Found:
+def _arranged(seen: _Seen, label: np.ndarray, root: int | None, method: str, parent: np.ndarray | None = None) -> Found:
     """A tree over the labels, whose vertices run from base to tip."""
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
@@ -475,8 +490,9 @@ def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: in
     return _Joints(parent, _bases(parent, still, own, other, contacts.vertices))
 
 
-def _bases(parent: np.ndarray, still: np.ndarray, own: np.ndarray, other: np.ndarray,
-           vertices: np.ndarray) -> np.ndarray:
+def _bases(
+    parent: np.ndarray, still: np.ndarray, own: np.ndarray, other: np.ndarray, vertices: np.ndarray
+) -> np.ndarray:
     base = still.copy()
     for child, its_parent, vertex in ((own, other, vertices[:, 0]), (other, own, vertices[:, 1])):
         hangs = parent[child] == its_parent

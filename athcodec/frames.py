@@ -26,8 +26,9 @@ class Frames:
         float32 by default.
     """
 
-    def __init__(self, read: Callable[[int, int], np.ndarray], frame_count: int, vertex_count: int,
-                 dtype: DTypeLike = np.float32):
+    def __init__(
+        self, read: Callable[[int, int], np.ndarray], frame_count: int, vertex_count: int, dtype: DTypeLike = np.float32
+    ):
         self._read = read
         self.shape, self.dtype = (frame_count, vertex_count, 3), np.dtype(dtype)
 

@@ -188,11 +188,7 @@ def build_hierarchy(
 
 
 def branches_from_edges(
-    edges: np.ndarray,
-    vertex_count: int,
-    rest: np.ndarray,
-    root: int | Sequence[int] | None = None,
-    up_axis: str = "y",
+    edges: np.ndarray, vertex_count: int, rest: np.ndarray, root: int | Sequence[int] | None = None, up_axis: str = "y"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Branches of a forest of centre lines: int32 vertex_branch (N,), branch_parent (B,), stem_index (N,).
 
@@ -311,9 +307,7 @@ class _EulerTour:
         return remaining, jump
 
 
-def _choose_roots(
-    part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str
-) -> np.ndarray:
+def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
     axis, sign = _parse_axis(up_axis)
     given = np.atleast_1d(np.asarray([] if root is None else root, np.int64))
     if ((given < 0) | (given >= len(part))).any():
@@ -329,9 +323,7 @@ def _choose_roots(
 def _parse_axis(up_axis: str) -> tuple[int, float]:
     name = str(up_axis).lower().lstrip("+-")
     if name not in ("x", "y", "z"):
-        raise ClipError(
-            f'up_axis: got {up_axis!r}, expected "x", "y" or "z", with "-" in front if it points down'
-        )
+        raise ClipError(f'up_axis: got {up_axis!r}, expected "x", "y" or "z", with "-" in front if it points down')
     return "xyz".index(name), -1.0 if str(up_axis).startswith("-") else 1.0
 
 
@@ -404,24 +396,18 @@ def _subtree_sizes(parent: np.ndarray) -> np.ndarray:
 def _check_parents_before(parent: np.ndarray) -> None:
     bad = np.flatnonzero((parent < -1) | (parent >= np.arange(len(parent))))
     if bad.size:
-        raise ClipError(
-            f"branch_parent: branch {bad[0]} has parent {parent[bad[0]]}, expected one before it or -1"
-        )
+        raise ClipError(f"branch_parent: branch {bad[0]} has parent {parent[bad[0]]}, expected one before it or -1")
 
 
 def _check_stems(parent: np.ndarray, stem_count: np.ndarray, attach: np.ndarray) -> None:
     if not len(parent) == len(stem_count) == len(attach) > 0:
         lengths = f"{len(parent)}, {len(stem_count)} and {len(attach)}"
-        raise ClipError(
-            f"hierarchy: got {lengths} parents, stems and attach points, expected equally many, at least 1"
-        )
+        raise ClipError(f"hierarchy: got {lengths} parents, stems and attach points, expected equally many, at least 1")
     bad = np.flatnonzero((stem_count < 1) | (stem_count >= MAX_VERTICES))
     if bad.size:
         raise ClipError(f"stem_count: branch {bad[0]} has {stem_count[bad[0]]} vertices, expected at least 1")
     if stem_count.sum() > MAX_VERTICES:
-        raise ClipError(
-            f"stem_count: got {stem_count.sum()} vertices in all, expected at most {MAX_VERTICES}"
-        )
+        raise ClipError(f"stem_count: got {stem_count.sum()} vertices in all, expected at most {MAX_VERTICES}")
     _check_parents_before(parent)
     first = np.cumsum(stem_count) - stem_count
     low = np.where(parent < 0, -1, first[parent])

@@ -54,10 +54,21 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     for part in parts:
         closing.callback(part.close)
     return MotionClip(
-        _joined([part.positions for part in parts]), np.concatenate([part.time for part in parts]), first.vertex_branch,
-        first.branch_parent, rest, first.edges, first.faces, first.attributes, _common_metadata(clips),
-        stem_index=first.stem_index, clip_ranges=clip_ranges, resource=closing, unchanged=_all_unchanged(parts),
-        skin=first.skin)
+        _joined([part.positions for part in parts]),
+        np.concatenate([part.time for part in parts]),
+        first.vertex_branch,
+        first.branch_parent,
+        rest,
+        first.edges,
+        first.faces,
+        first.attributes,
+        _common_metadata(clips),
+        stem_index=first.stem_index,
+        clip_ranges=clip_ranges,
+        resource=closing,
+        unchanged=_all_unchanged(parts),
+        skin=first.skin,
+    )
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
@@ -74,9 +85,15 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
     """
     if len(clip.clip_ranges) < 2:
         return {_only_clip_range("", clip).name: clip}
-    return {clip_range.name: clip.replace(positions=_run(clip.positions, start, stop), time=clip.time[start:stop],
-                                    clip_ranges=(clip_range,), metadata=metadata_of(clip.metadata, clip_range.name))
-            for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)}
+    return {
+        clip_range.name: clip.replace(
+            positions=_run(clip.positions, start, stop),
+            time=clip.time[start:stop],
+            clip_ranges=(clip_range,),
+            metadata=metadata_of(clip.metadata, clip_range.name),
+        )
+        for clip_range, (start, stop) in zip(clip.clip_ranges, clip.clip_range_frames)
+    }
 
 
 def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -109,14 +126,19 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     """
     clip_range = _only_clip_range("", clip)
     if not 0 <= blend <= clip.frame_count // 3:
-        raise ClipError(f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the "
-                        "clip")
+        raise ClipError(
+            f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip"
+        )
     frames = clip.frame_count - blend
     clip_ranges = (dataclasses.replace(clip_range, frame_count=frames, loop=True),)
     if not blend:
         return clip.replace(clip_ranges=clip_ranges)
-    return clip.replace(positions=_blended(clip.positions, blend), time=clip.time[:frames], clip_ranges=clip_ranges,
-                        metadata=clip.metadata | {BLEND: blend})
+    return clip.replace(
+        positions=_blended(clip.positions, blend),
+        time=clip.time[:frames],
+        clip_ranges=clip_ranges,
+        metadata=clip.metadata | {BLEND: blend},
+    )
 
 
 def clip_metadata(motion: Any) -> dict[str, Any]:
@@ -156,8 +178,9 @@ def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip
 
 
 def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
-    return a is b or (a is not None and b is not None and a.dtype == b.dtype and a.shape == b.shape
-                      and a.tobytes() == b.tobytes())
+    return a is b or (
+        a is not None and b is not None and a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    )
 
 
 def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
@@ -166,19 +189,25 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
     for other, clip in own.items():
         if not np.array_equal(clip.rest, chosen.rest):
             vertex = int(np.linalg.norm(clip.rest - chosen.rest, axis=1).argmax())
-            raise ClipError(f"{other}: got another rest pose than {name} (vertex {vertex} is "
-                            f"{clip.rest[vertex].tolist()}, not {chosen.rest[vertex].tolist()}), expected clips of one "
-                            "plant")
+            raise ClipError(
+                f"{other}: got another rest pose than {name} (vertex {vertex} is "
+                f"{clip.rest[vertex].tolist()}, not {chosen.rest[vertex].tolist()}), expected clips of one "
+                "plant"
+            )
     return chosen.source_rest
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
     """What all have in common, and under OWN what each has of its own."""
     every = [clip.metadata for clip in clips.values()]
-    common = {key: value for key, value in every[0].items()
-              if all(key in metadata and metadata[key] == value for metadata in every)}
-    own = {name: {key: value for key, value in clip.metadata.items() if key not in common}
-           for name, clip in clips.items()}
+    common = {
+        key: value
+        for key, value in every[0].items()
+        if all(key in metadata and metadata[key] == value for metadata in every)
+    }
+    own = {
+        name: {key: value for key, value in clip.metadata.items() if key not in common} for name, clip in clips.items()
+    }
     own = {name: metadata for name, metadata in own.items() if metadata}
     return common | {OWN: own} if own else common
 
@@ -194,8 +223,11 @@ def _joined(parts: Sequence[Any]) -> Frames:
     dtype = np.result_type(*(part.dtype for part in parts))
 
     def read(start: int, stop: int) -> np.ndarray:
-        runs = [np.asarray(part[max(start, first) - first: min(stop, last) - first], dtype)
-                for part, (first, last) in zip(parts, ranges) if first < stop and start < last]
+        runs = [
+            np.asarray(part[max(start, first) - first : min(stop, last) - first], dtype)
+            for part, (first, last) in zip(parts, ranges)
+            if first < stop and start < last
+        ]
         return runs[0] if len(runs) == 1 else np.concatenate(runs)
 
     return Frames(read, ranges[-1][1], parts[0].shape[1], dtype)
@@ -203,8 +235,9 @@ def _joined(parts: Sequence[Any]) -> Frames:
 
 def _run(positions: Any, first: int, last: int) -> Frames:
     """Frames `first` to `last` - 1."""
-    return Frames(lambda start, stop: positions[first + start: first + stop], last - first, positions.shape[1],
-                  positions.dtype)
+    return Frames(
+        lambda start, stop: positions[first + start : first + stop], last - first, positions.shape[1], positions.dtype
+    )
 
 
 def _blended(positions: Any, blend: int) -> Frames:
@@ -217,7 +250,7 @@ def _blended(positions: Any, blend: int) -> Frames:
             return shown
         place = np.arange(start, last)[:, None, None] / blend
         weight = place * place * (3 - 2 * place)  # smoothstep: neither positions nor speeds jump
-        leaving = np.asarray(positions[frame_count + start: frame_count + last], np.float64)
+        leaving = np.asarray(positions[frame_count + start : frame_count + last], np.float64)
         mixed = shown.astype(dtype, copy=True)
         mixed[: last - start] = leaving + (shown[: last - start] - leaving) * weight
         return mixed

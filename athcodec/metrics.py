@@ -131,9 +131,7 @@ def compare_clips(reference: MotionClip, decoded: MotionClip) -> ErrorMeter:
     """
     shapes = [(clip.frame_count, clip.vertex_count) for clip in (reference, decoded)]
     if shapes[0] != shapes[1]:
-        raise ClipError(
-            f"decoded clip: got {shapes[1]} frames and vertices, expected {shapes[0]} as in the reference"
-        )
+        raise ClipError(f"decoded clip: got {shapes[1]} frames and vertices, expected {shapes[0]} as in the reference")
     meter = ErrorMeter(reference.rest)
     for start, frames in reference.blocks():
         meter.add(frames, decoded.block(start, start + len(frames)))

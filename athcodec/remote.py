@@ -91,7 +91,7 @@ class Remote:
         best = memoryview(b"")
         for start, data in self._kept.items():
             if start <= offset < start + len(data) and start + len(data) - offset > len(best):
-                best = memoryview(data)[offset - start:]
+                best = memoryview(data)[offset - start :]
         return best
 
     def _missing(self, offset: int, size: int) -> Range:
@@ -194,13 +194,15 @@ class _AnySystem:
         if not ranges:
             return []
         starts, stops = [offset for offset, _ in ranges], [offset + size for offset, size in ranges]
-        parts = self._try(lambda: self._system.cat_ranges([self._path] * len(ranges), starts, stops, on_error="raise"),
-                          len(ranges))
+        parts = self._try(
+            lambda: self._system.cat_ranges([self._path] * len(ranges), starts, stops, on_error="raise"), len(ranges)
+        )
         for (offset, size), data in zip(ranges, parts, strict=True):
             self._remote.bytes += len(data)
             if len(data) != size:
-                raise RemoteError(f"{self._shown}: got {len(data)} bytes from {offset} on, "
-                                  f"expected {size}{self.change_hint}")
+                raise RemoteError(
+                    f"{self._shown}: got {len(data)} bytes from {offset} on, expected {size}{self.change_hint}"
+                )
         return list(zip(starts, parts))
 
     def _try(self, ask, requests: int = 1):
@@ -273,11 +275,15 @@ class _Http:
         import aiohttp
 
         options = dict(self._system.kwargs)
-        headers = {**options.pop("headers", {}), "Range": f"bytes={offset}-{offset + size - 1}",
-                   "Accept-Encoding": "identity"}
+        headers = {
+            **options.pop("headers", {}),
+            "Range": f"bytes={offset}-{offset + size - 1}",
+            "Accept-Encoding": "identity",
+        }
         patience = self._remote.timeout
-        options["timeout"] = aiohttp.ClientTimeout(total=patience + size / SLOWEST, sock_connect=patience,
-                                                   sock_read=patience)
+        options["timeout"] = aiohttp.ClientTimeout(
+            total=patience + size / SLOWEST, sock_connect=patience, sock_read=patience
+        )
         session = await self._system.set_session()
         self._remote.requests += 1
         try:
@@ -306,9 +312,11 @@ class _Http:
         said = answer.headers.get("Content-Range", "nothing")
         match = _RANGE.fullmatch(said)
         if match is None or answer.headers.get("Content-Encoding", "identity") != "identity":
-            raise self._refusal(f"got Content-Range {said!r}, Content-Encoding "
-                                f"{answer.headers.get('Content-Encoding')!r}; expected bytes as they are, of a known "
-                                "length")
+            raise self._refusal(
+                f"got Content-Range {said!r}, Content-Encoding "
+                f"{answer.headers.get('Content-Encoding')!r}; expected bytes as they are, of a known "
+                "length"
+            )
         first, last, length = map(int, match.groups())
         self._check_same(length, answer.headers)
         if (first, last + 1) != (offset, min(offset + size, length)):
@@ -319,8 +327,10 @@ class _Http:
         """The server ignores ranges: what it sends is taken as a whole where it can be kept."""
         length = None if "Content-Encoding" in answer.headers else answer.content_length
         if length is not None and length > KEPT_BYTES:
-            raise self._refusal(f"the server ignores byte ranges and the file has {length} bytes; expected ranges, or "
-                                f"at most {KEPT_BYTES} bytes")
+            raise self._refusal(
+                f"the server ignores byte ranges and the file has {length} bytes; expected ranges, or "
+                f"at most {KEPT_BYTES} bytes"
+            )
         data = await self._body(answer, length)
         self._check_same(len(data), answer.headers)
         return data
@@ -354,8 +364,10 @@ class _Http:
         pairs += [(name, tags[name], self._tags[name]) for name in tags if name in self._tags]
         for name, got, expected in pairs:
             if got != expected:
-                raise self._refusal(f"the file was changed on the server since it was opened: got {name} of {got}, "
-                                    f"expected {expected}; open it again")
+                raise self._refusal(
+                    f"the file was changed on the server since it was opened: got {name} of {got}, "
+                    f"expected {expected}; open it again"
+                )
 
     def _refusal(self, reason: str) -> RemoteError:
         return RemoteError(f"{self._shown}: {reason}")

@@ -13,8 +13,9 @@ def decoding_bytes(vertex_count: int, frames: int) -> int:
     return vertex_count * (3 * frames * (4 + 8 + 8) + 8 * PIECE_VERTICES)
 
 
-def split_segments(frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT,
-                   memory: int = 2 << 30) -> list[tuple[int, int]]:
+def split_segments(
+    frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT, memory: int = 2 << 30
+) -> list[tuple[int, int]]:
     """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 128 MiB, or where a
     decoder would need more than `memory` bytes."""
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))

@@ -45,12 +45,17 @@ def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], lev
         chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
         for chunk in chunks:
             if not file.is_available(chunk):
-                raise Truncated(f"{chunk}: got a file of {file.available_length} bytes; expected at least "
-                                f"{chunk.offset + chunk.length}")
+                raise Truncated(
+                    f"{chunk}: got a file of {file.available_length} bytes; expected at least "
+                    f"{chunk.offset + chunk.length}"
+                )
         errors = file.errors[: level + 1]
         whole = level + 1 == file.full_level_count
-        header = replace(file.header, level_count=level + 1,
-                         max_error=file.max_error_bound if whole else float(errors[level, :, 0].max()))
+        header = replace(
+            file.header,
+            level_count=level + 1,
+            max_error=file.max_error_bound if whole else float(errors[level, :, 0].max()),
+        )
         with new_file(target) as out:
             out.write(ct.pack_front(header, chunks, errors))
             for chunk in chunks:

@@ -29,8 +29,10 @@ INSTALL = 'pip install "athcodec[view]"'
 PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
 
 _MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
-_POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' data:; style-src 'unsafe-inline'; "
-           "img-src data: blob:; worker-src blob:; connect-src 'none'; base-uri 'none'; form-action 'none'")
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' data:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:; connect-src 'none'; base-uri 'none'; form-action 'none'"
+)
 
 
 def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip: str | None = None) -> int:
@@ -83,16 +85,21 @@ def self_contained(data: bytes, name: str, clip: str | None = None) -> str:
     main = _script((WEB / "viewer.js").read_text("utf-8"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
     first = "" if clip is None else f' data-clip="{html.escape(clip)}"'
-    file = (f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}"{first}>'
-            f"{base64.b64encode(data).decode()}</script>")
+    file = (
+        f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}"{first}>'
+        f"{base64.b64encode(data).decode()}</script>"
+    )
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
         (r'<link rel="modulepreload"[^>]*>\n', ""),
         (r'<link rel="stylesheet"[^>]*>', f"<style>{(WEB / 'viewer.css').read_text('utf-8')}</style>"),
         (_MAP.pattern, f'<script type="importmap">{inside}</script>'),
         (r'<script type="module" src="viewer.js"></script>', ""),
-        (r"</body>", f'<script type="text/plain" id="ath-worker">{worker}</script>\n{file}\n'
-                     f'<script type="module">{main}</script>\n</body>'),
+        (
+            r"</body>",
+            f'<script type="text/plain" id="ath-worker">{worker}</script>\n{file}\n'
+            f'<script type="module">{main}</script>\n</body>',
+        ),
     ):
         text = re.sub(old, lambda _, new=new: new, text, flags=re.DOTALL)
     return text
@@ -112,8 +119,9 @@ def file_name(path: str | os.PathLike[str]) -> str:
     return path.replace("\\", "/").rstrip("/").rpartition("/")[2] or "file.ath"
 
 
-def serve(path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print,
-          clip: str | None = None) -> None:
+def serve(
+    path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print, clip: str | None = None
+) -> None:
     """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
 
     Parameters

@@ -35,11 +35,28 @@ from bench import (
     viewer,
 )
 
-VERBS = {"data": data, "rd": rd, "scale": scale, "paper": paper, "report": report, "quick": quick,
-         "sizes": sizes, "levels": levels, "speed": speed, "memory": memory, "decode": decode,
-         "picture": picture, "hierarchy": hierarchy, "batch": batch, "viewer": viewer,
-         "large": large, "forest": forest, "remote": remote, "fault-injection": fault_injection,
-         "motions": motions}
+VERBS = {
+    "data": data,
+    "rd": rd,
+    "scale": scale,
+    "paper": paper,
+    "report": report,
+    "quick": quick,
+    "sizes": sizes,
+    "levels": levels,
+    "speed": speed,
+    "memory": memory,
+    "decode": decode,
+    "picture": picture,
+    "hierarchy": hierarchy,
+    "batch": batch,
+    "viewer": viewer,
+    "large": large,
+    "forest": forest,
+    "remote": remote,
+    "fault-injection": fault_injection,
+    "motions": motions,
+}
 
 
 def main(argv: Sequence[str]) -> int:

@@ -60,8 +60,14 @@ def add_windows(parser: argparse.ArgumentParser) -> None:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_windows(parser)
-    parser.add_argument("--workers", type=int, nargs="+", default=list(WORKERS), metavar="N",
-                        help="numbers of workers; others are compared with the first (default 1 2)")
+    parser.add_argument(
+        "--workers",
+        type=int,
+        nargs="+",
+        default=list(WORKERS),
+        metavar="N",
+        help="numbers of workers; others are compared with the first (default 1 2)",
+    )
     parser.add_argument("--rounds", type=int, default=1, metavar="N", help="(default %(default)s)")
 
 
@@ -78,13 +84,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 runs.setdefault(str(workers), []).append(_run(source, out, settings, workers))
                 broken += _differences(Path(folder, f"loop_{number}"), out)
         files = [path.stat().st_size for path in Path(folder, "loop_0").iterdir()]
-    rows = [{"workers": name, "clips": args.clips, "bytes": sum(files)}
-            | {column: median(figures[column] for figures in rounds) for column in rounds[0]}
-            | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)}
-            for name, rounds in runs.items()]
+    rows = [
+        {"workers": name, "clips": args.clips, "bytes": sum(files)}
+        | {column: median(figures[column] for figures in rounds) for column in rounds[0]}
+        | {"clips/s": args.clips / median(figures["clips s"] for figures in rounds)}
+        for name, rounds in runs.items()
+    ]
     note = NOTE.format(frames=args.frames, vertices=vertices, rounds=args.rounds)
-    return {"tables": [table(f"Many clips, bound {args.rel_error:g}", rows, note),
-                       table("Speed-up by further workers", _ratios(runs, args.workers), RATIO_NOTE)], "broken": broken}
+    return {
+        "tables": [
+            table(f"Many clips, bound {args.rel_error:g}", rows, note),
+            table("Speed-up by further workers", _ratios(runs, args.workers), RATIO_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 def make_clips(args: argparse.Namespace, folder: Path) -> int:
@@ -94,8 +107,14 @@ def make_clips(args: argparse.Namespace, folder: Path) -> int:
         frames = min(args.frames, clip.frame_count)
         for number, start in enumerate(np.linspace(0, clip.frame_count - frames, args.clips).astype(int)):
             window = athcodec.MotionClip(
-                clip.block(start, start + frames), clip.time[:frames], clip.vertex_branch, clip.branch_parent,
-                clip.source_rest, stem_index=clip.stem_index, metadata=clip.metadata)
+                clip.block(start, start + frames),
+                clip.time[:frames],
+                clip.vertex_branch,
+                clip.branch_parent,
+                clip.source_rest,
+                stem_index=clip.stem_index,
+                metadata=clip.metadata,
+            )
             athcodec.write_hdf5(window, folder / f"clip_{number:04}.h5")
         return clip.vertex_count
 
@@ -125,8 +144,11 @@ def _load() -> dict[str, float]:
 
 
 def _differences(loop: Path, out: Path) -> list[str]:
-    return [f"{path.name}: differs from the file of athcodec.encode" for path in sorted(loop.iterdir())
-            if path.read_bytes() != (out / path.name).read_bytes()]
+    return [
+        f"{path.name}: differs from the file of athcodec.encode"
+        for path in sorted(loop.iterdir())
+        if path.read_bytes() != (out / path.name).read_bytes()
+    ]
 
 
 def _ratios(runs: dict[str, list[dict[str, float]]], workers: list[int]) -> list[dict[str, Any]]:

@@ -41,11 +41,17 @@ def _large(axes, rows: Rows) -> None:
     ns = [1e9 * row["seconds"] / (row["vertices"] * row["frames"]) for row in rows]
     axes.bar(range(len(rows)), ns, 0.5, color=COLOURS[0], label="and peak memory over float32 positions, MB")
     for place, (row, height) in enumerate(zip(rows, ns)):
-        axes.text(place, height, f"{row['peak (MB)']:,.0f} / {row['float32 (MB)']:,.0f}", ha="center", va="bottom",
-                  fontsize=8)
-    axes.set_xticks(range(len(rows)), [
-        f"{row['frames']:,} frames of {row['vertices']:,}\n" + (f"threads: {row['threads']}" if row["threads"] else "")
-        for row in rows])
+        axes.text(
+            place, height, f"{row['peak (MB)']:,.0f} / {row['float32 (MB)']:,.0f}", ha="center", va="bottom", fontsize=8
+        )
+    axes.set_xticks(
+        range(len(rows)),
+        [
+            f"{row['frames']:,} frames of {row['vertices']:,}\n"
+            + (f"threads: {row['threads']}" if row["threads"] else "")
+            for row in rows
+        ],
+    )
     axes.margins(y=0.25)
     _label(axes, "Encoding large clips", "", "ns per vertex and frame")
 
@@ -70,8 +76,13 @@ def _remote(axes, rows: Rows) -> None:
     own = [row for row in rows if row["plants"] == most]
     places = range(len(own))
     for shift, column, colour in ((-0.2, "needed", COLOURS[1]), (0.2, "bytes", COLOURS[0])):
-        axes.barh([place + shift for place in places], [row[column] for row in own], 0.4, color=colour,
-                  label={"needed": "needed", "bytes": "over HTTP, and requests"}[column])
+        axes.barh(
+            [place + shift for place in places],
+            [row[column] for row in own],
+            0.4,
+            color=colour,
+            label={"needed": "needed", "bytes": "over HTTP, and requests"}[column],
+        )
     for place, row in zip(places, own):
         axes.text(row["bytes"], place + 0.2, f" {row['requests']}", va="center", fontsize=8)
     axes.set_yticks(places, [row["what"] for row in own])
@@ -85,6 +96,7 @@ CHARTS = {"scale": _scale, "large": _large, "forest": _forest, "batch": _batch, 
 
 def _grouped(rows: Rows, *names: str) -> Iterator[tuple[Any, Rows]]:
     """Rows grouped and ordered by their value in one column, or their values in several."""
+
     def key(row: dict[str, Any]) -> Any:
         values = tuple(row[name] for name in names)
         return values if len(names) > 1 else values[0]

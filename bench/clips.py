@@ -32,23 +32,38 @@ class Encoded:
 
 
 def add_clips(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP.h5", default=[athcodec.sample_path()],
-                        help="motion clips; by default the sample that ships with athcodec")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        type=Path,
+        metavar="CLIP.h5",
+        default=[athcodec.sample_path()],
+        help="motion clips; by default the sample that ships with athcodec",
+    )
 
 
 def add_rel_error(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--rel-error", type=float, default=REL_ERROR, metavar="FRACTION",
-                        help="error bound over the bounding box's diagonal (default %(default)s)")
+    parser.add_argument(
+        "--rel-error",
+        type=float,
+        default=REL_ERROR,
+        metavar="FRACTION",
+        help="error bound over the bounding box's diagonal (default %(default)s)",
+    )
 
 
 def add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--of", type=Path, default=athcodec.sample_path(), metavar="CLIP.h5",
-                        help="the clip that those measured are made from (default: the sample)")
+    parser.add_argument(
+        "--of",
+        type=Path,
+        default=athcodec.sample_path(),
+        metavar="CLIP.h5",
+        help="the clip that those measured are made from (default: the sample)",
+    )
 
 
 def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
-    parser.add_argument("--effort", choices=EFFORTS, default=default,
-                        help="the encoder's effort (default %(default)s)")
+    parser.add_argument("--effort", choices=EFFORTS, default=default, help="the encoder's effort (default %(default)s)")
 
 
 @contextmanager
@@ -61,8 +76,9 @@ def encoded(path: Path, rel_error: float, effort: str = "default") -> Iterator[E
             yield Encoded(clip, summary, decoder)
 
 
-def measure(clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None,
-            frames: slice | None = None) -> ErrorMeter:
+def measure(
+    clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None, frames: slice | None = None
+) -> ErrorMeter:
     """Errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
     meter = ErrorMeter(clip.rest)
     for start, block in decoder.blocks(level, frames=frames):
@@ -88,11 +104,15 @@ class ReplicatedPlants:
         source = self._clip
         parent, offset = source.branch_parent, np.arange(plants)[:, None] * source.branch_count
         index = None if source.stem_index is None else np.tile(source.stem_index, plants)
-        with Hdf5Writer(path, time=np.arange(frames) / source.fps,
-                        vertex_branch=(source.vertex_branch + offset).ravel(),
-                        branch_parent=np.where(parent < 0, -1, parent + offset).ravel(),
-                        rest=np.tile(source.rest.astype(np.float32), (plants, 1)), stem_index=index,
-                        metadata=source.metadata) as writer:
+        with Hdf5Writer(
+            path,
+            time=np.arange(frames) / source.fps,
+            vertex_branch=(source.vertex_branch + offset).ravel(),
+            branch_parent=np.where(parent < 0, -1, parent + offset).ravel(),
+            rest=np.tile(source.rest.astype(np.float32), (plants, 1)),
+            stem_index=index,
+            metadata=source.metadata,
+        ) as writer:
             for frame in range(frames):
                 writer.add(self._frame(frame, plants).reshape(1, -1, 3))
 

@@ -24,8 +24,7 @@ from athcodec._library import library_path
 from bench.codecs import Codec
 from bench.codecs.programs import lossless
 
-SOURCES = (("bench.codecs.ours", None), ("bench.codecs.programs", "PROGRAMS"),
-           ("bench.codecs.baselines", "BASELINES"))
+SOURCES = (("bench.codecs.ours", None), ("bench.codecs.programs", "PROGRAMS"), ("bench.codecs.baselines", "BASELINES"))
 OURS = "athcodec"
 DISTRIBUTIONS = ("athcodec", "numpy", "zstandard")
 
@@ -59,8 +58,11 @@ def chosen(names: Iterable[str]) -> dict[str, Codec]:
     Raises SystemExit for an unknown name.
     """
     names = list(names)
-    return {name: _named(name) for name in names} if names else {
-        codec.name: codec for codec in all_codecs() if not is_lossless(codec)}
+    return (
+        {name: _named(name) for name in names}
+        if names
+        else {codec.name: codec for codec in all_codecs() if not is_lossless(codec)}
+    )
 
 
 def _named(name: str) -> Codec:

@@ -51,8 +51,11 @@ def savings(points: list[Point], ours: str) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"against": codec}
         for error, name in (("max", "max error"), ("rms", "RMS")):
             saving = mean_saving(curve(points, ours, error), curve(points, codec, error))
-            row |= {f"{name}: saved %": saving and saving.percent, f"{name} from": saving and saving.low,
-                    f"{name} to": saving and saving.high}
+            row |= {
+                f"{name}: saved %": saving and saving.percent,
+                f"{name} from": saving and saving.low,
+                f"{name} to": saving and saving.high,
+            }
         rows.append(row)
     return rows
 
@@ -74,13 +77,19 @@ def ratios(points: list[Point], ours: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _ratio_row(against: str, error: str, size: float | None, others: dict[str, float],
-               target: float) -> dict[str, Any]:
+def _ratio_row(against: str, error: str, size: float | None, others: dict[str, float], target: float) -> dict[str, Any]:
     best = min(others, key=others.get, default=None)
     ratio = others[best] / size if best is not None and size is not None else None
-    return {"against": against, "at": error, "bytes": size and round(size), "best of them": best,
-            "its bytes": best and round(others[best]), "ratio": ratio, "target": target,
-            "met": None if ratio is None else ratio >= target}
+    return {
+        "against": against,
+        "at": error,
+        "bytes": size and round(size),
+        "best of them": best,
+        "its bytes": best and round(others[best]),
+        "ratio": ratio,
+        "target": target,
+        "met": None if ratio is None else ratio >= target,
+    }
 
 
 def over_clips(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -93,9 +102,18 @@ def over_clips(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         found = {row["clip"]: row["ratio"] for row in members if row["ratio"] is not None}
         least = min(found, key=found.get, default=None)
         mean = exp(sum(map(log, found.values())) / len(found)) if found else None
-        result.append({"codec": codec, "against": against, "at": error, "clips": len(found),
-                       "geometric mean": mean,
-                       "least": least and found[least], "least on": least, "target": target,
-                       "mean meets it": None if mean is None else mean >= target,
-                       "all meet it": None if least is None else found[least] >= target})
+        result.append(
+            {
+                "codec": codec,
+                "against": against,
+                "at": error,
+                "clips": len(found),
+                "geometric mean": mean,
+                "least": least and found[least],
+                "least on": least,
+                "target": target,
+                "mean meets it": None if mean is None else mean >= target,
+                "all meet it": None if least is None else found[least] >= target,
+            }
+        )
     return result

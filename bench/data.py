@@ -61,10 +61,15 @@ class Simulated:
         plant = grow(self.nodes, self.orders, self.height, self.seed)
         motion = simulate(plant, self.wind, self.frames)
         return athcodec.MotionClip(
-            motion.positions, motion.time, plant.branch, plant.branch_parent,
-            rest=plant.position.astype(np.float32), edges=plant.edges,
+            motion.positions,
+            motion.time,
+            plant.branch,
+            plant.branch_parent,
+            rest=plant.position.astype(np.float32),
+            edges=plant.edges,
             attributes={"radius": plant.radius.astype(np.float32)},
-            metadata={"unit": "m", "up_axis": "y", "fps": 30} | motion.settings)
+            metadata={"unit": "m", "up_axis": "y", "fps": 30} | motion.settings,
+        )
 
     def __str__(self) -> str:
         return f"MuJoCo, {self.height:g} m tree in wind of {self.wind_speed:g} m/s"
@@ -210,12 +215,19 @@ def tip_motion(clip: athcodec.MotionClip) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="*", metavar="NAME",
-                        help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or HDF5 clips by path")
-    parser.add_argument("--suite", choices=tuple(SUITES),
-                        help="a set of clips (quick, where nothing is named)")
-    parser.add_argument("--folder", type=Path, metavar="DIR",
-                        help=f"where clips are kept (default ${FOLDER_VARIABLE} or {DEFAULT_FOLDER})")
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or HDF5 clips by path",
+    )
+    parser.add_argument("--suite", choices=tuple(SUITES), help="a set of clips (quick, where nothing is named)")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        metavar="DIR",
+        help=f"where clips are kept (default ${FOLDER_VARIABLE} or {DEFAULT_FOLDER})",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -239,7 +251,12 @@ def _wanted(names: Sequence[str], suite: str | None) -> list[str]:
 
 
 def _row(clip: athcodec.MotionClip) -> dict[str, Any]:
-    return {"vertices": clip.vertex_count, "frames": clip.frame_count, "branches": clip.branch_count,
-            "orders": f"0-{int(branch_orders(clip.branch_parent).max())}",
-            "faces": None if clip.faces is None else len(clip.faces),
-            "float32 MB": 12e-6 * clip.vertex_count * clip.frame_count, "tips %": 100 * tip_motion(clip)}
+    return {
+        "vertices": clip.vertex_count,
+        "frames": clip.frame_count,
+        "branches": clip.branch_count,
+        "orders": f"0-{int(branch_orders(clip.branch_parent).max())}",
+        "faces": None if clip.faces is None else len(clip.faces),
+        "float32 MB": 12e-6 * clip.vertex_count * clip.frame_count,
+        "tips %": 100 * tip_motion(clip),
+    }

@@ -27,7 +27,7 @@ typedef struct {
 typedef struct {
     ath_segment **segments;
     float *matrices, *exact;
-    size_t matrix_floats, shown_floats; /* matrices; these and exact vertices */
+    size_t matrix_floats, shown_floats;                          /* matrices; these and exact vertices */
     double *prepare_ms, *frames_ms, *positions_us, *matrices_us; /* one per round */
     uint32_t crc;
 } level_run;
@@ -111,8 +111,8 @@ static void prepare(const opened *clip, int32_t segment, int32_t level, ath_segm
     expect_ok("ath_prepare", result);
 }
 
-static void write_frame(const opened *clip, ath_segment *const *segments, int32_t count, double frame,
-                        ath_order order, float *xyz)
+static void write_frame(const opened *clip, ath_segment *const *segments, int32_t count, double frame, ath_order order,
+                        float *xyz)
 {
     const ath_segment *const *given = (const ath_segment *const *)segments;
     expect_ok("ath_positions", ath_positions(clip->file, given, count, frame, order, xyz, 3 * sizeof(float)));
@@ -193,11 +193,9 @@ static void measure_level(const opened *clip, int32_t level, int round, level_ru
     double written = now_ms();
     if (round == 0) run->crc = crc_of(clip, xyz);
     double playing = now_ms();
-    for (int32_t t = 0; t < frames; t++)
-        write_frame(clip, run->segments, segments, t + BETWEEN, ATH_FILE_ORDER, xyz);
+    for (int32_t t = 0; t < frames; t++) write_frame(clip, run->segments, segments, t + BETWEEN, ATH_FILE_ORDER, xyz);
     double played = now_ms();
-    for (int32_t t = 0; t < frames; t++)
-        write_matrices(clip, run->segments, t + BETWEEN, run->matrices, run->exact);
+    for (int32_t t = 0; t < frames; t++) write_matrices(clip, run->segments, t + BETWEEN, run->matrices, run->exact);
     double skinned = now_ms();
     run->prepare_ms[round] = prepared - start;
     run->frames_ms[round] = written - prepared;
@@ -285,7 +283,7 @@ typedef struct {
     const level_run *runs;
     const int32_t *levels; /* of instance i: levels[i % level_count] */
     int level_count, count;
-    float *ring;           /* where what is shown goes, one instance behind the other */
+    float *ring; /* where what is shown goes, one instance behind the other */
     size_t ring_floats;
 } crowd;
 

@@ -84,14 +84,21 @@ prepared before and shared. Even mix: levels in rotation.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP", default=[athcodec.sample_path()],
-                        help="motion clips, which are encoded first, or .ath files; by default the sample "
-                             "that ships with athcodec")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        type=Path,
+        metavar="CLIP",
+        default=[athcodec.sample_path()],
+        help="motion clips, which are encoded first, or .ath files; by default the sample that ships with athcodec",
+    )
     add_rel_error(parser)
-    for name, count, what in (("rounds", ROUNDS, "runs of everything"), ("seeks", SEEKS, "random frames"),
-                              ("instances", INSTANCES, "plants shown at once")):
-        parser.add_argument(f"--{name}", type=int, default=count, metavar="N",
-                            help=f"{what} (default %(default)s)")
+    for name, count, what in (
+        ("rounds", ROUNDS, "runs of everything"),
+        ("seeks", SEEKS, "random frames"),
+        ("instances", INSTANCES, "plants shown at once"),
+    ):
+        parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"{what} (default %(default)s)")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -104,20 +111,28 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             case = Case(path, folder, args.rel_error, program)
             whole = _whole(case, folder, args.rounds)
             figures = case.program("all", args.rounds, args.seeks, args.instances)
-            rows = {"target": _target_rows(figures, whole), "whole": whole, "levels": level_rows(figures),
-                    "memory": memory_rows(figures), "instances": _instance_rows(figures)}
+            rows = {
+                "target": _target_rows(figures, whole),
+                "whole": whole,
+                "levels": level_rows(figures),
+                "memory": memory_rows(figures),
+                "instances": _instance_rows(figures),
+            }
             for key, added in rows.items():
                 tables[key] += [{"clip": path.stem} | row for row in added]
             broken += case.broken(figures["levels"][-1]["crc"])
     setups = {"layouts": len(SZ3_LAYOUTS), "algorithms": len(SZ3_ALGORITHMS)}
     whole_note = WHOLE_NOTE.format(rounds=args.rounds, **setups)
-    return {"tables": [
-        table(f"Decoding, bound {args.rel_error:g}, beside the targets", tables["target"], TARGET_NOTE),
-        table("Whole decoding, medians in ms", tables["whole"], whole_note),
-        table("Levels, medians", tables["levels"], LEVELS_NOTE),
-        table("Memory", tables["memory"], MEMORY_NOTE),
-        table("Instances", tables["instances"], INSTANCES_NOTE),
-    ], "broken": broken}
+    return {
+        "tables": [
+            table(f"Decoding, bound {args.rel_error:g}, beside the targets", tables["target"], TARGET_NOTE),
+            table("Whole decoding, medians in ms", tables["whole"], whole_note),
+            table("Levels, medians", tables["levels"], LEVELS_NOTE),
+            table("Memory", tables["memory"], MEMORY_NOTE),
+            table("Instances", tables["instances"], INSTANCES_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 # ---- clips and the program ----
@@ -194,8 +209,10 @@ def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
             for name, ms in theirs.items():
                 read[name].append(ms)
     size, error = case.file.stat().st_size, case.max_error
-    rows = [_whole_row(case, "athcodec", decode, decode, size, error),
-            _whole_row(case, "athcodec, opening included", opening, decode, size, error)]
+    rows = [
+        _whole_row(case, "athcodec", decode, decode, size, error),
+        _whole_row(case, "athcodec, opening included", opening, decode, size, error),
+    ]
     for other in others:
         rows.append(_whole_row(case, other.name, read[other.name], decode, other.bytes, other.max_error))
     if pysz is None:
@@ -203,13 +220,19 @@ def _whole(case: Case, folder: Path, rounds: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _whole_row(case: Case, name: str, runs: list[float], ours: list[float], size: int,
-               max_error: float) -> dict[str, Any]:
+def _whole_row(
+    case: Case, name: str, runs: list[float], ours: list[float], size: int, max_error: float
+) -> dict[str, Any]:
     middle = median(runs)
     return {
-        "reader": name, "ms": middle, "min": min(runs), "max": max(runs),
-        "M vertex-frames/s": case.vertex_frames / middle / 1e3, "ratio": middle / median(ours),
-        "bytes": size, "error/bound": max_error / case.bound,
+        "reader": name,
+        "ms": middle,
+        "min": min(runs),
+        "max": max(runs),
+        "M vertex-frames/s": case.vertex_frames / middle / 1e3,
+        "ratio": middle / median(ours),
+        "bytes": size,
+        "error/bound": max_error / case.bound,
     }
 
 
@@ -217,8 +240,14 @@ def _hdf5_reader(case: Case, folder: Path) -> _Reader:
     file, out = folder / "clip.h5", np.zeros_like(case.positions)
     frames = max(1, min(len(out), GZIP_CHUNK // out[0].nbytes))
     with h5py.File(file, "w") as target:
-        stored = target.create_dataset("positions", data=case.positions, chunks=(frames, *out.shape[1:]),
-                                       compression="gzip", compression_opts=4, shuffle=True)
+        stored = target.create_dataset(
+            "positions",
+            data=case.positions,
+            chunks=(frames, *out.shape[1:]),
+            compression="gzip",
+            compression_opts=4,
+            shuffle=True,
+        )
         size = stored.id.get_storage_size()
 
     def read() -> float:
@@ -309,13 +338,22 @@ def level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
     for level in figures["levels"]:
         share = 1e3 * level["prepare_ms"] / figures["frames"]
         vertices, matrices = level["positions_us"], level["matrices_us"]
-        rows.append({
-            "level": level["level"], "nodes": level["nodes"], "exact": level["exact_vertices"],
-            "bytes": level["bytes"], "%": 100 * level["bytes"] / figures["file_bytes"],
-            "prepare": level["prepare_ms"], "write": level["frames_ms"], "vertices": vertices,
-            "matrices": matrices, "playing vertices": share + vertices, "playing matrices": share + matrices,
-            "CRC-32C": f"{level['crc']:08x}",
-        })
+        rows.append(
+            {
+                "level": level["level"],
+                "nodes": level["nodes"],
+                "exact": level["exact_vertices"],
+                "bytes": level["bytes"],
+                "%": 100 * level["bytes"] / figures["file_bytes"],
+                "prepare": level["prepare_ms"],
+                "write": level["frames_ms"],
+                "vertices": vertices,
+                "matrices": matrices,
+                "playing vertices": share + vertices,
+                "playing matrices": share + matrices,
+                "CRC-32C": f"{level['crc']:08x}",
+            }
+        )
     return rows
 
 
@@ -328,12 +366,20 @@ def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
             row = {name: figures[f"{name}_bytes"] for name in ("file", "opened", "bases", "work")}
             row["segments"] = count * levels[level]["segment_bytes"]
             whole = {"sum": sum(row.values()), "positions": positions}
-            rows.append({"level": level, "prepared": count} | row | whole
-                        | {"over positions": whole["sum"] / positions})
+            rows.append(
+                {"level": level, "prepared": count} | row | whole | {"over positions": whole["sum"] / positions}
+            )
     return rows
 
 
 def _instance_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    return [{"level": "even mix" if row["level"] < 0 else str(row["level"]), "instances": row["instances"],
-             "pictures": row["pictures"], "ms": row["ms"], "instances/ms": row["per_ms"]}
-            for row in figures["instances"]]
+    return [
+        {
+            "level": "even mix" if row["level"] < 0 else str(row["level"]),
+            "instances": row["instances"],
+            "pictures": row["pictures"],
+            "ms": row["ms"],
+            "instances/ms": row["per_ms"],
+        }
+        for row in figures["instances"]
+    ]

@@ -52,12 +52,25 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         final, broken = batch.check_files()
     done = [row["new"] for row in rows]
     if sum(done) != args.clips or any(row["again"] for row in rows) or done[2:] != [1, 0]:
-        broken.append(f"new clips of the runs: got {done}, again {[row['again'] for row in rows]}; expected every clip "
-                      "once, one of them in the third run")
-    facts = {"clips": args.clips, "frames": args.frames, "vertices": batch.vertices, "bound": args.rel_error,
-             "effort": args.effort, "workers": WORKERS}
-    return {"tables": [table("A batch under fault injection", rows, NOTE.format(**facts)),
-                       table("Files at the end", [final], END_NOTE)], "broken": broken}
+        broken.append(
+            f"new clips of the runs: got {done}, again {[row['again'] for row in rows]}; expected every clip "
+            "once, one of them in the third run"
+        )
+    facts = {
+        "clips": args.clips,
+        "frames": args.frames,
+        "vertices": batch.vertices,
+        "bound": args.rel_error,
+        "effort": args.effort,
+        "workers": WORKERS,
+    }
+    return {
+        "tables": [
+            table("A batch under fault injection", rows, NOTE.format(**facts)),
+            table("Files at the end", [final], END_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 class _FaultyBatch:
@@ -79,18 +92,34 @@ class _FaultyBatch:
         yield self._row("resumed, nothing left to do", *self._finished())
 
     def _start(self) -> subprocess.Popen:
-        words = [str(self.source), "--out", str(self.out), "--rel-error", str(self.args.rel_error),
-                 "--effort", self.args.effort, "--workers", str(WORKERS), "--json"]
-        return subprocess.Popen([sys.executable, "-m", "athcodec", "batch", *words], cwd=self.folder, text=True,
-                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        words = [
+            str(self.source),
+            "--out",
+            str(self.out),
+            "--rel-error",
+            str(self.args.rel_error),
+            "--effort",
+            self.args.effort,
+            "--workers",
+            str(WORKERS),
+            "--json",
+        ]
+        return subprocess.Popen(
+            [sys.executable, "-m", "athcodec", "batch", *words],
+            cwd=self.folder,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
 
     def _killed(self) -> tuple[int, dict[str, Any]]:
         import psutil  # comes with dask.distributed
 
         process = self._start()
         self._wait(process, self.args.clips // 4)
-        workers = [child for child in psutil.Process(process.pid).children()
-                   if "spawn_main" in " ".join(child.cmdline())]
+        workers = [
+            child for child in psutil.Process(process.pid).children() if "spawn_main" in " ".join(child.cmdline())
+        ]
         workers[0].kill()
         self._wait(process, self.args.clips // 2)
         workers += psutil.Process(process.pid).children()
@@ -118,9 +147,14 @@ class _FaultyBatch:
 
     def _row(self, run: str, code: int, report: dict[str, Any]) -> dict[str, Any]:
         lines, done_before = self._lines(), self._done(self._lines_before)
-        added = self._done(lines[len(self._lines_before):])
-        row = {"run": run, "exit code": code, "lines": len(lines) - len(self._lines_before),
-               "new": len(added - done_before), "again": len(added & done_before)}
+        added = self._done(lines[len(self._lines_before) :])
+        row = {
+            "run": run,
+            "exit code": code,
+            "lines": len(lines) - len(self._lines_before),
+            "new": len(added - done_before),
+            "again": len(added & done_before),
+        }
         self._lines_before = lines
         return row | {name: report.get(name) for name in ("done", "kept", "failed")} | {"parts": len(self._parts())}
 
@@ -137,12 +171,15 @@ class _FaultyBatch:
         done = [line for line in self._lines() if line["status"] == "done"]
         counts, checksums = Counter(line["output"] for line in done), {line["output"]: line["sha256"] for line in done}
         files = sorted(self.out.glob("*.ath"))
-        checks = {"once": lambda path: counts[path.name] == 1 and checksums[path.name] == sha256(path),
-                  "verified": _is_intact,
-                  "identical": lambda path: path.read_bytes() == (alone / path.name).read_bytes()}
+        checks = {
+            "once": lambda path: counts[path.name] == 1 and checksums[path.name] == sha256(path),
+            "verified": _is_intact,
+            "identical": lambda path: path.read_bytes() == (alone / path.name).read_bytes(),
+        }
         faults = {check: [path.name for path in files if not passes(path)] for check, passes in checks.items()}
         row = {"clips": self.args.clips, "files": len(files)} | {
-            check: len(files) - len(names) for check, names in faults.items()}
+            check: len(files) - len(names) for check, names in faults.items()
+        }
         broken = [f"{name}: not {check}" for check, names in faults.items() for name in names]
         if len(files) != self.args.clips:
             broken.append(f"files: got {len(files)}; expected {self.args.clips}")

@@ -19,7 +19,7 @@ enum { LEVELS = 32, SLOTS = 3, MOTION = 16, STATIC = 32, SHAPES = 19, UNIT_POSES
 
 static const double FOV = 1.0471975511965976, SCREEN = 1080.0, PIXELS = 1.0; /* vertical; radians, pixels */
 static const double GOLDEN = 0.6180339887498949;
-static const double HASTE = 1.25;   /* preparations go on so much faster than they have to */
+static const double HASTE = 1.25; /* preparations go on so much faster than they have to */
 
 /* A clip, at each level in use with the segment that plays, the one before and the one behind it. It has the file to
  * itself and all of its segments; clips that share a file would share `file` and have some each. */
@@ -28,28 +28,38 @@ typedef struct {
     size_t size, memory;
     ath_file *file;
     ath_info info;
-    int32_t frame, segment;   /* that play: the later one of those that are blended */
-    int32_t shortest;         /* frames of the shortest segment */
-    long number;              /* of the segment that plays, counted on from loop to loop */
-    double ahead, loop;       /* seconds that the clip is ahead of the clock; of one round */
+    int32_t frame, segment; /* that play: the later one of those that are blended */
+    int32_t shortest;       /* frames of the shortest segment */
+    long number;            /* of the segment that plays, counted on from loop to loop */
+    double ahead, loop;     /* seconds that the clip is ahead of the clock; of one round */
     int used[LEVELS];
     ath_segment *slots[LEVELS][SLOTS];
 } clip;
 
-typedef struct { int32_t clip, phase; double distance; } instance;
-typedef struct { int32_t clip, level, phase; size_t at; } pose; /* at: in floats */
-typedef struct { clip *of; int32_t level, segment; long number; } job;
+typedef struct {
+    int32_t clip, phase;
+    double distance;
+} instance;
+typedef struct {
+    int32_t clip, level, phase;
+    size_t at;
+} pose; /* at: in floats */
+typedef struct {
+    clip *of;
+    int32_t level, segment;
+    long number;
+} job;
 
 typedef struct {
     clip *clips;
     instance *instances;
     pose *poses;
-    job *jobs;                /* a ring, oldest first */
-    int32_t *pose_of;         /* by clip, level and phase; -1: nobody shows it */
-    int32_t *shown;           /* the pose of each instance in this picture */
+    job *jobs;        /* a ring, oldest first */
+    int32_t *pose_of; /* by clip, level and phase; -1: nobody shows it */
+    int32_t *shown;   /* the pose of each instance in this picture */
     int32_t clip_count, instance_count, pose_count, phases;
     int32_t job_count, first_job, job_room, steps_left, steps_per_picture;
-    int begun;                /* the first job has been */
+    int begun; /* the first job has been */
     void *work;
     size_t work_bytes;
     float *floats;
@@ -286,8 +296,8 @@ static void read_scene(const char *path, forest *forest)
     for (int32_t i = 0; i < forest->instance_count; i++) {
         instance *each = forest->instances + i;
         expect(fscanf(stream, "%d %lf %d", &each->clip, &each->distance, &each->phase) == 3, path);
-        expect(each->clip >= 0 && each->clip < forest->clip_count && each->phase >= 0
-               && each->phase < forest->phases, path);
+        expect(each->clip >= 0 && each->clip < forest->clip_count && each->phase >= 0 && each->phase < forest->phases,
+               path);
     }
     fclose(stream);
 }
@@ -421,7 +431,9 @@ static double place_of(const forest *forest, const pose *pose, double clock)
     return ath_frame_at(clip->file, 0, clock + clip->ahead - lag, ATH_LOOP);
 }
 
-typedef struct { double choose, prepare, pose; } parts;
+typedef struct {
+    double choose, prepare, pose;
+} parts;
 
 static parts show(forest *forest, double clock)
 {

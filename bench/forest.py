@@ -96,9 +96,13 @@ class Unit:
     def facts(self) -> dict[str, Any]:
         with athcodec.open(self.path) as decoder:
             chunks = [chunk for chunk in decoder.file.chunks if chunk.is_motion]
-            return {"seconds": decoder.frame_count / decoder.fps, "segments": len(decoder.segments),
-                    "vertices": decoder.vertex_count, "prelude": decoder.file.prelude_length,
-                    "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks]}
+            return {
+                "seconds": decoder.frame_count / decoder.fps,
+                "segments": len(decoder.segments),
+                "vertices": decoder.vertex_count,
+                "prelude": decoder.file.prelude_length,
+                "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks],
+            }
 
     @property
     def seconds(self) -> float:
@@ -126,8 +130,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_source(parser)
     parser.add_argument("--instances", type=int, nargs="+", default=list(INSTANCES), metavar="N")
     parser.add_argument("--clips", type=int, nargs="+", default=list(CLIPS), metavar="N", help="unique ones")
-    parser.add_argument("--phases", type=int, nargs="+", default=list(PHASES), metavar="N",
-                        help="phases of the instances of a clip; 0: one each")
+    parser.add_argument(
+        "--phases",
+        type=int,
+        nargs="+",
+        default=list(PHASES),
+        metavar="N",
+        help="phases of the instances of a clip; 0: one each",
+    )
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
     add_effort(parser, "fast")
@@ -150,11 +160,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             broken += scene.differences(played)
         unit_rows = [row for clips in units.values() for row in _unit_rows(clips)]
         facts = units[args.clips[0]][0].facts
-    note = NOTE.format(**facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE,
-                       rounds=args.rounds)
-    return {"tables": [table("Forests", rows, note, FORMULA.format(side=side, wedge=np.degrees(WEDGE))),
-                       table("Time by stage", parts, PARTS_NOTE),
-                       table("Unit costs", unit_rows, UNITS_NOTE)], "broken": broken}
+    note = NOTE.format(
+        **facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE, rounds=args.rounds
+    )
+    return {
+        "tables": [
+            table("Forests", rows, note, FORMULA.format(side=side, wedge=np.degrees(WEDGE))),
+            table("Time by stage", parts, PARTS_NOTE),
+            table("Unit costs", unit_rows, UNITS_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 # ---- clips ----
@@ -165,8 +181,13 @@ def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
     files = [folder / f"clip_{number}.ath" for number in range(max(args.clips))]
     with athcodec.read_hdf5(args.of) as clip:
         for number, file in enumerate(files):
-            athcodec.encode(_variant(clip, number, args.frames), file, rel_error=args.rel_error, effort=args.effort,
-                            attributes="none")
+            athcodec.encode(
+                _variant(clip, number, args.frames),
+                file,
+                rel_error=args.rel_error,
+                effort=args.effort,
+                attributes="none",
+            )
     return files
 
 
@@ -182,8 +203,13 @@ def _variant(clip: athcodec.MotionClip, number: int, frames: int) -> athcodec.Mo
     sway, rest = 0.8 + 0.4 * (GOLDEN * number * 7 % 1), clip.rest.astype(np.float64)
     shape = _turn(2 * pi * GOLDEN * number) * (1, 1, -1 if number % 2 else 1)
     return athcodec.MotionClip(
-        ((rest + sway * (motion - rest)) @ shape.T).astype(np.float32), np.arange(frames) / clip.fps,
-        clip.vertex_branch, clip.branch_parent, (rest @ shape.T).astype(np.float32), stem_index=clip.stem_index)
+        ((rest + sway * (motion - rest)) @ shape.T).astype(np.float32),
+        np.arange(frames) / clip.fps,
+        clip.vertex_branch,
+        clip.branch_parent,
+        (rest @ shape.T).astype(np.float32),
+        stem_index=clip.stem_index,
+    )
 
 
 def _turn(angle: float) -> np.ndarray:
@@ -200,8 +226,10 @@ def _side(file: Path) -> float:
 
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
     measured = _output(program, "units", rounds, *files)
-    return [Unit(file, measured["choice_us"], clip["prepare_ms"], measured["pose_us"])
-            for file, clip in zip(files, measured["clips"], strict=True)]
+    return [
+        Unit(file, measured["choice_us"], clip["prepare_ms"], measured["pose_us"])
+        for file, clip in zip(files, measured["clips"], strict=True)
+    ]
 
 
 def _output(program: Path, *words: object) -> Any:
@@ -211,10 +239,15 @@ def _output(program: Path, *words: object) -> Any:
 
 def _unit_rows(units: list[Unit]) -> Iterator[dict[str, Any]]:
     for level in range(min(len(unit.pose_us) for unit in units)):
-        yield {"clips": len(units), "level": level, "prepare ms": np.mean([unit.prepare_ms[level] for unit in units]),
-               "pose us": units[0].pose_us[level], "choice us": units[0].choice_us,
-               "bytes": round(np.mean([unit.bytes({level}) for unit in units])),
-               "prelude": round(np.mean([unit.facts["prelude"] for unit in units]))}
+        yield {
+            "clips": len(units),
+            "level": level,
+            "prepare ms": np.mean([unit.prepare_ms[level] for unit in units]),
+            "pose us": units[0].pose_us[level],
+            "choice us": units[0].choice_us,
+            "bytes": round(np.mean([unit.bytes({level}) for unit in units])),
+            "prelude": round(np.mean([unit.facts["prelude"] for unit in units])),
+        }
 
 
 # ---- forests ----
@@ -259,28 +292,46 @@ class Scene:
         for clip, level in self.poses:
             used.setdefault(clip, set()).add(level)
         units, poses = self.units, self.poses.items()
-        return {"bytes_per_s": sum(units[clip].bytes_per_s(levels) for clip, levels in used.items()),
-                "choose_ms": sum(units[self.clip_of(i)].choice_us for i in range(len(self.distances))) / 1e3,
-                "prepare_ms": sum(units[clip].prepare_share(level) for (clip, level), _ in poses),
-                "pose_ms": sum(count * units[clip].pose_us[level] for (clip, level), count in poses) / 1e3}
+        return {
+            "bytes_per_s": sum(units[clip].bytes_per_s(levels) for clip, levels in used.items()),
+            "choose_ms": sum(units[self.clip_of(i)].choice_us for i in range(len(self.distances))) / 1e3,
+            "prepare_ms": sum(units[clip].prepare_share(level) for (clip, level), _ in poses),
+            "pose_ms": sum(count * units[clip].pose_us[level] for (clip, level), count in poses) / 1e3,
+        }
 
     def play(self, program: Path, folder: Path, rounds: int) -> dict[str, Any]:
         """Results of forest.c, with medians of its times."""
         file = folder / "scene.txt"
-        file.write_text("\n".join([
-            f"{self.phase_count} {len(self.units)}", *(str(unit.path) for unit in self.units),
-            f"{len(self.distances)}", *(f"{self.clip_of(i)} {distance!r} {self.phase_of(i)}"
-                                        for i, distance in enumerate(self.distances.tolist()))]))
+        file.write_text(
+            "\n".join(
+                [
+                    f"{self.phase_count} {len(self.units)}",
+                    *(str(unit.path) for unit in self.units),
+                    f"{len(self.distances)}",
+                    *(
+                        f"{self.clip_of(i)} {distance!r} {self.phase_of(i)}"
+                        for i, distance in enumerate(self.distances.tolist())
+                    ),
+                ]
+            )
+        )
         runs = [_output(program, "play", file, max(unit.seconds for unit in self.units), RATE) for _ in range(rounds)]
         return runs[0] | {name: median(figures[name] for figures in runs) for name in runs[0] if name.endswith("_ms")}
 
     def row(self, predicted: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
         expected, measured = _ms(predicted), _ms(played)
         return self._name() | {
-            "levels": played["levels"], "poses": played["poses"], "predicted kB/s": predicted["bytes_per_s"] / 1e3,
-            "kB/s": played["bytes_per_s"] / 1e3, "predicted ms": expected, "ms": measured, "p99 ms": played["p99_ms"],
-            "ms/predicted": measured / expected, "us/instance": 1e3 * measured / len(self.distances),
-            "MB": played["memory"] / 1e6}
+            "levels": played["levels"],
+            "poses": played["poses"],
+            "predicted kB/s": predicted["bytes_per_s"] / 1e3,
+            "kB/s": played["bytes_per_s"] / 1e3,
+            "predicted ms": expected,
+            "ms": measured,
+            "p99 ms": played["p99_ms"],
+            "ms/predicted": measured / expected,
+            "us/instance": 1e3 * measured / len(self.distances),
+            "MB": played["memory"] / 1e6,
+        }
 
     def parts(self, predicted: dict[str, float], played: dict[str, Any]) -> dict[str, Any]:
         once = sum(unit.facts["prelude"] for unit in self.units) + played["start_bytes"]

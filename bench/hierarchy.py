@@ -28,8 +28,9 @@ Right: per cent of branches found that are true ones on their true parents. Seco
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", default=["leaves_67k_200f"], metavar="CLIP",
-                        help="a name of `data`, or an HDF5 file")
+    parser.add_argument(
+        "clips", nargs="*", default=["leaves_67k_200f"], metavar="CLIP", help="a name of `data`, or an HDF5 file"
+    )
     add_rel_error(parser)
 
 
@@ -40,17 +41,33 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def measure(path: Path, rel_error: float) -> dict[str, Any]:
     with athcodec.read_hdf5(path) as clip, tempfile.TemporaryDirectory() as folder:
-        bare = dataclasses.replace(clip, vertex_branch=None, branch_parent=None, stem_index=None,
-                                   edges=clip.edges if clip.faces is None else None,
-                                   rest=clip.rest.astype(clip.rest_dtype))
+        bare = dataclasses.replace(
+            clip,
+            vertex_branch=None,
+            branch_parent=None,
+            stem_index=None,
+            edges=clip.edges if clip.faces is None else None,
+            rest=clip.rest.astype(clip.rest_dtype),
+        )
         began = time.perf_counter()
         found = athcodec.find_branches(bare)
         seconds = time.perf_counter() - began
-        true, ours = (athcodec.encode(variant, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
-                      for variant in (clip, discovery.with_branches(bare, found)))
-        return {"clip": path.stem, "vertices": clip.vertex_count, "branches": clip.branch_count,
-                "found": len(found.branch_parent), "by": found.method, "right": right_percent(found, clip),
-                "seconds": seconds, "true bytes": true, "found bytes": ours, "more": 100 * (ours / true - 1)}
+        true, ours = (
+            athcodec.encode(variant, Path(folder, "a.ath"), rel_error=rel_error, attributes="none").bytes
+            for variant in (clip, discovery.with_branches(bare, found))
+        )
+        return {
+            "clip": path.stem,
+            "vertices": clip.vertex_count,
+            "branches": clip.branch_count,
+            "found": len(found.branch_parent),
+            "by": found.method,
+            "right": right_percent(found, clip),
+            "seconds": seconds,
+            "true bytes": true,
+            "found bytes": ours,
+            "more": 100 * (ours / true - 1),
+        }
 
 
 def right_percent(found: discovery.Found, clip: athcodec.MotionClip) -> float:

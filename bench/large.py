@@ -52,8 +52,19 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             if not args.made:
                 _process("store", args.vertices, frames, path)
             for jobs in args.jobs:
-                rows.append(json.loads(_process("encode", args.vertices, frames, "" if args.made else path, jobs,
-                                                args.effort, args.rel_error)))
+                rows.append(
+                    json.loads(
+                        _process(
+                            "encode",
+                            args.vertices,
+                            frames,
+                            "" if args.made else path,
+                            jobs,
+                            args.effort,
+                            args.rel_error,
+                        )
+                    )
+                )
     for row in rows:
         first = next(other for other in rows if other["threads"] == row["threads"])
         single = [other for other in rows if other["threads"] == 1 and other["frames"] == row["frames"]]
@@ -64,8 +75,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _process(*words: object) -> str:
-    done = subprocess.run([sys.executable, "-m", "bench.large", *map(str, words)], check=True, capture_output=True,
-                          text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "bench.large", *map(str, words)], check=True, capture_output=True, text=True
+    )
     return done.stdout
 
 
@@ -104,8 +116,13 @@ def made(vertices: int, frames: int, seed: int = 0) -> MotionClip:
             out[row] = (rest + shift).reshape(-1, 3)
         return out
 
-    return MotionClip(Frames(read, frames, count * STEM), np.arange(frames) / FPS,
-                      np.repeat(np.arange(count), STEM), parent, rest=rest.reshape(-1, 3).astype(np.float32))
+    return MotionClip(
+        Frames(read, frames, count * STEM),
+        np.arange(frames) / FPS,
+        np.repeat(np.arange(count), STEM),
+        parent,
+        rest=rest.reshape(-1, 3).astype(np.float32),
+    )
 
 
 def encode(vertices: int, frames: int, path: str, jobs: int, effort: str, rel_error: float) -> None:
@@ -116,9 +133,19 @@ def encode(vertices: int, frames: int, path: str, jobs: int, effort: str, rel_er
         result = athcodec.encode(clip, Path(folder, "a.ath"), rel_error=rel_error, effort=effort, jobs=jobs or None)
         seconds = time.perf_counter() - began
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    print(json.dumps({"vertices": clip.vertex_count, "frames": frames, "threads": jobs, "seconds": seconds,
-                      "peak (MB)": peak / 1e6, "float32 (MB)": result.raw_bytes / 1e6,
-                      "file (MB)": result.bytes / 1e6}))
+    print(
+        json.dumps(
+            {
+                "vertices": clip.vertex_count,
+                "frames": frames,
+                "threads": jobs,
+                "seconds": seconds,
+                "peak (MB)": peak / 1e6,
+                "float32 (MB)": result.raw_bytes / 1e6,
+                "file (MB)": result.bytes / 1e6,
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -62,16 +62,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 broken += _broken_lines(path, stored, ours, result.decoder)
                 if has_nodes:
                     gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
-    return {"tables": [
-        table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
-        table(f"Gaps at the attach points, {GAP_FRAMES} frames", gaps, GAPS_NOTE),
-    ], "broken": broken}
+    return {
+        "tables": [
+            table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
+            table(f"Gaps at the attach points, {GAP_FRAMES} frames", gaps, GAPS_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
-    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound,
-                             hierarchy=result.decoder.hierarchy)
+    ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=result.decoder.hierarchy)
     ours, theirs = result.decoder.file.table1(), ath.table1()
     if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
         raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
@@ -88,9 +90,12 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
 def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
     diagonal = ours.diagonal
     return {
-        "nodes": stored.nodes, "bytes": stored.bytes,
-        "max": ours.max_error / diagonal, "RMS": ours.rms_error / diagonal,
-        "paper max": paper and paper.max_error / diagonal, "paper RMS": paper and paper.rms_error / diagonal,
+        "nodes": stored.nodes,
+        "bytes": stored.bytes,
+        "max": ours.max_error / diagonal,
+        "RMS": ours.rms_error / diagonal,
+        "paper max": paper and paper.max_error / diagonal,
+        "paper RMS": paper and paper.rms_error / diagonal,
         "ratio": ours.rms_error / paper.rms_error if paper and paper.rms_error else None,
     }
 
@@ -101,8 +106,7 @@ def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec
     allowed = decoder.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
     if ours.max_error <= allowed:
         return []
-    return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; "
-            f"expected at most {allowed:.9g}"]
+    return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; expected at most {allowed:.9g}"]
 
 
 # ---- gaps ----
@@ -116,9 +120,13 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
     joints = _Joints(result.decoder, level)
     ours = joints.gaps(frames)
     return {
-        "joints": len(joints.branch), "measured": len(joints.measured), "loose": joints.loose,
-        "max": ours.max / diagonal, "RMS": ours.rms / diagonal,
-        "paper max": paper.max / diagonal, "paper RMS": paper.rms / diagonal,
+        "joints": len(joints.branch),
+        "measured": len(joints.measured),
+        "loose": joints.loose,
+        "max": ours.max / diagonal,
+        "RMS": ours.rms / diagonal,
+        "paper max": paper.max / diagonal,
+        "paper RMS": paper.rms / diagonal,
     }
 
 
@@ -148,8 +156,7 @@ class _Joints:
         if not len(self.measured):
             return Gaps(0.0, 0.0)
         squares = np.array([self._squares(frame) for frame in frames])
-        return Gaps(float(np.sqrt(squares.max())),
-                    float(np.sqrt(squares.sum() / (len(frames) * len(self.branch)))))
+        return Gaps(float(np.sqrt(squares.max())), float(np.sqrt(squares.sum() / (len(frames) * len(self.branch)))))
 
     def _squares(self, frame: int) -> np.ndarray:
         matrices = self.decoder.affines(frame, self.level).matrices[self._part]

@@ -34,8 +34,14 @@ HDF5's chunk cache, at most 64 MiB, is included: it fills as a clip gets longer.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
-    parser.add_argument("--repeats", type=int, nargs="+", default=list(REPEATS), metavar="N",
-                        help="numbers of repetitions of the clip (default 4 8)")
+    parser.add_argument(
+        "--repeats",
+        type=int,
+        nargs="+",
+        default=list(REPEATS),
+        metavar="N",
+        help="numbers of repetitions of the clip (default 4 8)",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -48,9 +54,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 _process("repeat", str(path.resolve()), longer, str(repeats))
                 peak = _process("encode", longer, file, str(args.rel_error), segment)
             rows.append({"clip": path.stem, "times": repeats} | _row(peak))
-    return {"tables": [
-        table(f"Peak memory of encoding, bound {args.rel_error:g}, MB of 1,000,000 bytes", rows, NOTE),
-    ], "broken": []}
+    return {
+        "tables": [table(f"Peak memory of encoding, bound {args.rel_error:g}, MB of 1,000,000 bytes", rows, NOTE)],
+        "broken": [],
+    }
 
 
 def _segment_frames(path: Path) -> int:
@@ -67,7 +74,11 @@ def _process(*words: str) -> dict[str, int]:
 
 def _row(peak: dict[str, int]) -> dict[str, float | int]:
     return {
-        "frames": peak["frames"], "segments": peak["segments"], "positions": peak["raw_bytes"] / 1e6,
-        "file": peak["bytes"] / 1e6, "imports": peak["imports"] / 1e6, "peak": peak["peak"] / 1e6,
+        "frames": peak["frames"],
+        "segments": peak["segments"],
+        "positions": peak["raw_bytes"] / 1e6,
+        "file": peak["bytes"] / 1e6,
+        "imports": peak["imports"] / 1e6,
+        "peak": peak["peak"] / 1e6,
         "peak - imports": (peak["peak"] - peak["imports"]) / 1e6,
     }

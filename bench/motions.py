@@ -50,15 +50,26 @@ def _row(path: Path, count: int, blend: int, rel_error: float) -> dict[str, Any]
         joined = athcodec.encode(athcodec.join(motions), file, max_error=bound, attributes="none")
         with athcodec.open(file, strict=True) as decoder:
             error = max(measure(motion, decoder.play(name)).max_error for name, motion in motions.items())
-    return {"clip": path.stem, "motions": count, "frames": sum(motion.frame_count for motion in motions.values()),
-            "bytes, one clip": whole.bytes, "bytes, a file each": sum(apart), "bytes, one file": joined.bytes,
-            "one file / a file each": joined.bytes / sum(apart), "seam": max(s.error for s in joined.seams) / bound,
-            "kept": error <= bound}
+    return {
+        "clip": path.stem,
+        "motions": count,
+        "frames": sum(motion.frame_count for motion in motions.values()),
+        "bytes, one clip": whole.bytes,
+        "bytes, a file each": sum(apart),
+        "bytes, one file": joined.bytes,
+        "one file / a file each": joined.bytes / sum(apart),
+        "seam": max(s.error for s in joined.seams) / bound,
+        "kept": error <= bound,
+    }
 
 
 def _windows(clip: athcodec.MotionClip, count: int, blend: int) -> Iterator[tuple[str, athcodec.MotionClip]]:
     for index in range(count):
         start, stop = clip.frame_count * index // count, clip.frame_count * (index + 1) // count
-        part = dataclasses.replace(clip, positions=clip.block(start, stop), time=clip.time[: stop - start],
-                                   rest=clip.rest.astype(clip.rest_dtype))
+        part = dataclasses.replace(
+            clip,
+            positions=clip.block(start, stop),
+            time=clip.time[: stop - start],
+            rest=clip.rest.astype(clip.rest_dtype),
+        )
         yield f"{start}", athcodec.looped(part, blend)

@@ -22,9 +22,24 @@ from bench.decode import Case, compile_program, memory_rows
 from bench.suite import cases
 from bench.tables import table
 
-PAPER = {"clip": "paper, 2011", "frames": 200, "vertices": 8000, "depth": 3, "nodes": 97, "leaves": 68,
-         "epsilon": 358.6, "eta": 15, "xi": 5.7, "lambda": 6, "data MB": 57.6, "memory MB": 3.7,
-         "load us/frame": 4000.0, "near us/frame": 300.0, "far us/frame": 50.0, "ratio": 18.0}
+PAPER = {
+    "clip": "paper, 2011",
+    "frames": 200,
+    "vertices": 8000,
+    "depth": 3,
+    "nodes": 97,
+    "leaves": 68,
+    "epsilon": 358.6,
+    "eta": 15,
+    "xi": 5.7,
+    "lambda": 6,
+    "data MB": 57.6,
+    "memory MB": 3.7,
+    "load us/frame": 4000.0,
+    "near us/frame": 300.0,
+    "far us/frame": 50.0,
+    "ratio": 18.0,
+}
 REL_ERRORS = (1e-3, 1e-4, 1e-5)
 ROUNDS, TRIALS = 5, 24
 XI_RANGE = (1e-7, 1.0)  # over the diagonal
@@ -41,10 +56,21 @@ level 1 as matrices and exact stems; level 0: one matrix. One thread.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[SAMPLE],
-                        help="files CLIP.h5, or names of clips of this benchmark; by default the sample")
-    parser.add_argument("--rel-error", type=float, nargs="+", default=list(REL_ERRORS), metavar="FRACTION",
-                        help="error bounds over the bounding box's diagonal")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        metavar="CLIP",
+        default=[SAMPLE],
+        help="files CLIP.h5, or names of clips of this benchmark; by default the sample",
+    )
+    parser.add_argument(
+        "--rel-error",
+        type=float,
+        nargs="+",
+        default=list(REL_ERRORS),
+        metavar="FRACTION",
+        help="error bounds over the bounding box's diagonal",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -59,8 +85,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                     row = _row(case.name, clip, thresholds, rel_error, folder, program)
                     rows.append(row)
                     if row["max"] > rel_error:
-                        broken.append(f"{case.name}: got an error of {row['max']:.7g} of the diagonal; "
-                                      f"expected at most {rel_error:g}")
+                        broken.append(
+                            f"{case.name}: got an error of {row['max']:.7g} of the diagonal; "
+                            f"expected at most {rel_error:g}"
+                        )
     return {"tables": [table("Table 1 of the paper, and ours", rows, NOTE)], "broken": broken}
 
 
@@ -83,8 +111,9 @@ def thresholds_for(clip: athcodec.MotionClip, nodes: int) -> Thresholds:
     return min(tried, key=lambda thresholds: abs(tried[thresholds] - nodes))
 
 
-def _row(name: str, clip: athcodec.MotionClip, thresholds: Thresholds, rel_error: float, folder: Path,
-         program: Path) -> dict[str, Any]:
+def _row(
+    name: str, clip: athcodec.MotionClip, thresholds: Thresholds, rel_error: float, folder: Path, program: Path
+) -> dict[str, Any]:
     file = folder / "clip.ath"
     summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", tam=thresholds)
     with athcodec.open(file, strict=True) as decoder:
@@ -93,13 +122,25 @@ def _row(name: str, clip: athcodec.MotionClip, thresholds: Thresholds, rel_error
     deep, coarse, root = figures["levels"][-1], figures["levels"][1], figures["levels"][0]
     [memory] = [row for row in memory_rows(figures)[-2:] if row["prepared"] == 1]
     return {
-        "clip": name, "bound": f"{rel_error:g}", "frames": clip.frame_count, "vertices": clip.vertex_count,
-        "depth": nodes["depth"], "nodes": nodes["nodes"], "leaves": nodes["leaves"],
-        "epsilon": thresholds.epsilon / meter.diagonal, "eta": thresholds.eta,
-        "xi": thresholds.xi / meter.diagonal, "lambda": thresholds.lam, "data MB": summary.raw_bytes / 1e6,
-        "memory MB": memory["sum"] / 1e6, "file kB": summary.bytes / 1e3,
-        "load us/frame": 1e3 * deep["prepare_ms"] / figures["frames"], "near us/frame": deep["positions_us"],
-        "far us/frame": coarse["matrices_us"], "level 0 us/frame": root["matrices_us"],
-        "ratio": summary.ratio, "max": meter.max_error / meter.diagonal,
+        "clip": name,
+        "bound": f"{rel_error:g}",
+        "frames": clip.frame_count,
+        "vertices": clip.vertex_count,
+        "depth": nodes["depth"],
+        "nodes": nodes["nodes"],
+        "leaves": nodes["leaves"],
+        "epsilon": thresholds.epsilon / meter.diagonal,
+        "eta": thresholds.eta,
+        "xi": thresholds.xi / meter.diagonal,
+        "lambda": thresholds.lam,
+        "data MB": summary.raw_bytes / 1e6,
+        "memory MB": memory["sum"] / 1e6,
+        "file kB": summary.bytes / 1e3,
+        "load us/frame": 1e3 * deep["prepare_ms"] / figures["frames"],
+        "near us/frame": deep["positions_us"],
+        "far us/frame": coarse["matrices_us"],
+        "level 0 us/frame": root["matrices_us"],
+        "ratio": summary.ratio,
+        "max": meter.max_error / meter.diagonal,
         "RMS": meter.rms_error / meter.diagonal,
     }

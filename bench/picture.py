@@ -72,21 +72,28 @@ def _svg(result: Encoded, frame: int) -> str:
     for i, (level, points) in enumerate(zip(result.decoder.levels, shown)):
         error = np.linalg.norm(points - original, axis=1)
         behind = "".join(path(original, chain) for chain in chains)
-        lines = "".join(f'<path d="{path(points, chain)}" stroke="{_colour(error[chain].max() / worst)}"/>'
-                        for chain in chains)
+        lines = "".join(
+            f'<path d="{path(points, chain)}" stroke="{_colour(error[chain].max() / worst)}"/>' for chain in chains
+        )
         caption = f"level {level.level} &#183; {level.bytes / 1000:.1f} kB"
         furthest = _length(level.max_error, result.clip.metadata.get("unit", ""))
         detail = f"{level.nodes} part{'s' * (level.nodes > 1)} &#183; max error {furthest}"
         left = MARGIN + i * (panel + MARGIN) + (panel - width) / 2
-        panels.append(f'<g transform="translate({left:.0f} {MARGIN})">'
-                      f'<path d="{behind}" stroke="{FADED}"/>{lines}'
-                      f'<text x="{width / 2:.0f}" y="{height + 20:.0f}">{caption}</text>'
-                      f'<text x="{width / 2:.0f}" y="{height + 36:.0f}" class="small">{detail}</text></g>')
+        panels.append(
+            f'<g transform="translate({left:.0f} {MARGIN})">'
+            f'<path d="{behind}" stroke="{FADED}"/>{lines}'
+            f'<text x="{width / 2:.0f}" y="{height + 20:.0f}">{caption}</text>'
+            f'<text x="{width / 2:.0f}" y="{height + 36:.0f}" class="small">{detail}</text></g>'
+        )
     total = len(panels) * (panel + MARGIN) + MARGIN
-    style = ("path{fill:none;stroke-width:1;stroke-linejoin:round}text{font:13px sans-serif;text-anchor:middle;"
-             "fill:#202c38}.small{font-size:11px}")
-    return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total:.0f} {height + CAPTION + MARGIN:.0f}">'
-            f'<style>{style}</style><rect width="100%" height="100%" fill="#fff"/>{"".join(panels)}</svg>\n')
+    style = (
+        "path{fill:none;stroke-width:1;stroke-linejoin:round}text{font:13px sans-serif;text-anchor:middle;"
+        "fill:#202c38}.small{font-size:11px}"
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total:.0f} {height + CAPTION + MARGIN:.0f}">'
+        f'<style>{style}</style><rect width="100%" height="100%" fill="#fff"/>{"".join(panels)}</svg>\n'
+    )
 
 
 def _length(value: float, unit: str) -> str:

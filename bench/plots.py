@@ -28,8 +28,7 @@ class NoPlots(Exception):
     """matplotlib is missing; the message says what to do."""
 
 
-def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path,
-         prefix: str = "") -> list[Path]:
+def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path, prefix: str = "") -> list[Path]:
     """Writes the pictures of a clip and returns their files. Raises NoPlots."""
     figure_of = pyplot(INCHES)
     points = measured(point for point in contents["points"] if point["clip"] == clip)
@@ -88,17 +87,39 @@ def _progressive_picture(figure_of, result: dict[str, Any], clip: str):
     figure, axes = figure_of()
     steps, single = result["steps"], result["single"]
     for number, (error, name) in enumerate((("max", "largest error"), ("rms", "RMS error"))):
-        axes.plot([row["bytes"] for row in steps], [row[error] for row in steps], drawstyle="steps-post",
-                  color=COLOURS[number], marker="os"[number], linewidth=2,
-                  label=f"prefix of one file: {name}")
-        axes.plot([row["bytes"] for row in single], [row[error] for row in single], color=COLOURS[number],
-                  linestyle="--", marker="^v"[number], linewidth=1.2, label=f"files of their own: {name}")
+        axes.plot(
+            [row["bytes"] for row in steps],
+            [row[error] for row in steps],
+            drawstyle="steps-post",
+            color=COLOURS[number],
+            marker="os"[number],
+            linewidth=2,
+            label=f"prefix of one file: {name}",
+        )
+        axes.plot(
+            [row["bytes"] for row in single],
+            [row[error] for row in single],
+            color=COLOURS[number],
+            linestyle="--",
+            marker="^v"[number],
+            linewidth=1.2,
+            label=f"files of their own: {name}",
+        )
     for row in steps:
         if row["segments"] == max(other["segments"] for other in steps):
-            axes.annotate(f"level {row['level']}", (row["bytes"], row["max"]), xytext=(5, 6),
-                          textcoords="offset points", fontsize=9)
-    _label(axes, f"{clip}: a growing prefix of one file, bound {result['bound']:g}", "bytes",
-           "error / bounding-box diagonal")
+            axes.annotate(
+                f"level {row['level']}",
+                (row["bytes"], row["max"]),
+                xytext=(5, 6),
+                textcoords="offset points",
+                fontsize=9,
+            )
+    _label(
+        axes,
+        f"{clip}: a growing prefix of one file, bound {result['bound']:g}",
+        "bytes",
+        "error / bounding-box diagonal",
+    )
     axes.margins(x=0.1)
     axes.legend(fontsize=9, loc="best")
     return figure

@@ -61,11 +61,20 @@ def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[st
     for bound in (*(bound for bound in looser if bound > rel_error), rel_error):
         with encoded(clip_path, bound) as result:
             meter = measure(result.clip, result.decoder)
-            single.append({"bound": bound, "bytes": result.summary.bytes, "max": meter.max_error / diagonal,
-                           "rms": meter.rms_error / diagonal})
-    broken = [f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
-              f"the file's table says {row['table max']:.7g}"
-              for row in steps if row["max"] > row["table max"] * (1 + ROUNDING)]
+            single.append(
+                {
+                    "bound": bound,
+                    "bytes": result.summary.bytes,
+                    "max": meter.max_error / diagonal,
+                    "rms": meter.rms_error / diagonal,
+                }
+            )
+    broken = [
+        f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
+        f"the file's table says {row['table max']:.7g}"
+        for row in steps
+        if row["max"] > row["table max"] * (1 + ROUNDING)
+    ]
     return {"steps": steps, "single": single, "broken": broken}
 
 
@@ -85,9 +94,11 @@ def _steps(result: Encoded, diagonal: float) -> list[dict[str, Any]]:
         level_of[segment] = level
         if len(level_of) == len(decoder.segments):
             done = sum(shown == level for shown in level_of.values())
-            rows.append({"bytes": end, "level": level, "segments": done}
-                        | _together(decoded, decoder, diagonal)
-                        | _from_table(level_of, decoder, diagonal))
+            rows.append(
+                {"bytes": end, "level": level, "segments": done}
+                | _together(decoded, decoder, diagonal)
+                | _from_table(level_of, decoder, diagonal)
+            )
     return rows
 
 
@@ -106,15 +117,19 @@ def _boundaries(decoder: athcodec.Decoder) -> list[tuple[int, int, int]]:
 
 
 def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
-    parts = [(decoded[segment].max_error, decoded[segment].rms_error, stop - start)
-             for segment, (start, stop) in enumerate(decoder.segments)]
+    parts = [
+        (decoded[segment].max_error, decoded[segment].rms_error, stop - start)
+        for segment, (start, stop) in enumerate(decoder.segments)
+    ]
     return dict(zip(("max", "rms"), _pooled(parts, diagonal), strict=True))
 
 
 def _from_table(level_of: dict[int, int], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
     errors = decoder.file.errors
-    parts = [(*map(float, errors[level_of[segment], segment]), stop - start)
-             for segment, (start, stop) in enumerate(decoder.segments)]
+    parts = [
+        (*map(float, errors[level_of[segment], segment]), stop - start)
+        for segment, (start, stop) in enumerate(decoder.segments)
+    ]
     return dict(zip(("table max", "table rms"), _pooled(parts, diagonal), strict=True))
 
 
@@ -122,8 +137,10 @@ def _pooled(parts: Iterable[tuple[float, float, int]], diagonal: float) -> tuple
     """Largest and RMS error over the diagonal from those of segments with so many frames."""
     parts = list(parts)
     squares = sum(rms**2 * frames for _, rms, frames in parts)
-    return (max(largest for largest, _, _ in parts) / diagonal,
-            sqrt(squares / sum(frames for _, _, frames in parts)) / diagonal)
+    return (
+        max(largest for largest, _, _ in parts) / diagonal,
+        sqrt(squares / sum(frames for _, _, frames in parts)) / diagonal,
+    )
 
 
 # ---- the cost ----
@@ -138,24 +155,35 @@ def cost(clip_path: Path, rel_error: float) -> dict[str, Any]:
         return _cost(_Recoding(clip, rel_error), chunks, sizes, levels, segments, result.summary.bytes)
 
 
-def _cost(recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int,
-          bytes_: int) -> dict[str, Any]:
+def _cost(
+    recoding: _Recoding, chunks: list[ct.Chunk], sizes: dict[str, int], levels: int, segments: int, bytes_: int
+) -> dict[str, Any]:
     stored = recoding.streams(recoding.settings)
     in_file = sum(sizes.get(kind, 0) for kind in ("SHAPES", "STEMS", "CORRECTIONS"))
     if stored != in_file:
-        raise RuntimeError(f"{recoding.name}: got {stored} bytes of motion when coding "
-                           f"again; expected the {in_file} of the file")
+        raise RuntimeError(
+            f"{recoding.name}: got {stored} bytes of motion when coding again; expected the {in_file} of the file"
+        )
     uniform = recoding.of_one_level()
     split = min(stored, *(recoding.streams(settings) for settings in uniform))
     unsplit = min(recoding.streams(settings, split=False) for settings in (recoding.settings, *uniform))
     merged = min(recoding.streams(settings, split=False, one_level=True) for settings in uniform)
-    table = (TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
-             + ERROR_ENTRY * (levels - 1) * segments)
+    table = (
+        TABLE_ENTRY * sum(1 for chunk in chunks if _serves_levels(chunk, levels - 1))
+        + ERROR_ENTRY * (levels - 1) * segments
+    )
     affines = sizes.get("AFFINES", 0)
     without = bytes_ - affines - table - (split - min(split, unsplit, merged))
-    return {"bytes": bytes_, "levels": levels, "AFFINES": affines, "table": table,
-            "early split": split - unsplit, "one stream": split - merged, "without": without,
-            "cost %": 100 * (bytes_ / without - 1)}
+    return {
+        "bytes": bytes_,
+        "levels": levels,
+        "AFFINES": affines,
+        "table": table,
+        "early split": split - unsplit,
+        "one stream": split - merged,
+        "without": without,
+        "cost %": 100 * (bytes_ / without - 1),
+    }
 
 
 def _serves_levels(chunk: ct.Chunk, last: int) -> bool:
@@ -181,8 +209,10 @@ class _Recoding:
         """Settings for a single stream: those of each level in turn, applied to all levels."""
         levels = len(self.settings.rotation_step_factors)
         pairs = sorted(set(zip(self.settings.rotation_step_factors, self.settings.learned_bases, strict=True)))
-        return [replace(self.settings, rotation_step_factors=(factors,) * levels, learned_bases=(learned,) * levels)
-                for factors, learned in pairs]
+        return [
+            replace(self.settings, rotation_step_factors=(factors,) * levels, learned_bases=(learned,) * levels)
+            for factors, learned in pairs
+        ]
 
     def streams(self, settings: Settings, split: bool = True, one_level: bool = False) -> int:
         """Bytes of all learned_modes, stems and corrections."""

@@ -18,22 +18,38 @@ from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 CLIPS = ("sample", "mj_1k_200f")
-CODECS = ("athcodec", "float16 or integers + zstd", "pcodec",
-          "trajectory PCA + hierarchy (CoDDyAC), range coder")
+CODECS = ("athcodec", "float16 or integers + zstd", "pcodec", "trajectory PCA + hierarchy (CoDDyAC), range coder")
 BOUNDS = (1e-3, 1e-4)
 
 NOTE = "Seconds of each step, including the start of Python."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", default=list(CLIPS),
-                        help="files CLIP.h5, or names of clips of this benchmark (default: %(default)s)")
-    parser.add_argument("--codecs", nargs="+", metavar="NAME", default=list(CODECS),
-                        help="codecs to compare (default: %(default)s)")
-    parser.add_argument("--bounds", type=float, nargs="+", metavar="FRACTION", default=list(BOUNDS),
-                        help="error bounds over the bounding box's diagonal")
-    parser.add_argument("--out", type=Path, default=Path("build/bench"), metavar="FOLDER",
-                        help="where results and report go (default %(default)s)")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        metavar="CLIP",
+        default=list(CLIPS),
+        help="files CLIP.h5, or names of clips of this benchmark (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--codecs", nargs="+", metavar="NAME", default=list(CODECS), help="codecs to compare (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--bounds",
+        type=float,
+        nargs="+",
+        metavar="FRACTION",
+        default=list(BOUNDS),
+        help="error bounds over the bounding box's diagonal",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("build/bench"),
+        metavar="FOLDER",
+        help="where results and report go (default %(default)s)",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -41,12 +57,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, broken = [], []
     for verb, words in _steps(args):
         start = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", "bench", verb, *words], cwd=ROOT, text=True,
-                              stdout=subprocess.PIPE)
+        done = subprocess.run(
+            [sys.executable, "-m", "bench", verb, *words], cwd=ROOT, text=True, stdout=subprocess.PIPE
+        )
         rows.append({"step": verb, "seconds": time.perf_counter() - start, "exit code": done.returncode})
         if done.returncode:
-            broken += [line.removeprefix("BROKEN: ") for line in done.stdout.splitlines()
-                       if line.startswith("BROKEN: ")] or [f"{verb}: exit code {done.returncode}"]
+            broken += [
+                line.removeprefix("BROKEN: ") for line in done.stdout.splitlines() if line.startswith("BROKEN: ")
+            ] or [f"{verb}: exit code {done.returncode}"]
     rows.append({"step": "all", "seconds": sum(row["seconds"] for row in rows)})
     return {"tables": [table("Steps", rows, NOTE)], "broken": broken}
 
@@ -58,11 +76,14 @@ def _steps(args: argparse.Namespace) -> Iterator[tuple[str, list[str]]]:
     bounds = [f"{bound:g}" for bound in args.bounds]
     few = ["--rounds", "2", "--seeks", "20", "--instances", "20"]
     made = ["--of", *files] if files else []
-    steps = {"rd": [*clips, "--codecs", *args.codecs, "--bounds", *bounds], "decode": [*files, *few],
-             "paper": [*files, "--rel-error", "1e-4"],
-             "scale": ["--encodes", "1", *made],
-             "forest": ["--instances", "1", "100", "--clips", "1", "4", "--rounds", "1", *made],
-             "remote": ["--plants", "1", "--frames", "240", "--frame", "200", "--rounds", "1", *made]}
+    steps = {
+        "rd": [*clips, "--codecs", *args.codecs, "--bounds", *bounds],
+        "decode": [*files, *few],
+        "paper": [*files, "--rel-error", "1e-4"],
+        "scale": ["--encodes", "1", *made],
+        "forest": ["--instances", "1", "100", "--clips", "1", "4", "--rounds", "1", *made],
+        "remote": ["--plants", "1", "--frames", "240", "--frame", "200", "--rounds", "1", *made],
+    }
     for verb, words in steps.items():
         yield verb, [*words, "--json", str(out / f"{verb}.json")]
     yield "report", ["--results", str(out)]

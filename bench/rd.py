@@ -36,8 +36,12 @@ BOUNDS = {"quick": (1e-3, 1e-4, 1e-5), "full": (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e
 LOOSER = {"quick": (0.3, 0.03, 3e-3), "full": (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)}
 COST_BOUNDS = {"quick": (1e-4,), "full": (1e-3, 1e-4, 1e-5)}
 TIMEOUT = 3600
-KEYS = {"clips": ("clip",), "points": ("clip", "codec", "bound"), "curves": ("clip", "bound"),
-        "costs": ("clip", "bound")}
+KEYS = {
+    "clips": ("clip",),
+    "points": ("clip", "codec", "bound"),
+    "curves": ("clip", "bound"),
+    "costs": ("clip", "bound"),
+}
 OK, MISSING, BROKEN, FAILED, SLOW = "ok", "missing", "bound broken", "failed", "too slow"
 CANNOT = "cannot keep the bound"
 ABOUT = ("frames", "fps", "vertices", "branches")
@@ -67,18 +71,39 @@ OVER_CLIPS_NOTE = "Ratios as above, over the clips that have them."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[],
-                        help="files CLIP.h5, or names of clips of this benchmark; by default the suite's")
-    parser.add_argument("--suite", choices=SUITES, default="quick",
-                        help="which clips and bounds, where none are named (default %(default)s)")
-    parser.add_argument("--bounds", type=float, nargs="+", metavar="FRACTION",
-                        help="error bounds over the bounding box's diagonal")
-    parser.add_argument("--codecs", nargs="+", metavar="NAME", default=[],
-                        help="codecs to measure (default: all), or MODULE:NAME for one of your own")
-    parser.add_argument("--lossless", action="store_true",
-                        help="measure lossless modes of the programs too, once per clip")
-    parser.add_argument("--timeout", type=float, default=TIMEOUT, metavar="SECONDS",
-                        help="for one encoding or decoding (default %(default)s)")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        metavar="CLIP",
+        default=[],
+        help="files CLIP.h5, or names of clips of this benchmark; by default the suite's",
+    )
+    parser.add_argument(
+        "--suite",
+        choices=SUITES,
+        default="quick",
+        help="which clips and bounds, where none are named (default %(default)s)",
+    )
+    parser.add_argument(
+        "--bounds", type=float, nargs="+", metavar="FRACTION", help="error bounds over the bounding box's diagonal"
+    )
+    parser.add_argument(
+        "--codecs",
+        nargs="+",
+        metavar="NAME",
+        default=[],
+        help="codecs to measure (default: all), or MODULE:NAME for one of your own",
+    )
+    parser.add_argument(
+        "--lossless", action="store_true", help="measure lossless modes of the programs too, once per clip"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        default=TIMEOUT,
+        metavar="SECONDS",
+        help="for one encoding or decoding (default %(default)s)",
+    )
     parser.add_argument("--again", action="store_true", help="repeat what failed or was too slow")
     parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
 
@@ -108,8 +133,7 @@ def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
 
 
 def _listing(args: argparse.Namespace) -> dict[str, Any]:
-    codecs = [{"codec": codec.name, "kind": codec.kind, "can run": codec.missing() or "yes"}
-              for codec in all_codecs()]
+    codecs = [{"codec": codec.name, "kind": codec.kind, "can run": codec.missing() or "yes"} for codec in all_codecs()]
     clips = [{"clip": name, "what": data.describe(name)} for name in data.SUITES[args.suite]]
     return {"tables": [table("Codecs", codecs), table(f"Clips, suite {args.suite}", clips)], "broken": []}
 
@@ -119,9 +143,16 @@ def _about(store: Store, case: Case) -> dict[str, Any]:
     if case.path is None:
         return store.add("clips", {"clip": case.name, "what": case.description})
     with athcodec.read_hdf5(case.path) as clip:
-        row = {"clip": case.name, "what": case.description, "frames": clip.frame_count, "fps": clip.fps,
-               "vertices": clip.vertex_count, "branches": clip.branch_count,
-               "bytes": 12 * clip.frame_count * clip.vertex_count, "digest": digest(case.path)}
+        row = {
+            "clip": case.name,
+            "what": case.description,
+            "frames": clip.frame_count,
+            "fps": clip.fps,
+            "vertices": clip.vertex_count,
+            "branches": clip.branch_count,
+            "bytes": 12 * clip.frame_count * clip.vertex_count,
+            "digest": digest(case.path),
+        }
     return store.add("clips", row)
 
 
@@ -141,8 +172,7 @@ class _Job:
 
     @property
     def identity(self) -> dict[str, Any]:
-        return {"clip": self.case.name, "codec": self.codec.name, "kind": self.codec.kind,
-                "bound": self.bound}
+        return {"clip": self.case.name, "codec": self.codec.name, "kind": self.codec.kind, "bound": self.bound}
 
     @property
     def depends(self) -> dict[str, str]:
@@ -190,8 +220,9 @@ class _Failed(Exception):
 
 def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
     command = [sys.executable, "-m", "bench.rd_worker", *words]
-    with subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                          start_new_session=True) as process:
+    with subprocess.Popen(
+        command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    ) as process:
         try:
             out, errors = process.communicate(timeout=timeout)
         except BaseException:  # ends programs that the codec has started too
@@ -230,12 +261,16 @@ def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str,
 # ---- tables ----
 
 
-def summary(contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None,
-            ) -> dict[str, Any]:
+def summary(
+    contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None
+) -> dict[str, Any]:
     """Tables of the results of these clips and bounds (None: all bounds)."""
     tables = [_clips_table([row for row in contents["clips"] if row["clip"] in clips])]
-    points = [point for point in contents["points"]
-              if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))]
+    points = [
+        point
+        for point in contents["points"]
+        if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))
+    ]
     all_ratios: list[dict[str, Any]] = []
     for clip in clips:
         own = [point for point in points if point["clip"] == clip]
@@ -259,27 +294,51 @@ def title(clip: str) -> str:
 
 
 def _clips_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    return table("Clips", [{"clip": row["clip"]} | {name: row.get(name) for name in ABOUT}
-                           | {"float32 MB": row["bytes"] / 1e6 if "bytes" in row else None}
-                           | {"what": row["what"]} for row in rows])
+    return table(
+        "Clips",
+        [
+            {"clip": row["clip"]}
+            | {name: row.get(name) for name in ABOUT}
+            | {"float32 MB": row["bytes"] / 1e6 if "bytes" in row else None}
+            | {"what": row["what"]}
+            for row in rows
+        ],
+    )
 
 
 def _row(point: dict[str, Any]) -> dict[str, Any]:
     row = {"codec": point["codec"], "bound": f"{point['bound']:g}"}
     if "bytes" in point:
-        row |= {"bytes": point["bytes"], "encode s": point["encode_s"], "runs": point["encode_runs"],
-                "encode MB": point["encode_peak_bytes"] / 1e6}
+        row |= {
+            "bytes": point["bytes"],
+            "encode s": point["encode_s"],
+            "runs": point["encode_runs"],
+            "encode MB": point["encode_peak_bytes"] / 1e6,
+        }
     if "decode_s" in point:
-        row |= {"decode s": point["decode_s"], "decode MB": point["decode_peak_bytes"] / 1e6,
-                "bits": point["bits"]}
+        row |= {"decode s": point["decode_s"], "decode MB": point["decode_peak_bytes"] / 1e6, "bits": point["bits"]}
     if "max" in point:
         row |= {"max": point["max"], "RMS": point["rms"], "KG %": point["kg"], "motion": point["motion"]}
     settings = point["settings"] if point["status"] == OK else f"{point['status'].upper()}: {point['why']}"
     return _ordered(row | {"settings": settings.replace("|", "/")})
 
 
-COLUMNS = ("codec", "bound", "bytes", "bits", "max", "RMS", "KG %", "motion", "encode s", "runs", "decode s",
-           "encode MB", "decode MB", "settings")
+COLUMNS = (
+    "codec",
+    "bound",
+    "bytes",
+    "bits",
+    "max",
+    "RMS",
+    "KG %",
+    "motion",
+    "encode s",
+    "runs",
+    "decode s",
+    "encode MB",
+    "decode MB",
+    "settings",
+)
 
 
 def _ordered(row: dict[str, Any]) -> dict[str, Any]:
@@ -302,14 +361,17 @@ def _absent(points: list[dict[str, Any]]) -> list[str]:
 def _level_tables(contents: dict[str, list[dict[str, Any]]], clip: str) -> Iterator[dict[str, Any]]:
     for result in contents["curves"]:
         if result["clip"] == clip:
-            single = Curve.of([row["max"] for row in result["single"]],
-                                      [row["bytes"] for row in result["single"]])
+            single = Curve.of([row["max"] for row in result["single"]], [row["bytes"] for row in result["single"]])
             rows = [_step_row(row, single.size_at(row["max"])) for row in result["steps"]]
-            yield table(f"A growing prefix of one file: {clip}, bound {result['bound']:g}", rows,
-                        progressive.CURVE_NOTE)
-    costs = [{"bound": f"{row['bound']:g}"} | {name: value for name, value in row.items()
-                                               if name not in ("clip", "bound", "depends", "command")}
-             for row in contents["costs"] if row["clip"] == clip]
+            yield table(
+                f"A growing prefix of one file: {clip}, bound {result['bound']:g}", rows, progressive.CURVE_NOTE
+            )
+    costs = [
+        {"bound": f"{row['bound']:g}"}
+        | {name: value for name, value in row.items() if name not in ("clip", "bound", "depends", "command")}
+        for row in contents["costs"]
+        if row["clip"] == clip
+    ]
     if costs:
         yield table(f"What levels cost: {clip}", costs, progressive.COST_NOTE)
 
@@ -322,7 +384,6 @@ def _broken(points: list[dict[str, Any]], curves: list[dict[str, Any]]) -> Itera
     """Faults of athcodec and the baselines; those of programs are only rows."""
     for point in points:
         if point["status"] in (BROKEN, FAILED) and point["kind"] != "program":
-            yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: "
-                   f"{point['why']}")
+            yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: {point['why']}")
     for result in curves:
         yield from result["broken"]

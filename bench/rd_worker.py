@@ -43,8 +43,13 @@ def encode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
             runs.append(seconds)
     peak = peak_bytes()
     file.write_bytes(data)
-    return {"bytes": len(data), "encode_s": median(runs), "encode_runs": len(runs), "encode_peak_bytes": peak,
-            "settings": _words(codec.settings)}
+    return {
+        "bytes": len(data),
+        "encode_s": median(runs),
+        "encode_runs": len(runs),
+        "encode_peak_bytes": peak,
+        "settings": _words(codec.settings),
+    }
 
 
 def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dict[str, Any]:
@@ -59,8 +64,7 @@ def decode(codec_name: str, clip_path: str, rel_bound: float, file: Path) -> dic
     with athcodec.read_hdf5(clip_path) as clip:
         result = _errors(Source(clip), decoded, rel_bound)
         rate = bits_per_vertex_frame(len(data), clip.frame_count, clip.vertex_count)
-    return result | {"decode_s": median(runs), "decode_runs": len(runs), "decode_peak_bytes": peak,
-                     "bits": rate}
+    return result | {"decode_s": median(runs), "decode_runs": len(runs), "decode_peak_bytes": peak, "bits": rate}
 
 
 def _loaded(clip: athcodec.MotionClip) -> Source:
@@ -84,8 +88,12 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
         return {"broken": f"got {got}; expected float32 {shape}"}
     meter = ErrorMeter(source.clip.rest)
     meter.add(source.positions, decoded)
-    errors = {"max": meter.max_error / source.diagonal, "rms": meter.rms_error / source.diagonal,
-              "kg": meter.kg_error, "motion": meter.motion_normalised_error}
+    errors = {
+        "max": meter.max_error / source.diagonal,
+        "rms": meter.rms_error / source.diagonal,
+        "kg": meter.kg_error,
+        "motion": meter.motion_normalised_error,
+    }
     bound = rel_bound * source.diagonal
     if not meter.max_error <= bound:
         errors["broken"] = f"got an error of {meter.max_error:.6g}; expected at most {bound:.6g}"

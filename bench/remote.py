@@ -40,12 +40,14 @@ Step = Callable[[athcodec.Decoder], Any]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_source(parser)
-    parser.add_argument("--plants", type=int, nargs="+", default=list(PLANTS), metavar="N",
-                        help="copies of it in a clip (default 1 20)")
+    parser.add_argument(
+        "--plants", type=int, nargs="+", default=list(PLANTS), metavar="N", help="copies of it in a clip (default 1 20)"
+    )
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--frame", type=int, default=FRAME, metavar="N", help="that is shown (default %(default)s)")
-    parser.add_argument("--latency", type=float, default=LATENCY, metavar="SECONDS",
-                        help="before a response (default %(default)s)")
+    parser.add_argument(
+        "--latency", type=float, default=LATENCY, metavar="SECONDS", help="before a response (default %(default)s)"
+    )
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
     add_effort(parser, "fast")
     add_rel_error(parser)
@@ -59,8 +61,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             for row, lines in _rows(file, args):
                 rows.append({"plants": plants} | row)
                 broken += lines
-    note = NOTE.format(frames=args.frames, bound=args.rel_error, ahead=READ_AHEAD, latency=1e3 * args.latency,
-                       rounds=args.rounds)
+    note = NOTE.format(
+        frames=args.frames, bound=args.rel_error, ahead=READ_AHEAD, latency=1e3 * args.latency, rounds=args.rounds
+    )
     return {"tables": [table("A clip behind a URL", rows, note)], "broken": broken}
 
 
@@ -74,13 +77,15 @@ def _make(replicated: ReplicatedPlants, folder: Path, plants: int, args: argpars
 
 def _steps(frame: int) -> dict[str, tuple[Step, int | None]]:
     """What is done with an opened file, and the largest allowed number of requests."""
-    return {"open": (lambda decoder: None, None),
-            f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, level=1), TARGET),
-            f"frame {frame} in full": (lambda decoder: decoder.positions(frame), None),
-            "level 0, all frames": (lambda decoder: decoder.positions(level=0), None),
-            "level 1, all frames": (lambda decoder: decoder.positions(level=1), None),
-            "everything": (lambda decoder: decoder.positions(), None),
-            "verify": (lambda decoder: decoder.file.check(), None)}
+    return {
+        "open": (lambda decoder: None, None),
+        f"frame {frame} at level 1": (lambda decoder: decoder.positions(frame, level=1), TARGET),
+        f"frame {frame} in full": (lambda decoder: decoder.positions(frame), None),
+        "level 0, all frames": (lambda decoder: decoder.positions(level=0), None),
+        "level 1, all frames": (lambda decoder: decoder.positions(level=1), None),
+        "everything": (lambda decoder: decoder.positions(), None),
+        "verify": (lambda decoder: decoder.file.check(), None),
+    }
 
 
 def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any], list[str]]]:
@@ -94,8 +99,10 @@ def _rows(file: Path, args: argparse.Namespace) -> Iterator[tuple[dict[str, Any]
                 answered = len(server.log) // args.rounds, server.sent(NAME) // args.rounds
         lines = []
         if (row["requests"], row["bytes"]) != answered:
-            lines.append(f"{what}: the reader counts {row['requests']} requests, {row['bytes']} bytes; the server "
-                         f"{answered[0]} and {answered[1]}")
+            lines.append(
+                f"{what}: the reader counts {row['requests']} requests, {row['bytes']} bytes; the server "
+                f"{answered[0]} and {answered[1]}"
+            )
         if allowed is not None and row["requests"] > allowed:
             lines.append(f"{what}: got {row['requests']} requests; expected at most {allowed}")
         yield row | {"bytes/needed": row["bytes"] / row["needed"], "file": len(data)}, lines
@@ -122,7 +129,7 @@ class _CountingFile(io.FileIO):
 
     def read(self, size: int = -1) -> bytes:
         start, data = self.tell(), super().read(size)
-        self.touched[start: start + len(data)] = True
+        self.touched[start : start + len(data)] = True
         return data
 
 

@@ -14,11 +14,21 @@ from bench import charts, plots, rd, store
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
-TITLES = {"rd": "Rate and distortion", "paper": "The paper's table again", "scale": "Time by size",
-          "decode": "The decoder", "sizes": "Sizes and what they are made of", "levels": "Levels of detail",
-          "speed": "Encoding and decoding in Python", "memory": "Memory of encoding", "large": "Large clips",
-          "forest": "Forests", "batch": "Many clips", "fault-injection": "A batch under fault injection",
-          "remote": "Behind a URL"}
+TITLES = {
+    "rd": "Rate and distortion",
+    "paper": "The paper's table again",
+    "scale": "Time by size",
+    "decode": "The decoder",
+    "sizes": "Sizes and what they are made of",
+    "levels": "Levels of detail",
+    "speed": "Encoding and decoding in Python",
+    "memory": "Memory of encoding",
+    "large": "Large clips",
+    "forest": "Forests",
+    "batch": "Many clips",
+    "fault-injection": "A batch under fault injection",
+    "remote": "Behind a URL",
+}
 
 ORDER = {verb: place for place, verb in enumerate(TITLES)}
 
@@ -34,8 +44,13 @@ principal components; dashed: programs."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--results", type=Path, default=RESULTS, metavar="FOLDER",
-                        help="folder of the JSON files, which report.md goes to (default: bench/results)")
+    parser.add_argument(
+        "--results",
+        type=Path,
+        default=RESULTS,
+        metavar="FOLDER",
+        help="folder of the JSON files, which report.md goes to (default: bench/results)",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -45,11 +60,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def write(folder: Path) -> dict[str, Any]:
     """Writes report.md and pictures into the folder of the results; returns the list of files as a result."""
     results = [(path.stem, store.read(path)) for path in sorted(folder.glob("*.json"))]
-    results = sorted(((name, result) for name, result in results if "command" in result),
-                     key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)))
+    results = sorted(
+        ((name, result) for name, result in results if "command" in result),
+        key=lambda pair: ORDER.get(_verb(pair[1]), len(ORDER)),
+    )
     if not results:
-        raise SystemExit(f"{folder.name}: found no results; expected JSON files of `python -m bench VERB "
-                         f"--json FILE`")
+        raise SystemExit(f"{folder.name}: found no results; expected JSON files of `python -m bench VERB --json FILE`")
     sections, rows = [], []
     for name, result in results:
         pictures, missing = _pictures(name, result, folder)

@@ -30,11 +30,15 @@ from bench.tables import table
 
 TARGET = 1.5
 ENCODES, DECODES = 3, 5
-REAL = {"vertices, 200 frames": ("mj_1k_200f", "mj_4k_200f", "mj_8k_200f", "refined_50k_200f"),
-        "frames, 1k vertices": ("mj_1k_200f", "mj_1k_1200f"),
-        "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f")}
-SIZES = {"quick": ((1, 3), 120, (120, 240), 1),  # copies, their frames; frames, their copies
-         "full": ((1, 2, 5, 10, 20, 50), 200, (200, 400, 800, 1200), 8)}
+REAL = {
+    "vertices, 200 frames": ("mj_1k_200f", "mj_4k_200f", "mj_8k_200f", "refined_50k_200f"),
+    "frames, 1k vertices": ("mj_1k_200f", "mj_1k_1200f"),
+    "frames, 4k vertices": ("mj_4k_200f", "mj_4k_1200f"),
+}
+SIZES = {
+    "quick": ((1, 3), 120, (120, 240), 1),  # copies, their frames; frames, their copies
+    "full": ((1, 2, 5, 10, 20, 50), 200, (200, 400, 800, 1200), 8),
+}
 
 NOTE = """
 Encode: from an HDF5 file to a file, default effort, no attributes, median of {encodes} runs. Decode: opening
@@ -58,14 +62,21 @@ class _Clip:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[],
-                        help="a series of your own: files CLIP.h5, or names of clips of this benchmark")
-    parser.add_argument("--suite", choices=tuple(SIZES), default="quick",
-                        help="length of the generated series (default %(default)s)")
+    parser.add_argument(
+        "clips",
+        nargs="*",
+        metavar="CLIP",
+        default=[],
+        help="a series of your own: files CLIP.h5, or names of clips of this benchmark",
+    )
+    parser.add_argument(
+        "--suite", choices=tuple(SIZES), default="quick", help="length of the generated series (default %(default)s)"
+    )
     add_source(parser)
     for name, count in (("encodes", ENCODES), ("decodes", DECODES)):
-        parser.add_argument(f"--{name}", type=int, default=count, metavar="N",
-                            help="runs for each median (default %(default)s)")
+        parser.add_argument(
+            f"--{name}", type=int, default=count, metavar="N", help="runs for each median (default %(default)s)"
+        )
     add_rel_error(parser)
 
 
@@ -78,8 +89,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             if clip.path.parent == Path(folder):
                 clip.path.unlink()
     note = NOTE.format(encodes=args.encodes, decodes=args.decodes)
-    return {"tables": [table(f"Time by size, bound {args.rel_error:g}", rows, note),
-                       table("Largest over smallest", list(_ratios(rows)), RATIO_NOTE)], "broken": []}
+    return {
+        "tables": [
+            table(f"Time by size, bound {args.rel_error:g}", rows, note),
+            table("Largest over smallest", list(_ratios(rows)), RATIO_NOTE),
+        ],
+        "broken": [],
+    }
 
 
 def _row(clip: _Clip, file: Path, args: argparse.Namespace, program: Path) -> dict[str, Any]:
@@ -88,11 +104,22 @@ def _row(clip: _Clip, file: Path, args: argparse.Namespace, program: Path) -> di
     with athcodec.open(file) as decoder:
         frames, vertices, branches = decoder.frame_count, decoder.vertex_count, decoder.branch_count
         segments = len(decoder.segments)
-    row = {"series": clip.series, "clip": clip.name, "plants": clip.plants, "vertices": vertices,
-           "branches": branches, "frames": frames, "segments": segments, "bytes": file.stat().st_size}
+    row = {
+        "series": clip.series,
+        "clip": clip.name,
+        "plants": clip.plants,
+        "vertices": vertices,
+        "branches": branches,
+        "frames": frames,
+        "segments": segments,
+        "bytes": file.stat().st_size,
+    }
     seconds = {"encode": encode, "decode": decode, "decode, C": in_c}
-    return (row | {f"{what} s": value for what, value in seconds.items()}
-            | {f"{what} ns": 1e9 * value / (frames * vertices) for what, value in seconds.items()})
+    return (
+        row
+        | {f"{what} s": value for what, value in seconds.items()}
+        | {f"{what} ns": 1e9 * value / (frames * vertices) for what, value in seconds.items()}
+    )
 
 
 def _encode_seconds(path: Path, file: Path, rel_error: float, count: int) -> float:
@@ -117,8 +144,10 @@ def _decode_seconds(file: Path, count: int) -> float:
 
 def _c_seconds(file: Path, program: Path, count: int) -> float:
     command = [str(program), str(file), "once"]
-    runs = [json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)["decode_ms"]
-            for _ in range(count)]
+    runs = [
+        json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)["decode_ms"]
+        for _ in range(count)
+    ]
     return median(runs) / 1e3
 
 
@@ -128,8 +157,16 @@ def _ratios(rows: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         for what in ("encode", "decode", "decode, C"):
             figures = [row[f"{what} ns"] for row in own]
             ratio = max(figures) / min(figures)
-            yield {"series": series, "what": what, "clips": len(own), "least ns": min(figures),
-                   "most ns": max(figures), "ratio": ratio, "target": TARGET, "met": ratio <= TARGET}
+            yield {
+                "series": series,
+                "what": what,
+                "clips": len(own),
+                "least ns": min(figures),
+                "most ns": max(figures),
+                "ratio": ratio,
+                "target": TARGET,
+                "met": ratio <= TARGET,
+            }
 
 
 # ---- the clips ----

@@ -35,10 +35,15 @@ Rotations (step factors) and learned time bases by level.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
-    parser.add_argument("--rel-error", type=float, nargs="+", default=list(REL_ERRORS), metavar="FRACTION",
-                        help="error bounds over the bounding box's diagonal")
-    parser.add_argument("--effort", nargs="+", choices=EFFORTS, default=["default"],
-                        help="efforts of the encoder")
+    parser.add_argument(
+        "--rel-error",
+        type=float,
+        nargs="+",
+        default=list(REL_ERRORS),
+        metavar="FRACTION",
+        help="error bounds over the bounding box's diagonal",
+    )
+    parser.add_argument("--effort", nargs="+", choices=EFFORTS, default=["default"], help="efforts of the encoder")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -54,11 +59,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 choices.append(case | result.summary.choices)
                 if not sizes[-1]["kept"]:
                     broken.append(_broken_line(path, rel_error, effort, meter.max_error, result))
-    return {"tables": [
-        table("Sizes", sizes, SIZES_NOTE),
-        table("Bytes per kind of chunk", chunks, CHUNKS_NOTE),
-        table("Choices of the encoder", choices, CHOICES_NOTE),
-    ], "broken": broken}
+    return {
+        "tables": [
+            table("Sizes", sizes, SIZES_NOTE),
+            table("Bytes per kind of chunk", chunks, CHUNKS_NOTE),
+            table("Choices of the encoder", choices, CHOICES_NOTE),
+        ],
+        "broken": broken,
+    }
 
 
 def _size_row(result: Encoded, meter: ErrorMeter, rel_error: float) -> dict[str, Any]:
@@ -66,10 +74,13 @@ def _size_row(result: Encoded, meter: ErrorMeter, rel_error: float) -> dict[str,
     # the bound in the file, and the one requested on the diagonal as measured here
     bound = min(summary.max_error_bound, rel_error * meter.diagonal)
     return {
-        "bytes": summary.bytes, "ratio": summary.ratio,
+        "bytes": summary.bytes,
+        "ratio": summary.ratio,
         "bits/vertex/frame": bits_per_vertex_frame(summary.bytes, clip.frame_count, clip.vertex_count),
-        "max/bound": meter.max_error / bound, "kept": meter.max_error <= bound,
-        "RMS": meter.rms_error / meter.diagonal, "KG %": meter.kg_error,
+        "max/bound": meter.max_error / bound,
+        "kept": meter.max_error <= bound,
+        "RMS": meter.rms_error / meter.diagonal,
+        "KG %": meter.kg_error,
         "motion": meter.motion_normalised_error,
     }
 
@@ -79,5 +90,7 @@ def _chunk_row(chunk_bytes: dict[str, int]) -> dict[str, Any]:
 
 
 def _broken_line(path: Path, rel_error: float, effort: str, max_error: float, result: Encoded) -> str:
-    return (f"{path.name} at {rel_error:g}, effort {effort}: got an error of {max_error:.6g}; "
-            f"expected at most {result.summary.max_error_bound:.6g}")
+    return (
+        f"{path.name} at {rel_error:g}, effort {effort}: got an error of {max_error:.6g}; "
+        f"expected at most {result.summary.max_error_bound:.6g}"
+    )

@@ -43,12 +43,24 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             case = _Case(path, Path(folder), args.rel_error)
             seconds = case.measure()
             summary.append({"clip": path.stem} | case.summary(seconds))
-            details += [{"clip": path.stem, "step": step, "runs": len(runs), "min s": min(runs),
-                         "median s": median(runs), "max s": max(runs)} for step, runs in seconds.items()]
-    return {"tables": [
-        table(f"Speed, bound {args.rel_error:g}, medians in seconds", summary, NOTE),
-        table("All runs", details),
-    ], "broken": []}
+            details += [
+                {
+                    "clip": path.stem,
+                    "step": step,
+                    "runs": len(runs),
+                    "min s": min(runs),
+                    "median s": median(runs),
+                    "max s": max(runs),
+                }
+                for step, runs in seconds.items()
+            ]
+    return {
+        "tables": [
+            table(f"Speed, bound {args.rel_error:g}, medians in seconds", summary, NOTE),
+            table("All runs", details),
+        ],
+        "broken": [],
+    }
 
 
 class _Case:
@@ -64,8 +76,9 @@ class _Case:
 
     def measure(self) -> dict[str, list[float]]:
         seconds = _in_turns({"encode": self.encode}, ENCODES)
-        return seconds | _in_turns({"decode": self.decode, "HDF5": self.read_hdf5, "info": self.info,
-                                    "frame": self.one_frame}, DECODES)
+        return seconds | _in_turns(
+            {"decode": self.decode, "HDF5": self.read_hdf5, "info": self.info, "frame": self.one_frame}, DECODES
+        )
 
     def encode(self) -> None:
         with athcodec.read_hdf5(self.path) as clip:
@@ -94,10 +107,17 @@ class _Case:
         with h5py.File(self.gzip, "r") as file:
             stored = file["positions"].id.get_storage_size()
         return {
-            "bytes": length, "encode": middle["encode"], "decode": middle["decode"],
-            "M vertex-frames/s": self.vertex_frames / middle["decode"] / 1e6, "info": middle["info"],
-            "frame": middle["frame"], "read": self.frame_bytes, "read %": 100 * self.frame_bytes / length,
-            "HDF5": middle["HDF5"], "HDF5 bytes": stored, "decode/HDF5": middle["decode"] / middle["HDF5"],
+            "bytes": length,
+            "encode": middle["encode"],
+            "decode": middle["decode"],
+            "M vertex-frames/s": self.vertex_frames / middle["decode"] / 1e6,
+            "info": middle["info"],
+            "frame": middle["frame"],
+            "read": self.frame_bytes,
+            "read %": 100 * self.frame_bytes / length,
+            "HDF5": middle["HDF5"],
+            "HDF5 bytes": stored,
+            "decode/HDF5": middle["decode"] / middle["HDF5"],
         }
 
 

@@ -19,18 +19,15 @@ Results = list[dict[str, Any]]
 class Store:
     """Lists of results by name, each result a dictionary; `file` None keeps them in memory alone."""
 
-    def __init__(self, file: Path | None, environment: dict[str, Any],
-                 keys: dict[str, Sequence[str]]) -> None:
+    def __init__(self, file: Path | None, environment: dict[str, Any], keys: dict[str, Sequence[str]]) -> None:
         self.file, self._environment, self._keys = file, environment, keys
         saved = read(file) if file is not None and file.exists() else {}
-        self._results = {name: {self._key(name, result): result for result in saved.get(name, [])}
-                         for name in keys}
+        self._results = {name: {self._key(name, result): result for result in saved.get(name, [])} for name in keys}
 
     def _key(self, name: str, result: dict[str, Any]) -> tuple:
         return tuple(result[key] for key in self._keys[name])
 
-    def find(self, name: str, wanted: dict[str, Any],
-             depends: dict[str, Any] | None = None) -> dict[str, Any] | None:
+    def find(self, name: str, wanted: dict[str, Any], depends: dict[str, Any] | None = None) -> dict[str, Any] | None:
         """The result with these keys, if it depends on exactly `depends` (None: on anything)."""
         result = self._results[name].get(self._key(name, wanted))
         return result if result is not None and depends in (None, result["depends"]) else None
@@ -41,8 +38,10 @@ class Store:
         self._results[name][self._key(name, result)] = result
         if self.file is not None:
             part = self.file.with_name(self.file.name + ".part")
-            part.write_text(_layout(self._environment | {
-                name: _table_of(results) for name, results in self.contents().items()}) + "\n")
+            part.write_text(
+                _layout(self._environment | {name: _table_of(results) for name, results in self.contents().items()})
+                + "\n"
+            )
             os.replace(part, self.file)
         return result
 
@@ -52,15 +51,17 @@ class Store:
 
 def read(file: Path) -> dict[str, Any]:
     """The JSON file of any verb; tables of a Store as lists of dictionaries."""
-    return {name: _results_of(value) if isinstance(value, dict) and "columns" in value else value
-            for name, value in json.loads(file.read_text()).items()}
+    return {
+        name: _results_of(value) if isinstance(value, dict) and "columns" in value else value
+        for name, value in json.loads(file.read_text()).items()
+    }
 
 
 def _table_of(results: Results) -> dict[str, Any]:
     columns = list(dict.fromkeys(column for result in results for column in result))
     distinct: dict[str, dict[str, int]] = {
-        column: {} for column in columns
-        if any(isinstance(result.get(column), (str, list, dict)) for result in results)}
+        column: {} for column in columns if any(isinstance(result.get(column), (str, list, dict)) for result in results)
+    }
 
     def cell(column: str, value: Any) -> Any:
         if value is None or column not in distinct:
@@ -74,8 +75,14 @@ def _table_of(results: Results) -> dict[str, Any]:
 
 def _results_of(table: dict[str, Any]) -> Results:
     distinct = table["distinct"]
-    return [{column: distinct[column][cell] if column in distinct else cell
-             for column, cell in zip(table["columns"], row, strict=True) if cell is not None} for row in table["rows"]]
+    return [
+        {
+            column: distinct[column][cell] if column in distinct else cell
+            for column, cell in zip(table["columns"], row, strict=True)
+            if cell is not None
+        }
+        for row in table["rows"]
+    ]
 
 
 def _layout(value: Any, newline: str = "\n") -> str:

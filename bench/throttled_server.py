@@ -90,7 +90,7 @@ class _Handler(BaseHTTPRequestHandler):
         headers = {"Content-Type": "application/octet-stream", "ETag": f'"{len(data)}"'}
         if requested:
             headers["Content-Range"] = f"bytes {first}-{last}/{len(data)}"
-        self._respond(206 if requested else 200, data[first: last + 1], headers, entry)
+        self._respond(206 if requested else 200, data[first : last + 1], headers, entry)
 
     def _respond(self, status: int, body: bytes, headers: dict[str, str], entry: list | None = None) -> None:
         self.send_response(status)
@@ -101,7 +101,7 @@ class _Handler(BaseHTTPRequestHandler):
             if entry is None:
                 self.wfile.write(body)
             for at in range(0, len(body) if entry else 0, PACKET):
-                packet = body[at: at + PACKET]
+                packet = body[at : at + PACKET]
                 self.server.wait(len(packet))
                 self.wfile.write(packet)
                 entry[2] += len(packet)

@@ -109,13 +109,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     own = sum(row["bytes"] for row in sizes[:3])
     if own > MOST_BYTES:
         broken.append(f"bundle: got {own:,} bytes, expected at most {MOST_BYTES:,}")
-    return {"tables": [
-        table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
-        table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
-        table(f"Bundles; loader, worker with decoder and page together {own:,} bytes", sizes),
-        table("Forest", forests, NOTE_FOREST),
-        table("Ways of moving the vertices", modes, NOTE_MODES),
-    ], "broken": broken}
+    return {
+        "tables": [
+            table(f"First motion at {args.line:g} Mbit/s", starts, NOTE_START),
+            table("Tasks of the main thread, ms", tasks, NOTE_TASKS),
+            table(f"Bundles; loader, worker with decoder and page together {own:,} bytes", sizes),
+            table("Forest", forests, NOTE_FOREST),
+            table("Ways of moving the vertices", modes, NOTE_MODES),
+        ],
+        "broken": broken,
+    }
 
 
 def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:
@@ -123,8 +126,11 @@ def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:
     with athcodec.read_hdf5(path) as clip:
         athcodec.encode(clip, folder / "tree.ath", rel_error=rel_error)
         positions = clip.block(0, clip.frame_count).astype("<f4")
-        return {"tree.ath": (folder / "tree.ath").read_bytes(), "tree.raw": positions.tobytes(),
-                "tree.glb": _glb(positions, clip.time)}
+        return {
+            "tree.ath": (folder / "tree.ath").read_bytes(),
+            "tree.raw": positions.tobytes(),
+            "tree.glb": _glb(positions, clip.time),
+        }
 
 
 def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
@@ -142,11 +148,21 @@ def _glb(positions: np.ndarray, time: np.ndarray) -> bytes:
         body += array.tobytes()
     sampler = {"input": frames + 1, "output": frames + 2}
     targets = [{"POSITION": 1 + frame} for frame in range(frames)]
-    head = json.dumps({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0, "targets": targets}]}],
-        "animations": [{"samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}],
-        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(body)}]}).encode()
+    head = json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0, "targets": targets}]}],
+            "animations": [
+                {"samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}
+            ],
+            "accessors": accessors,
+            "bufferViews": views,
+            "buffers": [{"byteLength": len(body)}],
+        }
+    ).encode()
     head += b" " * (-len(head) % 4)
     parts = struct.pack("<II", len(head), 0x4E4F534A) + head + struct.pack("<II", len(body), 0x004E4942) + body
     return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
@@ -169,16 +185,26 @@ def _starts(browser, files: dict[str, bytes], args: argparse.Namespace) -> dict[
     with ThrottledServer(files, rate=SLOW) as server:
         first = _open(browser, server, until="athcodecViewer.counters.firstMotion")["motion"]["bytes"]
     motion = [opening["motion"]["ms"] / 1000 for opening in rounds]
-    ath = {"file": ".ath", "size": len(files["tree.ath"]),
-           "picture": statistics.median(opening["picture"]["ms"] for opening in rounds) / 1000,
-           "motion": statistics.median(motion), "slowest": max(motion), "bytes": first,
-           "share": first / len(files["tree.ath"]),
-           "all": statistics.median(opening["all"] for opening in rounds)}
+    ath = {
+        "file": ".ath",
+        "size": len(files["tree.ath"]),
+        "picture": statistics.median(opening["picture"]["ms"] for opening in rounds) / 1000,
+        "motion": statistics.median(motion),
+        "slowest": max(motion),
+        "bytes": first,
+        "share": first / len(files["tree.ath"]),
+        "all": statistics.median(opening["all"] for opening in rounds),
+    }
     rows = [ath] + [{"file": name, "size": found["size"], "motion": found["seconds"]} for name, found in others.items()]
-    return {"starts": rows, "tasks": {
-        "rounds": args.rounds, "by the clock": [max(opening["tasks"], default=0) for opening in rounds],
-        "processor": [opening["processor"] for opening in rounds],
-        "over 50 ms": sum(ms > LONGEST_TASK for opening in rounds for ms in opening["tasks"])}}
+    return {
+        "starts": rows,
+        "tasks": {
+            "rounds": args.rounds,
+            "by the clock": [max(opening["tasks"], default=0) for opening in rounds],
+            "processor": [opening["processor"] for opening in rounds],
+            "over 50 ms": sum(ms > LONGEST_TASK for opening in rounds for ms in opening["tasks"]),
+        },
+    }
 
 
 COMPLETE = "athcodecViewer.motion?.complete && athcodecViewer.counters.firstMotion"
@@ -196,16 +222,27 @@ def _open(browser, server: ThrottledServer, until: str = COMPLETE) -> dict[str, 
     tasks = page.evaluate("longTasks")
     processor = _longest_task(json.loads(browser.stop_tracing())["traceEvents"])
     page.close()
-    return {"picture": counters["firstPicture"], "motion": counters["firstMotion"], "all": done, "tasks": tasks,
-            "processor": processor}
+    return {
+        "picture": counters["firstPicture"],
+        "motion": counters["firstMotion"],
+        "all": done,
+        "tasks": tasks,
+        "processor": processor,
+    }
 
 
 def _longest_task(events: list[dict[str, Any]]) -> float:
     """Milliseconds of processor time of the longest task of a renderer's main thread."""
-    threads = {(event["pid"], event["tid"]) for event in events
-               if event["name"] == "thread_name" and event["args"]["name"] == "CrRendererMain"}
-    return max(event.get("tdur", 0) / 1000 for event in events
-               if event.get("ph") == "X" and (event["pid"], event["tid"]) in threads)
+    threads = {
+        (event["pid"], event["tid"])
+        for event in events
+        if event["name"] == "thread_name" and event["args"]["name"] == "CrRendererMain"
+    }
+    return max(
+        event.get("tdur", 0) / 1000
+        for event in events
+        if event.get("ph") == "X" and (event["pid"], event["tid"]) in threads
+    )
 
 
 def _missed_targets(clip: str, found: dict[str, Any]) -> list[str]:
@@ -215,12 +252,16 @@ def _missed_targets(clip: str, found: dict[str, Any]) -> list[str]:
         broken.append(f"{clip}: first motion: got {ath['motion']:.2f} s, expected at most {MOST_SECONDS} s")
     for other in others:
         if ath["motion"] > MOST_SHARE * other["motion"]:
-            broken.append(f"{clip}: first motion: got {ath['motion']:.2f} s, expected at most a tenth of "
-                          f"{other['file']}'s {other['motion']:.2f} s")
+            broken.append(
+                f"{clip}: first motion: got {ath['motion']:.2f} s, expected at most a tenth of "
+                f"{other['file']}'s {other['motion']:.2f} s"
+            )
     longest = statistics.median(found["tasks"]["by the clock"])
     if longest > LONGEST_TASK:
-        broken.append(f"{clip}: main thread: got tasks of {longest:.0f} ms by the clock (median of the rounds' "
-                      f"longest), expected none over {LONGEST_TASK} ms")
+        broken.append(
+            f"{clip}: main thread: got tasks of {longest:.0f} ms by the clock (median of the rounds' "
+            f"longest), expected none over {LONGEST_TASK} ms"
+        )
     return broken
 
 
@@ -240,9 +281,18 @@ def _forests(browser, data: bytes, counts: list[int]) -> list[dict[str, Any]]:
                     page.evaluate(f"athcodecViewer.state.forest.levelOfDetail = {json.dumps(detail)}")
                     timings.append(page.evaluate("athcodecViewer.timeForest(1)"))
             on, off = (min(timings, key=lambda timing: timing["ms"]) for timings in both.values())
-            rows.append({"instances": count, "in view": count - on["unseen"], "by level": on["counts"],
-                         "detail on": on["ms"], "detail off": off["ms"], "off / on": off["ms"] / on["ms"],
-                         "vertices on": on["vertices"], "vertices off": off["vertices"]})
+            rows.append(
+                {
+                    "instances": count,
+                    "in view": count - on["unseen"],
+                    "by level": on["counts"],
+                    "detail on": on["ms"],
+                    "detail off": off["ms"],
+                    "off / on": off["ms"] / on["ms"],
+                    "vertices on": on["vertices"],
+                    "vertices off": off["vertices"],
+                }
+            )
         page.close()
     return rows
 
@@ -253,7 +303,8 @@ def _modes(browser, data: bytes) -> list[dict[str, Any]]:
         page.wait_for_function("() => athcodecViewer.motion?.complete")
         page.evaluate("athcodecViewer.setPlaying(false)")
         levels = page.evaluate("athcodecViewer.motion.levelCount")
-        rows = [row for mode in ("matrices", "positions")
-                for row in page.evaluate(MODES, ["/tree.ath", mode, levels, 21])]
+        rows = [
+            row for mode in ("matrices", "positions") for row in page.evaluate(MODES, ["/tree.ath", mode, levels, 21])
+        ]
         page.close()
     return sorted(rows, key=lambda row: row["level"])

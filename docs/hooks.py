@@ -8,15 +8,31 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-SHOWN = ("*.md", "LICENSE", "docs/*.md", "docs/*.css", "spec/*.md", "spec/reference_decoder.py",
-         "bench/results/report.md", "bench/results/*.png", "bench/results/*.svg", "athcodec/viewer/*.d.ts",
-         "athcodec/viewer/src/index.d.ts", "athcodec/exporters/vat.md", "athcodec/core/ath.h",
-         "athcodec/core/examples/play.c")
+SHOWN = (
+    "*.md",
+    "LICENSE",
+    "docs/*.md",
+    "docs/*.css",
+    "spec/*.md",
+    "spec/reference_decoder.py",
+    "bench/results/report.md",
+    "bench/results/*.png",
+    "bench/results/*.svg",
+    "athcodec/viewer/*.d.ts",
+    "athcodec/viewer/src/index.d.ts",
+    "athcodec/exporters/vat.md",
+    "athcodec/core/ath.h",
+    "athcodec/core/examples/play.c",
+)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     root = Path(config.config_file_path).parent
     of_theme = [file for file in files if file.src_dir != config.docs_dir]
     shown = sorted({path for pattern in SHOWN for path in root.glob(pattern)})
-    return Files([*of_theme, *(File.generated(config, path.relative_to(root).as_posix(), abs_src_path=str(path))
-                               for path in shown)])
+    return Files(
+        [
+            *of_theme,
+            *(File.generated(config, path.relative_to(root).as_posix(), abs_src_path=str(path)) for path in shown),
+        ]
+    )

@@ -44,9 +44,19 @@ from spec.reference_decoder import crc32c
 
 FOLDER = Path(__file__).resolve().parent / "vectors"
 DECODER_MODULE = Path(__file__).resolve().parent.parent / "athcodec" / "viewer" / "ath_decoder.mjs"
-ERRORS = ("INVALID", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED", "BAD_CHECKSUM", "BAD_HEADER",
-          "BAD_CHUNK_TABLE",
-          "UNKNOWN_CHUNK", "BAD_CHUNK", "LIMIT_EXCEEDED", "TRAILING_BYTES")
+ERRORS = (
+    "INVALID",
+    "NOT_AN_ATH_FILE",
+    "UNSUPPORTED_VERSION",
+    "TRUNCATED",
+    "BAD_CHECKSUM",
+    "BAD_HEADER",
+    "BAD_CHUNK_TABLE",
+    "UNKNOWN_CHUNK",
+    "BAD_CHUNK",
+    "LIMIT_EXCEEDED",
+    "TRAILING_BYTES",
+)
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
 LISTING = """\
@@ -125,9 +135,14 @@ def with_quiet_nans(answer: bytes, kind: str) -> bytes:
 def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
     """A line for each item whose result differs from expected.txt."""
     left_out = set(without)
-    jobs = [(vector, item) for vector in chosen for item, result in vector.results.items()
-            if item not in left_out and not ("levels" in left_out and item.isdecimal())
-            and not ("limits" in left_out and result == "LIMIT_EXCEEDED")]
+    jobs = [
+        (vector, item)
+        for vector in chosen
+        for item, result in vector.results.items()
+        if item not in left_out
+        and not ("levels" in left_out and item.isdecimal())
+        and not ("limits" in left_out and result == "LIMIT_EXCEEDED")
+    ]
     for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
         expected, got = vector.results[item], result_of(vector.path.read_bytes(), item, answer)
         if got != expected:
@@ -160,9 +175,11 @@ def result(ask: Callable[[bytes, str], bytes], data: bytes, item: str) -> str:
 
 def command(words: list[str]) -> Decoder:
     """A program, called by the protocol above."""
+
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
             yield ask_command(words, vector.path, item)
+
     return decoder
 
 
@@ -181,12 +198,14 @@ def ask_command(words: list[str], path: Path, item: str) -> bytes | Exception:
 
 def one_by_one(ask: Callable[[bytes, str], bytes]) -> Decoder:
     """A function that takes a file's bytes and an item, and may raise Refused."""
+
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
             try:
                 yield ask(vector.path.read_bytes(), item)
             except Refused as error:
                 yield error
+
     return decoder
 
 
@@ -225,8 +244,7 @@ def ask_package(decoder, item: str) -> bytes:
         return b"".join(clip_entry(clip) for clip in decoder.clips)
     if item != "static":
         played = (decoder.play(clip.name) for clip in decoder.clips)
-        return b"".join((clip.time if item == "time" else clip.positions(level=int(item))).tobytes()
-                        for clip in played)
+        return b"".join((clip.time if item == "time" else clip.positions(level=int(item))).tobytes() for clip in played)
     arrays = [decoder.faces, decoder.edges, *decoder.attributes.values()]
     return metadata_text(decoder) + b"".join(array.tobytes() for array in arrays if array is not None)
 
@@ -298,15 +316,17 @@ def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
     node = shutil.which("node")
     if node is None:
         raise OSError("node: got none on PATH; expected Node.js 18 or newer")
-    request = {"module": DECODER_MODULE.as_uri(),
-             "jobs": [{"path": str(v.path), "item": item} for v, item in jobs]}
-    done = subprocess.run([node, "--input-type=module", "-e", NODE_SCRIPT], input=json.dumps(request),
-                          capture_output=True,
-                          text=True, timeout=SECONDS)
+    request = {"module": DECODER_MODULE.as_uri(), "jobs": [{"path": str(v.path), "item": item} for v, item in jobs]}
+    done = subprocess.run(
+        [node, "--input-type=module", "-e", NODE_SCRIPT],
+        input=json.dumps(request),
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+    )
     if done.returncode != 0:
         raise OSError(f"node: {done.stderr.strip()}")
-    return [node_answer(vector, answer) for (vector, _),
-            answer in zip(jobs, json.loads(done.stdout), strict=True)]
+    return [node_answer(vector, answer) for (vector, _), answer in zip(jobs, json.loads(done.stdout), strict=True)]
 
 
 def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
@@ -326,8 +346,11 @@ class Own:
     without: tuple[str, ...] = ()
 
 
-OWN = {"c": Own(one_by_one(package)), "wasm": Own(web_assembly, ("strict", "static")),
-       "reference": Own(one_by_one(reference))}
+OWN = {
+    "c": Own(one_by_one(package)),
+    "wasm": Own(web_assembly, ("strict", "static")),
+    "reference": Own(one_by_one(reference)),
+}
 
 
 # ---- command -----------------------------------------------------------------------------------------------
@@ -337,12 +360,18 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m spec.conformance",
         description="Tests a decoder of .ath files against the vectors of spec/vectors.",
-        epilog="spec/conformance.py describes how DECODER-COMMAND is called.")
+        epilog="spec/conformance.py describes how DECODER-COMMAND is called.",
+    )
     parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
     parser.add_argument("--only", metavar="GLOB", default="*", help="vectors whose name matches")
-    parser.add_argument("--without", metavar="ITEM", action="append", default=[],
-                        help="leave out items that a decoder does not support: strict, open, levels, rest, time, "
-                             "clips, static, limits; may be repeated")
+    parser.add_argument(
+        "--without",
+        metavar="ITEM",
+        action="append",
+        default=[],
+        help="leave out items that a decoder does not support: strict, open, levels, rest, time, "
+        "clips, static, limits; may be repeated",
+    )
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="DECODER-COMMAND")
     options = parser.parse_args(words)
     if bool(options.own) == bool(options.command):

@@ -101,10 +101,13 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 
 def forked(**fields) -> Plant:
     """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
-    scripts = {(rd.SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
-               (rd.STEMS, 1): lambda: Chance(1), (rd.STEMS, 2): lambda: Chance(2),
-               (rd.AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
-               (rd.CORRECTIONS, 2): lambda: Chance(3)}
+    scripts = {
+        (rd.SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
+        (rd.STEMS, 1): lambda: Chance(1),
+        (rd.STEMS, 2): lambda: Chance(2),
+        (rd.AFFINES, 0): [-8, *row((5, -3, 1), (0, 2, 0))],
+        (rd.CORRECTIONS, 2): lambda: Chance(3),
+    }
     return Plant(FORK, **{"frames": 4, "segments": 2, "scripts": scripts} | fields)
 
 
@@ -133,126 +136,290 @@ HEADS = {level: stems_head(0.01 * (level + 1), level % 5) for level in range(33)
 
 def chain(branches: int, count: int = 1, **last) -> list[Stem]:
     return [Stem(b - 1, count, count - 1 if b else 0) for b in range(branches - 1)] + [
-        Stem(branches - 2, count, count - 1, **last)]
+        Stem(branches - 2, count, count - 1, **last)
+    ]
 
 
 def documented() -> bytes:
     """The hex dump in FORMAT.md."""
     text = (Path(__file__).resolve().parent.parent / "FORMAT.md").read_text("utf-8")
-    dump = text[text.index("\n## Smallest file"):]
+    dump = text[text.index("\n## Smallest file") :]
     return bytes.fromhex("".join(re.findall(r"^ {4}[0-9a-f]{8}  ((?:[0-9a-f]{2} ?)+)", dump, re.M)))
 
 
 valid("documented", "the smallest file, as FORMAT.md has it", documented)
 valid("smallest", "one vertex, one frame, nothing moves", lone)
 valid("smallest-wide", "the same with binary64 positions and rest pose", lambda: lone(is_float64=True))
-valid("one-vertex-moves", "one vertex whose translation has three frequencies in five frames",
-      lambda: lone(frames=5, scripts={(rd.STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}))
+valid(
+    "one-vertex-moves",
+    "one vertex whose translation has three frequencies in five frames",
+    lambda: lone(frames=5, scripts={(rd.STEMS, 0): row((1, 2, 3), (-40, 5, 0), (7, 0, -1))}),
+)
 valid("one-frame", "a bush in a single frame", lambda: moving(FORK, 5, frames=1, heads=HEADS))
-valid("all-equal", "all vertices at one point: no length, no extent, no rotations, no maps",
-      lambda: moving([Stem(-1, 4), Stem(0, 2, 1), Stem(0, 2, 3, SHEET)], 6, points=[[1.0, 1.0, 1.0]] * 8,
-                     heads=HEADS))
-valid("all-at-origin", "all vertices at the origin, and the origin 0",
-      lambda: still([Stem(-1, 3)], points=[[0.0] * 3] * 3))
-valid("empty-streams", "streams all of whose decisions are 1 and that have no bytes",
-      lambda: still(FORK, frames=3))
-valid("two-roots", "two plants: a root in the middle of the file",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 4), Stem(2, 1, 3)], 7, heads=HEADS))
-valid("many-roots", "roots alone, each a node by its first modes",
-      lambda: moving([Stem(-1, 1), Stem(-1, 2), Stem(-1, 3), Stem(-1, 1, 0, SHEET)], 8, heads=HEADS))
-valid("chain",
-      "the deepest hierarchy of nodes that there can be: 31 branches, each on the one before, 32 levels",
-      lambda: moving(chain(31), 9, heads=HEADS))
-valid("chain-in-whole", "a chain of 40 branches in a WHOLE subtree: nodes end where it begins",
-      lambda: moving([Stem(-1, 2), *(replace(s, parent=b, flags=WHOLE if b == 0 else 0)
-                                     for b, s in enumerate(chain(40)))], 10, heads=HEADS))
-valid("depth-4096", "branches as deep as the limit allows, of which level 0 is stored",
-      lambda: still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))],
-                    points=[[0.0] * 3] * 4096).draft().upto(0))
-valid("whole",
-      "WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1, WHOLE), Stem(2, 1), Stem(0, 2, 2, WHOLE),
-                      Stem(-1, 2, 0, WHOLE), Stem(5, 3, 1)], 11, heads=HEADS))
-valid("whole-alone", "a root that is WHOLE and all there is: h is 0",
-      lambda: moving([Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS))
-valid("loose", "LOOSE branches: a node by its modes, one with a map of its own, one inside a WHOLE subtree",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1, LOOSE), Stem(0, 3, 2, LOOSE), Stem(2, 2, 1, WHOLE),
-                      Stem(3, 2, 0, LOOSE)], 13, heads=HEADS))
-valid("loose-long", "a LOOSE stem of two pieces: only its first has a translation",
-      lambda: moving([Stem(-1, 2), Stem(0, 65, 1, LOOSE)], 14, frames=2, heads=HEADS))
-valid("long-stem", "a stem of 129 vertices: three pieces, a root with a map of its own",
-      lambda: moving([Stem(-1, 129)], 15, frames=2, heads=HEADS))
-valid("stem-of-64", "a stem of 64 vertices: one piece, by its modes",
-      lambda: moving([Stem(-1, 64)], 16, frames=2))
-valid("sheet", "SHEET branches that others hang on: flat, of one vertex, of two, in a line",
-      lambda: moving([Stem(-1, 9, 0, SHEET), Stem(0, 1, 4, SHEET), Stem(1, 2, 0, SHEET), Stem(0, 5, 8, SHEET),
-                      Stem(3, 2, 4)], 17, frames=4, heads=HEADS,
-                     points=[[float(i % 3), float(i // 3), 0.0] for i in range(9)] + [[5.0, 1.0, 1.0]]
-                     + [[6.0, 1.0, 1.0], [6.0, 2.0, 1.0]] + [[2.0 + i, 2.0, 0.0] for i in range(5)]
-                     + [[7.0, 2.0, 1.0], [8.0, 2.0, 1.0]]))
-valid("sheet-long", "a SHEET of 70 vertices in two pieces, and a branch on the second",
-      lambda: moving([Stem(-1, 70, 0, SHEET), Stem(0, 2, 69)], 18, frames=2, heads=HEADS))
-valid("sheet-mirrored", "a sheet that is turned inside out: the gradient is followed, not Newton's step",
-      lambda: Plant([Stem(-1, 4, 0, SHEET), Stem(0, 2, 3)], 2, points=[
-          [0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0],
-          [0.0, 0.0, 10.0]],
-          scripts={(rd.STEMS, 1): [*row(), 0, *row((0, 0, 0), (-200, 30, 0)), *row((0, 0, 0), (0, -170, 0)),
-                                   *row((3, 3, -160), (0, 0, 40))]}))
-valid("tangent-opposed", "a parent that folds back on itself: the kept rotation is not turned",
-      lambda: Plant([Stem(-1, 2), Stem(0, 2, 1)], 2,
-                    points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
-                    scripts={(rd.STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]}))
-valid("tangent-none", "coincident vertices: no tangent to follow, at rest and in motion",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(0, 2, 2)], 19, points=[[1.0, 2.0, 3.0]] * 3 + [
-          [1.0, 3.0, 3.0], [1.0, 4.0, 3.0], [1.0, 2.0, 3.0], [2.0, 2.0, 3.0]]))
-valid("whitening", "nodes whose subtrees extend in 0, 1, 2 and 3 directions",
-      lambda: moving([Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1), Stem(-1, 2), Stem(4, 2, 1),
-                      Stem(-1, 2),
-                      Stem(6, 3, 1)], 20, heads=HEADS, points=[
-          [0.0] * 3, [0.0] * 3, [0.0] * 3, [5.0, 0.0, 0.0], [6.0, 1.0, 0.0], [7.0, 2.0, 0.0], [0.0, 5.0, 0.0],
-          [1.0, 5.0, 0.0], [1.0, 6.0, 0.0], [3.0, 9.0, 0.0], [0.0, 0.0, 9.0], [1.0, 0.0, 9.0],
-          [1.0, 2.0, 9.0],
-          [1.0, 2.0, 12.0], [2.0, 3.0, 14.0]]))
-valid("rotations", "every rotation factor there is: 0, 1, 2, 4, 8", lambda: moving(
-    [Stem(-1, 3), *(Stem(b, 2, 1) for b in range(4))], 21, frames=4, heads=HEADS))
-valid("permutations", "branches and vertices numbered otherwise in the source",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(0, 1, 2)], 22, branch_source=[2, 0, 1],
-                     vertex_source=[5, 0, 3, 1, 4, 2]))
-valid("permutation-of-branches", "branches numbered otherwise, vertices as that lets one expect",
-      lambda: moving(FORK, 23, branch_source=[1, 0]))
-valid("permutations-said", "numbers as expected, but said one by one",
-      lambda: still(FORK, branch_source=[0, 1], vertex_source=[0, 1, 2, 3, 4]))
+valid(
+    "all-equal",
+    "all vertices at one point: no length, no extent, no rotations, no maps",
+    lambda: moving([Stem(-1, 4), Stem(0, 2, 1), Stem(0, 2, 3, SHEET)], 6, points=[[1.0, 1.0, 1.0]] * 8, heads=HEADS),
+)
+valid(
+    "all-at-origin",
+    "all vertices at the origin, and the origin 0",
+    lambda: still([Stem(-1, 3)], points=[[0.0] * 3] * 3),
+)
+valid("empty-streams", "streams all of whose decisions are 1 and that have no bytes", lambda: still(FORK, frames=3))
+valid(
+    "two-roots",
+    "two plants: a root in the middle of the file",
+    lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 4), Stem(2, 1, 3)], 7, heads=HEADS),
+)
+valid(
+    "many-roots",
+    "roots alone, each a node by its first modes",
+    lambda: moving([Stem(-1, 1), Stem(-1, 2), Stem(-1, 3), Stem(-1, 1, 0, SHEET)], 8, heads=HEADS),
+)
+valid(
+    "chain",
+    "the deepest hierarchy of nodes that there can be: 31 branches, each on the one before, 32 levels",
+    lambda: moving(chain(31), 9, heads=HEADS),
+)
+valid(
+    "chain-in-whole",
+    "a chain of 40 branches in a WHOLE subtree: nodes end where it begins",
+    lambda: moving(
+        [Stem(-1, 2), *(replace(s, parent=b, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(40)))],
+        10,
+        heads=HEADS,
+    ),
+)
+valid(
+    "depth-4096",
+    "branches as deep as the limit allows, of which level 0 is stored",
+    lambda: (
+        still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4096))], points=[[0.0] * 3] * 4096)
+        .draft()
+        .upto(0)
+    ),
+)
+valid(
+    "whole",
+    "WHOLE subtrees: a root's, a branch's, and that of a branch alone, shown till the last level",
+    lambda: moving(
+        [
+            Stem(-1, 3),
+            Stem(0, 2, 1),
+            Stem(1, 2, 1, WHOLE),
+            Stem(2, 1),
+            Stem(0, 2, 2, WHOLE),
+            Stem(-1, 2, 0, WHOLE),
+            Stem(5, 3, 1),
+        ],
+        11,
+        heads=HEADS,
+    ),
+)
+valid(
+    "whole-alone",
+    "a root that is WHOLE and all there is: h is 0",
+    lambda: moving([Stem(-1, 3, 0, WHOLE)], 12, heads=HEADS),
+)
+valid(
+    "loose",
+    "LOOSE branches: a node by its modes, one with a map of its own, one inside a WHOLE subtree",
+    lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1, LOOSE), Stem(0, 3, 2, LOOSE), Stem(2, 2, 1, WHOLE), Stem(3, 2, 0, LOOSE)],
+        13,
+        heads=HEADS,
+    ),
+)
+valid(
+    "loose-long",
+    "a LOOSE stem of two pieces: only its first has a translation",
+    lambda: moving([Stem(-1, 2), Stem(0, 65, 1, LOOSE)], 14, frames=2, heads=HEADS),
+)
+valid(
+    "long-stem",
+    "a stem of 129 vertices: three pieces, a root with a map of its own",
+    lambda: moving([Stem(-1, 129)], 15, frames=2, heads=HEADS),
+)
+valid("stem-of-64", "a stem of 64 vertices: one piece, by its modes", lambda: moving([Stem(-1, 64)], 16, frames=2))
+valid(
+    "sheet",
+    "SHEET branches that others hang on: flat, of one vertex, of two, in a line",
+    lambda: moving(
+        [Stem(-1, 9, 0, SHEET), Stem(0, 1, 4, SHEET), Stem(1, 2, 0, SHEET), Stem(0, 5, 8, SHEET), Stem(3, 2, 4)],
+        17,
+        frames=4,
+        heads=HEADS,
+        points=[[float(i % 3), float(i // 3), 0.0] for i in range(9)]
+        + [[5.0, 1.0, 1.0]]
+        + [[6.0, 1.0, 1.0], [6.0, 2.0, 1.0]]
+        + [[2.0 + i, 2.0, 0.0] for i in range(5)]
+        + [[7.0, 2.0, 1.0], [8.0, 2.0, 1.0]],
+    ),
+)
+valid(
+    "sheet-long",
+    "a SHEET of 70 vertices in two pieces, and a branch on the second",
+    lambda: moving([Stem(-1, 70, 0, SHEET), Stem(0, 2, 69)], 18, frames=2, heads=HEADS),
+)
+valid(
+    "sheet-mirrored",
+    "a sheet that is turned inside out: the gradient is followed, not Newton's step",
+    lambda: Plant(
+        [Stem(-1, 4, 0, SHEET), Stem(0, 2, 3)],
+        2,
+        points=[[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 9.0], [0.0, 0.0, 10.0]],
+        scripts={
+            (rd.STEMS, 1): [
+                *row(),
+                0,
+                *row((0, 0, 0), (-200, 30, 0)),
+                *row((0, 0, 0), (0, -170, 0)),
+                *row((3, 3, -160), (0, 0, 40)),
+            ]
+        },
+    ),
+)
+valid(
+    "tangent-opposed",
+    "a parent that folds back on itself: the kept rotation is not turned",
+    lambda: Plant(
+        [Stem(-1, 2), Stem(0, 2, 1)],
+        2,
+        points=[[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 8.0, 0.0], [0.0, 9.0, 1.0]],
+        scripts={(rd.STEMS, 1): [*row(), *row((0, -60, 0), (0, 60, 0)), *row((0, -9, 1))]},
+    ),
+)
+valid(
+    "tangent-none",
+    "coincident vertices: no tangent to follow, at rest and in motion",
+    lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 2, 2)],
+        19,
+        points=[[1.0, 2.0, 3.0]] * 3 + [[1.0, 3.0, 3.0], [1.0, 4.0, 3.0], [1.0, 2.0, 3.0], [2.0, 2.0, 3.0]],
+    ),
+)
+valid(
+    "whitening",
+    "nodes whose subtrees extend in 0, 1, 2 and 3 directions",
+    lambda: moving(
+        [
+            Stem(-1, 2),
+            Stem(0, 1, 1),
+            Stem(-1, 2),
+            Stem(2, 1, 1),
+            Stem(-1, 2),
+            Stem(4, 2, 1),
+            Stem(-1, 2),
+            Stem(6, 3, 1),
+        ],
+        20,
+        heads=HEADS,
+        points=[
+            [0.0] * 3,
+            [0.0] * 3,
+            [0.0] * 3,
+            [5.0, 0.0, 0.0],
+            [6.0, 1.0, 0.0],
+            [7.0, 2.0, 0.0],
+            [0.0, 5.0, 0.0],
+            [1.0, 5.0, 0.0],
+            [1.0, 6.0, 0.0],
+            [3.0, 9.0, 0.0],
+            [0.0, 0.0, 9.0],
+            [1.0, 0.0, 9.0],
+            [1.0, 2.0, 9.0],
+            [1.0, 2.0, 12.0],
+            [2.0, 3.0, 14.0],
+        ],
+    ),
+)
+valid(
+    "rotations",
+    "every rotation factor there is: 0, 1, 2, 4, 8",
+    lambda: moving([Stem(-1, 3), *(Stem(b, 2, 1) for b in range(4))], 21, frames=4, heads=HEADS),
+)
+valid(
+    "permutations",
+    "branches and vertices numbered otherwise in the source",
+    lambda: moving(
+        [Stem(-1, 3), Stem(0, 2, 1), Stem(0, 1, 2)], 22, branch_source=[2, 0, 1], vertex_source=[5, 0, 3, 1, 4, 2]
+    ),
+)
+valid(
+    "permutation-of-branches",
+    "branches numbered otherwise, vertices as that lets one expect",
+    lambda: moving(FORK, 23, branch_source=[1, 0]),
+)
+valid(
+    "permutations-said",
+    "numbers as expected, but said one by one",
+    lambda: still(FORK, branch_source=[0, 1], vertex_source=[0, 1, 2, 3, 4]),
+)
 
 # ---- valid: segments, time, levels -------------------------------------------------------------------------
 
-valid("frames-256", "a segment of as many frames as there can be, with rows that code all of them",
-      lambda: lone(frames=256, scripts={(rd.STEMS, 0): row(*[(1, 0, -1)] * 256), (rd.STEMS, 1): []}))
-valid("frames-257", "one frame more: segments of 128 and 129",
-      lambda: moving([Stem(-1, 2)], 24, frames=257, segments=2))
-valid("uneven-segments", "7 frames in 3 segments, of 2, 2 and 3",
-      lambda: moving(FORK, 25, frames=7, segments=3, heads=HEADS))
-valid("segment-per-frame", "as many segments as frames",
-      lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
-valid("steps-per-segment", "segments with steps, rotations and bases of their own",
-      lambda: moving(FORK, 27, frames=6, segments=2, heads={
-          (1, 0): stems_head(0.5, 3), (1, 1): stems_head(0.001, 0), (2, 1): stems_head(
-              0.25, 1, 8, 2, basis_stream([[100, -100, 100], [128, 0, -128]], 8))}))
+valid(
+    "frames-256",
+    "a segment of as many frames as there can be, with rows that code all of them",
+    lambda: lone(frames=256, scripts={(rd.STEMS, 0): row(*[(1, 0, -1)] * 256), (rd.STEMS, 1): []}),
+)
+valid(
+    "frames-257", "one frame more: segments of 128 and 129", lambda: moving([Stem(-1, 2)], 24, frames=257, segments=2)
+)
+valid(
+    "uneven-segments",
+    "7 frames in 3 segments, of 2, 2 and 3",
+    lambda: moving(FORK, 25, frames=7, segments=3, heads=HEADS),
+)
+valid("segment-per-frame", "as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
+valid(
+    "steps-per-segment",
+    "segments with steps, rotations and bases of their own",
+    lambda: moving(
+        FORK,
+        27,
+        frames=6,
+        segments=2,
+        heads={
+            (1, 0): stems_head(0.5, 3),
+            (1, 1): stems_head(0.001, 0),
+            (2, 1): stems_head(0.25, 1, 8, 2, basis_stream([[100, -100, 100], [128, 0, -128]], 8)),
+        },
+    ),
+)
 valid("level-0-alone", "shortened: level 0 of 3", lambda: fork().upto(0))
 valid("level-1-of-3", "shortened: without the last level and its corrections", lambda: fork().upto(1))
-valid("errors-announced", "an error table with numbers, -0.0 among them, and Max_Error 0",
-      lambda: replace(lone().draft().with_header(max_error=0.0),
-                      errors=struct.pack("<4f", 1e30, FLOAT_TINY, -0.0, 0.0)))
+valid(
+    "errors-announced",
+    "an error table with numbers, -0.0 among them, and Max_Error 0",
+    lambda: replace(lone().draft().with_header(max_error=0.0), errors=struct.pack("<4f", 1e30, FLOAT_TINY, -0.0, 0.0)),
+)
 valid("max-error-negative-zero", "Max_Error -0.0 is 0", lambda: lone().draft().with_header(max_error=-0.0))
-valid("time-rate", "times by their rate, First below 0",
-      lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
-valid("time-wide", "times far from 0, with a Step that just counts",
-      lambda: lone(frames=3, time=steady_time(2.0**52, 1.0)))
-valid("time-uneven", "times one by one, -0.0 and subnormal ones among them",
-      lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)))
+valid("time-rate", "times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
+valid(
+    "time-wide",
+    "times far from 0, with a Step that just counts",
+    lambda: lone(frames=3, time=steady_time(2.0**52, 1.0)),
+)
+valid(
+    "time-uneven",
+    "times one by one, -0.0 and subnormal ones among them",
+    lambda: lone(frames=6, time=uneven_time(-1e300, -1.0, -0.0, TINY, 1 / 3, HIGHEST)),
+)
 valid("time-one-uneven", "a single time by Method 2", lambda: lone(time=uneven_time(1.5)))
-valid("thresholds", "Epsilon, Xi, Eta and Lambda at the ends of their range", lambda: lone().draft().change(
-    rd.HIERARCHY,
-    content=hierarchy_chunk(lone().draft().content(rd.HIERARCHY)[16:], FLOAT_MAX, 0.0, 2**32 - 1, 0)))
+valid(
+    "thresholds",
+    "Epsilon, Xi, Eta and Lambda at the ends of their range",
+    lambda: (
+        lone()
+        .draft()
+        .change(
+            rd.HIERARCHY,
+            content=hierarchy_chunk(lone().draft().content(rd.HIERARCHY)[16:], FLOAT_MAX, 0.0, 2**32 - 1, 0),
+        )
+    ),
+)
 
 # ---- valid: clips ------------------------------------------------------------------------------------------
 
@@ -274,56 +441,150 @@ def named(*names: str) -> Plant:
 
 
 valid("clips-two", "two clips of different lengths, that share the shapes of pieces", two_clips)
-valid("clips-three", "13 frames in 6 segments, which without the clips would begin elsewhere",
-      lambda: moving(FORK, 28, heads=HEADS, clips=(rd.Clip(5, 2, "a"), rd.Clip(1, 1, "b"), rd.Clip(7, 3, "c"))))
-valid("clips-of-one-frame", "three clips of one frame each, one of them a loop",
-      lambda: moving(FORK, 29, heads=HEADS, clips=(
-          rd.Clip(1, 1, "a"), loop(rd.Clip(1, 1, "b"), 0.0, 0.0, 0.0), rd.Clip(1, 1, "c"))))
-valid("clips-segment-lengths", "a segment of as many frames as there can be before shorter ones",
-      lambda: lone(clips=(rd.Clip(256, 1, "long"), rd.Clip(257, 2, "longer"), rd.Clip(2, 2, "short")),
-                   scripts={(rd.STEMS, 0): row((1, 2, 3))}))
-valid("clips-255", "as many clips as there can be, the last with a segment more",
-      lambda: lone(clips=(*(rd.Clip(1, 1, f"{i}") for i in range(254)), rd.Clip(2, 2, "last")),
-                   scripts={(rd.STEMS, 0): row((1, 2, 3))}))
-valid("clips-loops", "two loops around a clip that is none: seams at the ends of binary32, and -0.0",
-      lambda: two_clips(clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), rd.Clip(2, 1, "once"),
-                               loop(STORM, FLOAT_MAX, 1.0, -0.0))))
+valid(
+    "clips-three",
+    "13 frames in 6 segments, which without the clips would begin elsewhere",
+    lambda: moving(FORK, 28, heads=HEADS, clips=(rd.Clip(5, 2, "a"), rd.Clip(1, 1, "b"), rd.Clip(7, 3, "c"))),
+)
+valid(
+    "clips-of-one-frame",
+    "three clips of one frame each, one of them a loop",
+    lambda: moving(
+        FORK, 29, heads=HEADS, clips=(rd.Clip(1, 1, "a"), loop(rd.Clip(1, 1, "b"), 0.0, 0.0, 0.0), rd.Clip(1, 1, "c"))
+    ),
+)
+valid(
+    "clips-segment-lengths",
+    "a segment of as many frames as there can be before shorter ones",
+    lambda: lone(
+        clips=(rd.Clip(256, 1, "long"), rd.Clip(257, 2, "longer"), rd.Clip(2, 2, "short")),
+        scripts={(rd.STEMS, 0): row((1, 2, 3))},
+    ),
+)
+valid(
+    "clips-255",
+    "as many clips as there can be, the last with a segment more",
+    lambda: lone(
+        clips=(*(rd.Clip(1, 1, f"{i}") for i in range(254)), rd.Clip(2, 2, "last")),
+        scripts={(rd.STEMS, 0): row((1, 2, 3))},
+    ),
+)
+valid(
+    "clips-loops",
+    "two loops around a clip that is none: seams at the ends of binary32, and -0.0",
+    lambda: two_clips(
+        clips=(loop(CALM, 0.5, FLOAT_TINY, 0.0), rd.Clip(2, 1, "once"), loop(STORM, FLOAT_MAX, 1.0, -0.0))
+    ),
+)
 valid("clip-named", "a single clip with a name", lambda: two_clips(clips=(CALM,)))
 valid("clip-loop", "a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
 valid("clip-unnamed", "a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(rd.Clip(4, 2),)))
-valid("clip-unnamed-loop", "a single loop with an empty name",
-      lambda: two_clips(clips=(loop(rd.Clip(4, 2), 0.25, 0.25, 0.0),)))
-valid("clips-time", "First and Step of each clip: the second begins before the first and overlaps it",
-      lambda: two_clips(time=steady_times((10.0, 0.5), (-1.0, 0.25))))
-valid("clips-time-rate", "First and rate of each clip, which all begin at 0",
-      lambda: two_clips(time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)))
-valid("clips-time-uneven", "times one by one, that descend and repeat from clip to clip",
-      lambda: two_clips(time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)))
-valid("clips-time-of-one-frame", "clips of one frame, all at the same time, one by one",
-      lambda: replace(named("a", "b", "c"), time=uneven_time(1.5, 1.5, 1.5)))
-valid("clips-time-vast", "what a time is expected to be, from clips before, overflows to infinity",
-      lambda: replace(named("a", "b", "c", "d"), time=uneven_time(LOWEST, HIGHEST, LOWEST, 0.0)))
-valid("clips-time-step-vanishes", "a Step that vanishes, in a clip of one frame",
-      lambda: two_clips(clips=(CALM, rd.Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)),
-                        scripts={}))
-valid("clips-steps", "segments with steps, rotations and bases of their own, of as many rows as each has frames",
-      lambda: moving(FORK, 30, clips=(CALM, STORM), heads={
-          (1, 0): stems_head(0.5, 3, 8, 3, basis_stream([[100, -100, 100], [128, 0, -128], [1, 2, 3]], 8)),
-          (1, 1): stems_head(0.001, 0, 9, 2, basis_stream([[1, 2], [256, -256]], 9)),
-          (2, 2): stems_head(0.25, 1)}))
-valid("clips-corrections", "corrections in the second clip alone",
-      lambda: Plant(FORK, clips=(CALM, STORM), is_float64=True, scripts={(rd.CORRECTIONS, 2, 2): lambda: Chance(58)}))
-valid("clips-truncated", "shortened: level 0 of 3, seams of all three",
-      lambda: two_clips(clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))).upto(0))
-valid("clips-lossless", "two loops whose last level is the source's own numbers: seams of four levels",
-      lambda: two_clips(clips=(loop(CALM, 3.0, 2.0, 1.0, 0.0), loop(STORM, 0.5, 0.25, 0.125, 0.0))).with_header(
-          level_count=4, full_level_count=4).add(*(Entry(rd.EXACT, b"", 3, s) for s in range(3))))
-valid("clips-names", "names that differ in case, in accents, in their ends, by spaces alone", lambda: named(
-    "wind", "Wind", "WIND", "win", "winds", " ", "  ", "B\u00f6e", "Bo\u0308e", "\u98ce", "\U0001f333", "\"\\/",
-    "a.b/c"))
-valid("clips-names-ends", "characters at the ends of the ranges of UTF-8", lambda: named(
-    " ", "~", "\x80", "\x9f", "\u07ff", "\u0800", "\ud7ff", "\ue000", "\ufeff", "\ufffe", "\uffff",
-    "\U00010000", "\U0010ffff"))
+valid(
+    "clip-unnamed-loop",
+    "a single loop with an empty name",
+    lambda: two_clips(clips=(loop(rd.Clip(4, 2), 0.25, 0.25, 0.0),)),
+)
+valid(
+    "clips-time",
+    "First and Step of each clip: the second begins before the first and overlaps it",
+    lambda: two_clips(time=steady_times((10.0, 0.5), (-1.0, 0.25))),
+)
+valid(
+    "clips-time-rate",
+    "First and rate of each clip, which all begin at 0",
+    lambda: two_clips(time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)),
+)
+valid(
+    "clips-time-uneven",
+    "times one by one, that descend and repeat from clip to clip",
+    lambda: two_clips(time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)),
+)
+valid(
+    "clips-time-of-one-frame",
+    "clips of one frame, all at the same time, one by one",
+    lambda: replace(named("a", "b", "c"), time=uneven_time(1.5, 1.5, 1.5)),
+)
+valid(
+    "clips-time-vast",
+    "what a time is expected to be, from clips before, overflows to infinity",
+    lambda: replace(named("a", "b", "c", "d"), time=uneven_time(LOWEST, HIGHEST, LOWEST, 0.0)),
+)
+valid(
+    "clips-time-step-vanishes",
+    "a Step that vanishes, in a clip of one frame",
+    lambda: two_clips(clips=(CALM, rd.Clip(1, 1, "still")), time=steady_times((0.0, 0.5), (1e30, 1.0)), scripts={}),
+)
+valid(
+    "clips-steps",
+    "segments with steps, rotations and bases of their own, of as many rows as each has frames",
+    lambda: moving(
+        FORK,
+        30,
+        clips=(CALM, STORM),
+        heads={
+            (1, 0): stems_head(0.5, 3, 8, 3, basis_stream([[100, -100, 100], [128, 0, -128], [1, 2, 3]], 8)),
+            (1, 1): stems_head(0.001, 0, 9, 2, basis_stream([[1, 2], [256, -256]], 9)),
+            (2, 2): stems_head(0.25, 1),
+        },
+    ),
+)
+valid(
+    "clips-corrections",
+    "corrections in the second clip alone",
+    lambda: Plant(FORK, clips=(CALM, STORM), is_float64=True, scripts={(rd.CORRECTIONS, 2, 2): lambda: Chance(58)}),
+)
+valid(
+    "clips-truncated",
+    "shortened: level 0 of 3, seams of all three",
+    lambda: two_clips(clips=(CALM, loop(STORM, 3.0, 2.0, 1.0))).upto(0),
+)
+valid(
+    "clips-lossless",
+    "two loops whose last level is the source's own numbers: seams of four levels",
+    lambda: (
+        two_clips(clips=(loop(CALM, 3.0, 2.0, 1.0, 0.0), loop(STORM, 0.5, 0.25, 0.125, 0.0)))
+        .with_header(level_count=4, full_level_count=4)
+        .add(*(Entry(rd.EXACT, b"", 3, s) for s in range(3)))
+    ),
+)
+valid(
+    "clips-names",
+    "names that differ in case, in accents, in their ends, by spaces alone",
+    lambda: named(
+        "wind",
+        "Wind",
+        "WIND",
+        "win",
+        "winds",
+        " ",
+        "  ",
+        "B\u00f6e",
+        "Bo\u0308e",
+        "\u98ce",
+        "\U0001f333",
+        '"\\/',
+        "a.b/c",
+    ),
+)
+valid(
+    "clips-names-ends",
+    "characters at the ends of the ranges of UTF-8",
+    lambda: named(
+        " ",
+        "~",
+        "\x80",
+        "\x9f",
+        "\u07ff",
+        "\u0800",
+        "\ud7ff",
+        "\ue000",
+        "\ufeff",
+        "\ufffe",
+        "\uffff",
+        "\U00010000",
+        "\U0010ffff",
+    ),
+)
 valid("clips-names-longest", "names of 255 bytes", lambda: named("n" * 255, "n" * 254 + "m", "\u98ce" * 85))
 
 # ---- valid: rest poses -------------------------------------------------------------------------------------
@@ -334,8 +595,9 @@ AWKWARD_DOUBLES = [-0.0, TINY, -1e300, 1e300, 1.0, -1e-310, 0.0, 1 + 2**-52, -1.
 
 def branches_of(stems: list[Stem]) -> list:
     count = sum(stem.count for stem in stems)
-    return rd.decode_hierarchy(write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), count),
-                               len(stems), count)[0]
+    return rd.decode_hierarchy(
+        write(rd.decode_hierarchy, hierarchy_script(stems), len(stems), count), len(stems), count
+    )[0]
 
 
 def exact_rest(stems: list[Stem], numbers: list, is_float64: bool, **fields) -> bytes:
@@ -351,126 +613,284 @@ def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
     return Plant(stems, rest=rest, **fields)
 
 
-valid("rest-lags", "rest poses by steps, predicted from 1, 2 and 3 vertices before",
-      lambda: still([Stem(-1, 7, lag=1), Stem(0, 6, 3, lag=2), Stem(1, 8, 5, lag=3)], points=grown(
-          [Stem(-1, 7), Stem(0, 6, 3), Stem(1, 8, 5)], 3)))
-valid("rest-lag-65535", "the largest Lag: every vertex is expected where the one before is",
-      lambda: still([Stem(-1, 3, lag=65535)]))
-valid("rest-beams", "beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices",
-      lambda: with_rest([Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0),
-                         Stem(-1, 1, lag=0)], coded_rest(
-          [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)],
-          Chance(31))))
-valid("rest-beams-and-steps", "stems of both kinds that share their models",
-      lambda: with_rest([Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)], coded_rest(
-          [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)], Chance(32), rest_type=1,
-          origin=(1e6, -0.5, 3.0))))
-valid("rest-exact", "binary32 bit for bit: -0.0, subnormal and largest numbers",
-      lambda: with_rest([Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_FLOATS, False)))
-valid("rest-exact-wide", "binary64 bit for bit, in a file whose positions are binary32",
-      lambda: with_rest([Stem(-1, 3)],
-                        exact_rest([Stem(-1, 3)], AWKWARD_DOUBLES, True, origin=(1.0, -0.0, TINY))))
-valid("rest-exact-predicted",
-      "exact numbers expected from vertices before; the expectation overflows to infinity",
-      lambda: with_rest([Stem(-1, 4), Stem(0, 3, 2)], exact_rest([Stem(-1, 4), Stem(0, 3, 2)], [
-          1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9, False)))
-valid("rest-exact-wraps", "differences beyond half of all numbers wrap around",
-      lambda: with_rest([Stem(-1, 2)],
-                        exact_rest([Stem(-1, 2)], [1.0, 0.0, 0.0, (2**64 - 1, True), 0.0, 0.0], True)))
-valid("rest-steps-vast", "steps of 1e300: distances overflow, nothing has a length, positions are infinite",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1)], 33, step=1e300, heads=HEADS))
-valid("rest-steps-tiny", "a subnormal Rest_Step: squares of distances vanish",
-      lambda: moving(FORK, 34, step=TINY, heads=HEADS))
-valid("origin-far", "an origin that eats what the rest pose adds",
-      lambda: moving(FORK, 35, origin=(1e9, -1e9, 2.0**60)))
-valid("origin-overflows", "binary32 positions of an origin beyond its range are infinite",
-      lambda: still(FORK, origin=(1e39, -1e39, 0.0)))
+valid(
+    "rest-lags",
+    "rest poses by steps, predicted from 1, 2 and 3 vertices before",
+    lambda: still(
+        [Stem(-1, 7, lag=1), Stem(0, 6, 3, lag=2), Stem(1, 8, 5, lag=3)],
+        points=grown([Stem(-1, 7), Stem(0, 6, 3), Stem(1, 8, 5)], 3),
+    ),
+)
+valid(
+    "rest-lag-65535",
+    "the largest Lag: every vertex is expected where the one before is",
+    lambda: still([Stem(-1, 3, lag=65535)]),
+)
+valid(
+    "rest-beams",
+    "beams: runs of 1, 16 and 17 and of 32 vertices, from roots and from attach vertices",
+    lambda: with_rest(
+        [Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)],
+        coded_rest([Stem(-1, 2, lag=0), Stem(0, 33, 1, lag=0), Stem(0, 32, 0, lag=0), Stem(-1, 1, lag=0)], Chance(31)),
+    ),
+)
+valid(
+    "rest-beams-and-steps",
+    "stems of both kinds that share their models",
+    lambda: with_rest(
+        [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
+        coded_rest(
+            [Stem(-1, 5, lag=0), Stem(0, 3, 1, lag=1), Stem(0, 4, 4, lag=0)],
+            Chance(32),
+            rest_type=1,
+            origin=(1e6, -0.5, 3.0),
+        ),
+    ),
+)
+valid(
+    "rest-exact",
+    "binary32 bit for bit: -0.0, subnormal and largest numbers",
+    lambda: with_rest([Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_FLOATS, False)),
+)
+valid(
+    "rest-exact-wide",
+    "binary64 bit for bit, in a file whose positions are binary32",
+    lambda: with_rest([Stem(-1, 3)], exact_rest([Stem(-1, 3)], AWKWARD_DOUBLES, True, origin=(1.0, -0.0, TINY))),
+)
+valid(
+    "rest-exact-predicted",
+    "exact numbers expected from vertices before; the expectation overflows to infinity",
+    lambda: with_rest(
+        [Stem(-1, 4), Stem(0, 3, 2)],
+        exact_rest(
+            [Stem(-1, 4), Stem(0, 3, 2)],
+            [1.0, 2.0, -3e38, 2.0, 4.0, 1e38, 3.0, 6.0, 3e38, 4.0, 8.0, 0.0] + [0.5] * 9,
+            False,
+        ),
+    ),
+)
+valid(
+    "rest-exact-wraps",
+    "differences beyond half of all numbers wrap around",
+    lambda: with_rest([Stem(-1, 2)], exact_rest([Stem(-1, 2)], [1.0, 0.0, 0.0, (2**64 - 1, True), 0.0, 0.0], True)),
+)
+valid(
+    "rest-steps-vast",
+    "steps of 1e300: distances overflow, nothing has a length, positions are infinite",
+    lambda: moving([Stem(-1, 3), Stem(0, 2, 1)], 33, step=1e300, heads=HEADS),
+)
+valid(
+    "rest-steps-tiny",
+    "a subnormal Rest_Step: squares of distances vanish",
+    lambda: moving(FORK, 34, step=TINY, heads=HEADS),
+)
+valid(
+    "origin-far", "an origin that eats what the rest pose adds", lambda: moving(FORK, 35, origin=(1e9, -1e9, 2.0**60))
+)
+valid(
+    "origin-overflows",
+    "binary32 positions of an origin beyond its range are infinite",
+    lambda: still(FORK, origin=(1e39, -1e39, 0.0)),
+)
 
 # ---- valid: motion -----------------------------------------------------------------------------------------
 
-valid("steps-largest", "Step at the end of binary32: infinities and NaN as the arithmetic yields them",
-      lambda: moving(FORK, 41, heads={level: stems_head(FLOAT_MAX, 4) for level in range(3)}))
-valid("steps-smallest", "the smallest Step",
-      lambda: moving(FORK, 42, heads={level: stems_head(FLOAT_TINY, 4) for level in range(3)}))
-valid("numbers-largest", "integers at the ends of what a stream can hold",
-      lambda: lone(frames=3,
-                   scripts={(rd.STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1),
-                                               (2**20 + 1, 0, 9))}))
-valid("maps-largest", "maps whose steps are 2^100 and 2^-100 in turn",
-      lambda: Plant([Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1), Stem(-1, 2), Stem(4, 1, 1)], 2,
-                    points=[[float(x), 0.0, 0.0] for x in range(9)], scripts={(rd.AFFINES, 0): [
-                        200, *row((1, 2, 3)), *row((0, 1, 0)), -400, *row((5, 5, 5)), *row(), 399, *row(),
-                        *row((0, 0, 1))]}))
-valid("learned-basis", "a learned basis of one row, 8 bits, at the ends of its range",
-      lambda: lone(frames=4, heads={0: stems_head(0.5, 0, 8, 1, basis_stream([[128, -128, 128, 0]], 8))},
-                   scripts={(rd.STEMS, 0): row((3, -1, 70))}))
-valid("learned-basis-full",
-      "a learned basis of as many rows as frames, 16 bits, beside cosines on other levels",
-      lambda: moving(FORK, 43, heads={1: stems_head(0.5, 2, 16, 3, basis_stream(
-          [[32768, 1, -5], [-32768, 32768, -32768], [0, 0, 77]], 16))}))
-valid("learned-basis-zero", "a learned basis of zeros, of no bytes but the stream's",
-      lambda: moving([Stem(-1, 3)], 44,
-                     heads={0: stems_head(0.5, 1, 12, 2, basis_stream([[0] * 3] * 2, 12))}))
-valid("shapes", "learned shapes at base levels and at the levels that complete a piece, in both segments",
-      fork)
-valid("shapes-high", "as many shapes as there can be: of the first modes, then of the others",
-      lambda: Plant([Stem(-1, 4)], 3, scripts={
-          (rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
-          (rd.SHAPES, 1, 0): [6,
-                              *(n for i in range(6)
-                                for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
-          (rd.STEMS, 0): lambda: Chance(45), (rd.STEMS, 1): lambda: Chance(46)}))
-valid("shapes-few", "a shape less than its mode has axes, and none at the level that completes the piece",
-      lambda: Plant([Stem(-1, 20)], 3, scripts={
-          (rd.SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
-          (rd.SHAPES, 1, 0): [], (rd.STEMS, 0): lambda: Chance(47), (rd.STEMS, 1): lambda: Chance(48)}))
-valid("shapes-of-sheets", "shapes of a sheet, and of pieces inside a WHOLE subtree",
-      lambda: Plant([Stem(-1, 4, 0, SHEET), Stem(0, 3, 3, WHOLE), Stem(1, 2, 1, SHEET)], 3, scripts={
-          (rd.SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
-          (rd.SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
-          (rd.STEMS, 1): lambda: Chance(49), (rd.STEMS, 2): lambda: Chance(50),
-          (rd.AFFINES, 0): lambda: Chance(51, large=3),
-          (rd.AFFINES, 1): lambda: Chance(52, large=3)}))
-valid("shapes-in-one-level", "shapes at the last level alone, of pieces that begin there",
-      lambda: Plant([Stem(-1, 2), Stem(0, 2, 1, WHOLE), Stem(1, 2, 1)], 2, scripts={
-          (rd.SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (rd.STEMS, 2): lambda: Chance(53)}))
-valid("corrections",
-      "corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
-      lambda: Plant([Stem(-1, 6)], 18, scripts={(rd.CORRECTIONS, 1): lambda: Chance(54)}))
-valid("corrections-wide", "corrections of binary64 positions", lambda: Plant(
-    FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rd.CORRECTIONS, 2): lambda: Chance(55)}))
-valid("corrections-none", "a CORRECTIONS chunk that corrects nothing, in one of two segments",
-      lambda: Plant(FORK, 3, 2, scripts={(rd.CORRECTIONS, 2, 1): []}))
-valid("corrections-to-infinity", "a Correction_Step at the end of binary32", lambda: Plant(FORK, 2, scripts={
-    (rd.CORRECTIONS, 2): lambda: Chance(56)}).draft().change(rd.CORRECTIONS, 2,
-                                                             content=struct.pack("<f", FLOAT_MAX) + Plant(
-        FORK, 2, scripts={(rd.CORRECTIONS, 2): lambda: Chance(56)}).draft().content(rd.CORRECTIONS, 2)[4:]))
-valid("not-a-number", "vertices at NaN, others hang on them", lambda: Plant(
-    [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)], 2,
-    heads={level: stems_head(FLOAT_MAX, 1) for level in range(4)},
-    points=grown([Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1)], 4), step=1e200,
-    scripts={(rd.STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25)
-             for level in range(4)}))
+valid(
+    "steps-largest",
+    "Step at the end of binary32: infinities and NaN as the arithmetic yields them",
+    lambda: moving(FORK, 41, heads={level: stems_head(FLOAT_MAX, 4) for level in range(3)}),
+)
+valid(
+    "steps-smallest",
+    "the smallest Step",
+    lambda: moving(FORK, 42, heads={level: stems_head(FLOAT_TINY, 4) for level in range(3)}),
+)
+valid(
+    "numbers-largest",
+    "integers at the ends of what a stream can hold",
+    lambda: lone(frames=3, scripts={(rd.STEMS, 0): row((2**30 - 1, 1 - 2**30, 0), (2**29, -1, 1), (2**20 + 1, 0, 9))}),
+)
+valid(
+    "maps-largest",
+    "maps whose steps are 2^100 and 2^-100 in turn",
+    lambda: Plant(
+        [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1), Stem(-1, 2), Stem(4, 1, 1)],
+        2,
+        points=[[float(x), 0.0, 0.0] for x in range(9)],
+        scripts={
+            (rd.AFFINES, 0): [
+                200,
+                *row((1, 2, 3)),
+                *row((0, 1, 0)),
+                -400,
+                *row((5, 5, 5)),
+                *row(),
+                399,
+                *row(),
+                *row((0, 0, 1)),
+            ]
+        },
+    ),
+)
+valid(
+    "learned-basis",
+    "a learned basis of one row, 8 bits, at the ends of its range",
+    lambda: lone(
+        frames=4,
+        heads={0: stems_head(0.5, 0, 8, 1, basis_stream([[128, -128, 128, 0]], 8))},
+        scripts={(rd.STEMS, 0): row((3, -1, 70))},
+    ),
+)
+valid(
+    "learned-basis-full",
+    "a learned basis of as many rows as frames, 16 bits, beside cosines on other levels",
+    lambda: moving(
+        FORK,
+        43,
+        heads={1: stems_head(0.5, 2, 16, 3, basis_stream([[32768, 1, -5], [-32768, 32768, -32768], [0, 0, 77]], 16))},
+    ),
+)
+valid(
+    "learned-basis-zero",
+    "a learned basis of zeros, of no bytes but the stream's",
+    lambda: moving([Stem(-1, 3)], 44, heads={0: stems_head(0.5, 1, 12, 2, basis_stream([[0] * 3] * 2, 12))}),
+)
+valid("shapes", "learned shapes at base levels and at the levels that complete a piece, in both segments", fork)
+valid(
+    "shapes-high",
+    "as many shapes as there can be: of the first modes, then of the others",
+    lambda: Plant(
+        [Stem(-1, 4)],
+        3,
+        scripts={
+            (rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, -i, 2), (i, 5, 0), (0, 0, 3)))],
+            (rd.SHAPES, 1, 0): [6, *(n for i in range(6) for n in row((0, 1, i), (0, -i, 0), (2, 2, 2), (9, 9, i)))],
+            (rd.STEMS, 0): lambda: Chance(45),
+            (rd.STEMS, 1): lambda: Chance(46),
+        },
+    ),
+)
+valid(
+    "shapes-few",
+    "a shape less than its mode has axes, and none at the level that completes the piece",
+    lambda: Plant(
+        [Stem(-1, 20)],
+        3,
+        scripts={
+            (rd.SHAPES, 0, 0): [2, *row((2**29, 0, 0)), *row(*[(0, 0, 0)] * 15, (1, 0, 0))],
+            (rd.SHAPES, 1, 0): [],
+            (rd.STEMS, 0): lambda: Chance(47),
+            (rd.STEMS, 1): lambda: Chance(48),
+        },
+    ),
+)
+valid(
+    "shapes-of-sheets",
+    "shapes of a sheet, and of pieces inside a WHOLE subtree",
+    lambda: Plant(
+        [Stem(-1, 4, 0, SHEET), Stem(0, 3, 3, WHOLE), Stem(1, 2, 1, SHEET)],
+        3,
+        scripts={
+            (rd.SHAPES, 1, 0): [3, *row((1, 2, 3)), *row((3, 2, 1), (1, 1, 1)), *row((0, 0, 5))],
+            (rd.SHAPES, 2, 0): [1, *row((4, 0, 0)), 2, *row((0, 7, 0)), *row((0, 0, 7))],
+            (rd.STEMS, 1): lambda: Chance(49),
+            (rd.STEMS, 2): lambda: Chance(50),
+            (rd.AFFINES, 0): lambda: Chance(51, large=3),
+            (rd.AFFINES, 1): lambda: Chance(52, large=3),
+        },
+    ),
+)
+valid(
+    "shapes-in-one-level",
+    "shapes at the last level alone, of pieces that begin there",
+    lambda: Plant(
+        [Stem(-1, 2), Stem(0, 2, 1, WHOLE), Stem(1, 2, 1)],
+        2,
+        scripts={(rd.SHAPES, 2, 0): [2, *row((1, 0, 0)), *row((0, 1, 1))], (rd.STEMS, 2): lambda: Chance(53)},
+    ),
+)
+valid(
+    "corrections",
+    "corrections on the last level: blocks of 8 frames, the last of 2, and vertices that have none",
+    lambda: Plant([Stem(-1, 6)], 18, scripts={(rd.CORRECTIONS, 1): lambda: Chance(54)}),
+)
+valid(
+    "corrections-wide",
+    "corrections of binary64 positions",
+    lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rd.CORRECTIONS, 2): lambda: Chance(55)}),
+)
+valid(
+    "corrections-none",
+    "a CORRECTIONS chunk that corrects nothing, in one of two segments",
+    lambda: Plant(FORK, 3, 2, scripts={(rd.CORRECTIONS, 2, 1): []}),
+)
+valid(
+    "corrections-to-infinity",
+    "a Correction_Step at the end of binary32",
+    lambda: (
+        Plant(FORK, 2, scripts={(rd.CORRECTIONS, 2): lambda: Chance(56)})
+        .draft()
+        .change(
+            rd.CORRECTIONS,
+            2,
+            content=struct.pack("<f", FLOAT_MAX)
+            + Plant(FORK, 2, scripts={(rd.CORRECTIONS, 2): lambda: Chance(56)}).draft().content(rd.CORRECTIONS, 2)[4:],
+        )
+    ),
+)
+valid(
+    "not-a-number",
+    "vertices at NaN, others hang on them",
+    lambda: Plant(
+        [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)],
+        2,
+        heads={level: stems_head(FLOAT_MAX, 1) for level in range(4)},
+        points=grown([Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1)], 4),
+        step=1e200,
+        scripts={(rd.STEMS, level): lambda level=level: Chance(57 + level, empty=0.1, large=25) for level in range(4)},
+    ),
+)
 
 # ---- valid: chunks that are skipped ------------------------------------------------------------------------
 
 FUTURE = b"from the future"
-valid("unknown-optional",
-      "optional kinds that are not known, in every place where they may stand, some twice",
-      lambda: fork().add(
-          Entry(0x8000, FUTURE), Entry(0x8008, FUTURE), Entry(0x800F, b""), Entry(0x8015, FUTURE, 0, 1),
-          Entry(0x8015, FUTURE, 1, 1), Entry(0x801F, FUTURE, 1, 1), Entry(0x801F, b"", 2, 0),
-          Entry(0x8021, FUTURE),
-          Entry(0x8021, FUTURE), Entry(0xFFFF, FUTURE), Entry(0xFFFF, b"")))
-valid("unknown-optional-damaged", "what is skipped is not read: its Checksum does not fit",
-      lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)))
+valid(
+    "unknown-optional",
+    "optional kinds that are not known, in every place where they may stand, some twice",
+    lambda: fork().add(
+        Entry(0x8000, FUTURE),
+        Entry(0x8008, FUTURE),
+        Entry(0x800F, b""),
+        Entry(0x8015, FUTURE, 0, 1),
+        Entry(0x8015, FUTURE, 1, 1),
+        Entry(0x801F, FUTURE, 1, 1),
+        Entry(0x801F, b"", 2, 0),
+        Entry(0x8021, FUTURE),
+        Entry(0x8021, FUTURE),
+        Entry(0xFFFF, FUTURE),
+        Entry(0xFFFF, b""),
+    ),
+)
+valid(
+    "unknown-optional-damaged",
+    "what is skipped is not read: its Checksum does not fit",
+    lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)),
+)
 
 # ---- zstd frames and static data ---------------------------------------------------------------------------
 
 
-def frame(content: bytes, *, stated: int | None = -1, single_segment: bool = True, window: int = 0,
-          checksum: int | None = -1,
-          dictionary: int | None = None, reserved: int = 0, blocks: bytes | None = None) -> bytes:
+def frame(
+    content: bytes,
+    *,
+    stated: int | None = -1,
+    single_segment: bool = True,
+    window: int = 0,
+    checksum: int | None = -1,
+    dictionary: int | None = None,
+    reserved: int = 0,
+    blocks: bytes | None = None,
+) -> bytes:
     """A zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: the true value; None: left out.
 
     window: the byte Window_Descriptor, where there is no single segment."""
@@ -541,101 +961,245 @@ def attributes(*contents: bytes) -> Draft:
 # A text of 456 bytes compressed by zstd 1.5 at level 19: literals with a Huffman table, sequences with FSE tables.
 WIND_FRAME = bytes.fromhex(
     "28b52ffd60c800ad020022451011a0ed1eed626666b605a3aadb6d42a28a6b759b222fa48e0e364efd01138aae2035fb"
-    "a691439684d741439ee7d467ee9d9ba6e65e2cb76b7bb06c2fb6558b4b0305004e05f0d550b2ea0815558a6bb10205")
+    "a691439684d741439ee7d467ee9d9ba6e65e2cb76b7bb06c2fb6558b4b0305004e05f0d550b2ea0815558a6bb10205"
+)
 
 FACES_3 = np.array([[0, 1, 2], [2, 1, 4]], "<u2")
 EDGES_2 = np.array([[0, 1], [4, 3]], "<i8")
 
-valid("metadata-plain", "METADATA as plain text, with white space around it",
-      lambda: metadata('\t\r\n {"unit": "m", "up_axis": "y", "more": [1, -0, 2.5e-3, true, false, null]} \n'))
-valid("metadata-zstd", "METADATA in a zstd frame of compressed blocks",
-      lambda: metadata(WIND_FRAME, 1))
+valid(
+    "metadata-plain",
+    "METADATA as plain text, with white space around it",
+    lambda: metadata('\t\r\n {"unit": "m", "up_axis": "y", "more": [1, -0, 2.5e-3, true, false, null]} \n'),
+)
+valid("metadata-zstd", "METADATA in a zstd frame of compressed blocks", lambda: metadata(WIND_FRAME, 1))
 valid("metadata-empty", "an object without members", lambda: metadata("{}"))
-valid("metadata-escapes", "escapes, surrogate pairs and text beyond ASCII; the members differ",
-      lambda: metadata('{"\\u0061\\n\\"": "\\ud83c\\udf33", "\u00e9": "\U0001f333\\/", "": {"a": 1, "A": 1}, '
-                        '"\\u0000": ""}'))
+valid(
+    "metadata-escapes",
+    "escapes, surrogate pairs and text beyond ASCII; the members differ",
+    lambda: metadata(
+        '{"\\u0061\\n\\"": "\\ud83c\\udf33", "\u00e9": "\U0001f333\\/", "": {"a": 1, "A": 1}, "\\u0000": ""}'
+    ),
+)
 valid("metadata-long-integer", "an integer of 4300 digits", lambda: metadata('{"n": -' + "9" * 4300 + "}"))
-valid("metadata-nested", "100 levels of nesting",
-      lambda: metadata('{"a":' * 50 + "[" * 50 + "]" * 50 + "}" * 50))
-valid("metadata-numbers", "numbers at the ends of binary64, and below them",
-      lambda: metadata('{"a": [1.7976931348623157e308, -1.797693134862315807e+308, 1e-400, 0e99999, 1E0, '
-                        '123456789012345678901234567890]}'))
-valid("faces-and-edges", "triangles and edges, in integers of different sizes",
-      lambda: with_static((rd.FACES, numbers(FACES_3)), (rd.EDGES, numbers(EDGES_2))))
-valid("faces-of-any-width", "faces of five columns, big-endian",
-      lambda: with_static((rd.FACES, numbers(np.array([[4, 3, 2, 1, 0]], ">i4")))))
-valid("faces-none", "no faces: three columns, no rows, no data; edges without rows likewise",
-      lambda: with_static((rd.FACES, numbers(np.zeros((0, 3), "|u1"))),
-                          (rd.EDGES, numbers(np.zeros((0, 2), "<u4")))))
-valid("edges-derived", "edges that the hierarchy implies, as big-endian numbers, in a file with permutations",
-      lambda: moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61,
-                     vertex_source=[5, 0, 3, 1, 4, 2]).draft().add(
-          Entry(rd.EDGES, array_chunk({"derived": ">i2"}))))
-valid("edges-derived-least", "as numbers of one byte; of one vertex there are none",
-      lambda: lone().draft().add(Entry(rd.EDGES, array_chunk({"derived": "|i1"}))))
-valid("edges-array-counts", "\"derived\" does not count where there is an array", lambda: with_static(
-    (rd.EDGES, numbers(EDGES_2, derived="no type"))))
-valid("shape-without-type", "\"shape\" does not count where there is no Type", lambda: with_static(
-    (rd.EDGES, array_chunk({"derived": "<u8", "shape": "no shape"}))))
-valid("attributes", "named arrays: a member that is not known, a name beyond ASCII, booleans, no dimensions",
-      lambda: attributes(numbers(np.linspace(0, 1, 5).astype("<f4"), name="radius", colour="red"),
-                         numbers(np.array([0, 1, 2, 255], "|u1"), "|b1", name="\U0001f333 ?"),
-                         numbers(np.array(2.5, "<f8"), name=" ")))
-valid("attribute-types", "one element of every plain Type", lambda: attributes(*(
-    element(name, bytes(range(1, size + 1)), name) for name, size in [
-        ("|b1", 1), ("i1", 1), ("|u1", 1), ("<i1", 1), (">u1", 1), ("<i2", 2), (">u2", 2), ("<u4", 4),
-        (">i4", 4), ("<i8", 8),
-        (">u8", 8), ("<f2", 2), (">f4", 4), ("<f8", 8), ("<c8", 8), (">c16", 16), ("|S3", 3), ("<U2", 8),
-        (">U1", 4),
-        ("|V5", 5), ("|V0000005", 5)])))
-valid("attribute-records", "records in records, fields with a Shape, without bytes, gaps", lambda: attributes(
-    element([["a", "<f4"], ["", "|V3"], ["b", [["c", "|u1", [2, 2]], ["d", "|S0"], ["", "|V1"]], [2]],
-             ["", "|V1"], ["e", "<i2", []],
-             ["f", "<f8", [3, 0]]], bytes(range(20)))))
+valid("metadata-nested", "100 levels of nesting", lambda: metadata('{"a":' * 50 + "[" * 50 + "]" * 50 + "}" * 50))
+valid(
+    "metadata-numbers",
+    "numbers at the ends of binary64, and below them",
+    lambda: metadata(
+        '{"a": [1.7976931348623157e308, -1.797693134862315807e+308, 1e-400, 0e99999, 1E0, '
+        "123456789012345678901234567890]}"
+    ),
+)
+valid(
+    "faces-and-edges",
+    "triangles and edges, in integers of different sizes",
+    lambda: with_static((rd.FACES, numbers(FACES_3)), (rd.EDGES, numbers(EDGES_2))),
+)
+valid(
+    "faces-of-any-width",
+    "faces of five columns, big-endian",
+    lambda: with_static((rd.FACES, numbers(np.array([[4, 3, 2, 1, 0]], ">i4")))),
+)
+valid(
+    "faces-none",
+    "no faces: three columns, no rows, no data; edges without rows likewise",
+    lambda: with_static((rd.FACES, numbers(np.zeros((0, 3), "|u1"))), (rd.EDGES, numbers(np.zeros((0, 2), "<u4")))),
+)
+valid(
+    "edges-derived",
+    "edges that the hierarchy implies, as big-endian numbers, in a file with permutations",
+    lambda: (
+        moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2])
+        .draft()
+        .add(Entry(rd.EDGES, array_chunk({"derived": ">i2"})))
+    ),
+)
+valid(
+    "edges-derived-least",
+    "as numbers of one byte; of one vertex there are none",
+    lambda: lone().draft().add(Entry(rd.EDGES, array_chunk({"derived": "|i1"}))),
+)
+valid(
+    "edges-array-counts",
+    '"derived" does not count where there is an array',
+    lambda: with_static((rd.EDGES, numbers(EDGES_2, derived="no type"))),
+)
+valid(
+    "shape-without-type",
+    '"shape" does not count where there is no Type',
+    lambda: with_static((rd.EDGES, array_chunk({"derived": "<u8", "shape": "no shape"}))),
+)
+valid(
+    "attributes",
+    "named arrays: a member that is not known, a name beyond ASCII, booleans, no dimensions",
+    lambda: attributes(
+        numbers(np.linspace(0, 1, 5).astype("<f4"), name="radius", colour="red"),
+        numbers(np.array([0, 1, 2, 255], "|u1"), "|b1", name="\U0001f333 ?"),
+        numbers(np.array(2.5, "<f8"), name=" "),
+    ),
+)
+valid(
+    "attribute-types",
+    "one element of every plain Type",
+    lambda: attributes(
+        *(
+            element(name, bytes(range(1, size + 1)), name)
+            for name, size in [
+                ("|b1", 1),
+                ("i1", 1),
+                ("|u1", 1),
+                ("<i1", 1),
+                (">u1", 1),
+                ("<i2", 2),
+                (">u2", 2),
+                ("<u4", 4),
+                (">i4", 4),
+                ("<i8", 8),
+                (">u8", 8),
+                ("<f2", 2),
+                (">f4", 4),
+                ("<f8", 8),
+                ("<c8", 8),
+                (">c16", 16),
+                ("|S3", 3),
+                ("<U2", 8),
+                (">U1", 4),
+                ("|V5", 5),
+                ("|V0000005", 5),
+            ]
+        )
+    ),
+)
+valid(
+    "attribute-records",
+    "records in records, fields with a Shape, without bytes, gaps",
+    lambda: attributes(
+        element(
+            [
+                ["a", "<f4"],
+                ["", "|V3"],
+                ["b", [["c", "|u1", [2, 2]], ["d", "|S0"], ["", "|V1"]], [2]],
+                ["", "|V1"],
+                ["e", "<i2", []],
+                ["f", "<f8", [3, 0]],
+            ],
+            bytes(range(20)),
+        )
+    ),
+)
 NESTED_16: list = [["x", "|u1"]]
 for _ in range(15):
     NESTED_16 = [["x", NESTED_16]]
-valid("attribute-nested-16", "records nested as deep as they may be",
-      lambda: attributes(element(NESTED_16, b"\7")))
-valid("attribute-shuffled", "planes of bytes of a record of 7 bytes, 3 elements",
-      lambda: attributes(array_chunk(
-    {"name": "a", "dtype": [["a", "<i4"], ["b", "|S3"]], "shape": [3]}, plain(bytes(range(21))))))
-valid("attribute-empty", "no elements and no data; sizes of 0 count as 1 against the limit",
-      lambda: attributes(array_chunk({"name": "a", "dtype": "<f4", "shape": [0, 1 << 20, 1 << 6]})))
-valid("attribute-32-dimensions", "as many dimensions as there can be",
-      lambda: attributes(array_chunk({"name": "a", "dtype": "<u2", "shape": [1] * 31 + [2]}, plain(b"abcd"))))
-valid("attribute-element-largest", "an element of 2^20 bytes", lambda: attributes(array_chunk(
-    {"name": "a", "dtype": "|V1048576", "shape": []},
-    frame(bytes(1 << 20), checksum=None, blocks=zeros(1 << 20)))))
-valid("attribute-name-longest", "a name of 4096 bytes", lambda: attributes(
-    numbers(np.zeros(1, "|u1"), name="n" * 4096)))
-valid("attributes-256", "as many attributes as there can be", lambda: lone().draft().add(*(
-    Entry(rd.ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))))
-valid("zstd-checksum", "a frame with a Content_Checksum", lambda: attributes(
-    array_chunk({"name": "a", "dtype": "|u1", "shape": [5]}, frame(b"plant"))))
-valid("zstd-blocks", "raw, repeated and empty blocks, a frame with a window", lambda: attributes(
-    array_chunk({"name": "a", "dtype": "|u1", "shape": [9]}, frame(
-        b"abaaaaaaa", checksum=None, single_segment=False, window=0,
-        blocks=raw_block(b"ab", False) + run_block(b"a", 7, False) + raw_block(b"", True)))))
-valid("zstd-window-8-mib", "a window of 8 MiB, the largest that small arrays may ask for", lambda: attributes(
-    array_chunk({"name": "a", "dtype": "|u1", "shape": [5]}, frame(
-        b"plant", checksum=None, single_segment=False, window=13 << 3))))
-valid("zstd-window-of-array", "a window of 9 MiB where the array has 9 MiB", lambda: attributes(
-    array_chunk({"name": "a", "dtype": "|u1", "shape": [9 << 20]}, frame(
-        bytes(9 << 20), checksum=None, blocks=zeros(9 << 20)))))
-valid("zstd-dictionary-0", "Dictionary_ID 0 is none", lambda: attributes(
-    array_chunk({"name": "a", "dtype": "|u1", "shape": [5]}, frame(b"plant", checksum=None, dictionary=0))))
+valid("attribute-nested-16", "records nested as deep as they may be", lambda: attributes(element(NESTED_16, b"\7")))
+valid(
+    "attribute-shuffled",
+    "planes of bytes of a record of 7 bytes, 3 elements",
+    lambda: attributes(
+        array_chunk({"name": "a", "dtype": [["a", "<i4"], ["b", "|S3"]], "shape": [3]}, plain(bytes(range(21))))
+    ),
+)
+valid(
+    "attribute-empty",
+    "no elements and no data; sizes of 0 count as 1 against the limit",
+    lambda: attributes(array_chunk({"name": "a", "dtype": "<f4", "shape": [0, 1 << 20, 1 << 6]})),
+)
+valid(
+    "attribute-32-dimensions",
+    "as many dimensions as there can be",
+    lambda: attributes(array_chunk({"name": "a", "dtype": "<u2", "shape": [1] * 31 + [2]}, plain(b"abcd"))),
+)
+valid(
+    "attribute-element-largest",
+    "an element of 2^20 bytes",
+    lambda: attributes(
+        array_chunk(
+            {"name": "a", "dtype": "|V1048576", "shape": []},
+            frame(bytes(1 << 20), checksum=None, blocks=zeros(1 << 20)),
+        )
+    ),
+)
+valid(
+    "attribute-name-longest", "a name of 4096 bytes", lambda: attributes(numbers(np.zeros(1, "|u1"), name="n" * 4096))
+)
+valid(
+    "attributes-256",
+    "as many attributes as there can be",
+    lambda: lone().draft().add(*(Entry(rd.ATTRIBUTE, element("|u1", bytes([i]), str(i))) for i in range(256))),
+)
+valid(
+    "zstd-checksum",
+    "a frame with a Content_Checksum",
+    lambda: attributes(array_chunk({"name": "a", "dtype": "|u1", "shape": [5]}, frame(b"plant"))),
+)
+valid(
+    "zstd-blocks",
+    "raw, repeated and empty blocks, a frame with a window",
+    lambda: attributes(
+        array_chunk(
+            {"name": "a", "dtype": "|u1", "shape": [9]},
+            frame(
+                b"abaaaaaaa",
+                checksum=None,
+                single_segment=False,
+                window=0,
+                blocks=raw_block(b"ab", False) + run_block(b"a", 7, False) + raw_block(b"", True),
+            ),
+        )
+    ),
+)
+valid(
+    "zstd-window-8-mib",
+    "a window of 8 MiB, the largest that small arrays may ask for",
+    lambda: attributes(
+        array_chunk(
+            {"name": "a", "dtype": "|u1", "shape": [5]},
+            frame(b"plant", checksum=None, single_segment=False, window=13 << 3),
+        )
+    ),
+)
+valid(
+    "zstd-window-of-array",
+    "a window of 9 MiB where the array has 9 MiB",
+    lambda: attributes(
+        array_chunk(
+            {"name": "a", "dtype": "|u1", "shape": [9 << 20]},
+            frame(bytes(9 << 20), checksum=None, blocks=zeros(9 << 20)),
+        )
+    ),
+)
+valid(
+    "zstd-dictionary-0",
+    "Dictionary_ID 0 is none",
+    lambda: attributes(
+        array_chunk({"name": "a", "dtype": "|u1", "shape": [5]}, frame(b"plant", checksum=None, dictionary=0))
+    ),
+)
 
 
 # ---- valid: everything at once, and what the encoder writes ------------------------------------------------
 
 
 EVERYTHING = [
-    Stem(-1, 6, lag=1), Stem(0, 1, 3, lag=2), Stem(0, 66, 5, LOOSE), Stem(2, 5, 60, SHEET | LOOSE),
-    Stem(3, 3, 0, LOOSE), Stem(2, 4, 1, WHOLE, lag=0), Stem(5, 4, 3, SHEET, lag=0), Stem(-1, 7, 0, SHEET),
-    Stem(7, 2, 3, SHEET | WHOLE), Stem(7, 5, 6, SHEET, lag=0), Stem(7, 4, 1), Stem(10, 2, 2),
-    Stem(-1, 1, 0, WHOLE), Stem(12, 2), Stem(12, 3, 0, LOOSE), Stem(-1, 3), Stem(15, 3, 2, LOOSE | WHOLE),
-    Stem(16, 2, 1, LOOSE)]
+    Stem(-1, 6, lag=1),
+    Stem(0, 1, 3, lag=2),
+    Stem(0, 66, 5, LOOSE),
+    Stem(2, 5, 60, SHEET | LOOSE),
+    Stem(3, 3, 0, LOOSE),
+    Stem(2, 4, 1, WHOLE, lag=0),
+    Stem(5, 4, 3, SHEET, lag=0),
+    Stem(-1, 7, 0, SHEET),
+    Stem(7, 2, 3, SHEET | WHOLE),
+    Stem(7, 5, 6, SHEET, lag=0),
+    Stem(7, 4, 1),
+    Stem(10, 2, 2),
+    Stem(-1, 1, 0, WHOLE),
+    Stem(12, 2),
+    Stem(12, 3, 0, LOOSE),
+    Stem(-1, 3),
+    Stem(15, 3, 2, LOOSE | WHOLE),
+    Stem(16, 2, 1, LOOSE),
+]
 
 
 def basis_by_chance(random: np.random.Generator, rank: int, frames: int, bits: int) -> bytes:
@@ -646,27 +1210,53 @@ def basis_by_chance(random: np.random.Generator, rank: int, frames: int, bits: i
 def everything() -> Draft:
     random = np.random.default_rng(99)
     vertices = sum(stem.count for stem in EVERYTHING)
-    bases = {level: stems_head(0.03 + 0.01 * level, level % 5, bits, rank,
-                               basis_by_chance(random, rank, 5, bits))
-             for level, bits, rank in ((1, 11, 3), (2, 8, 1), (4, 16, 5))}
+    bases = {
+        level: stems_head(0.03 + 0.01 * level, level % 5, bits, rank, basis_by_chance(random, rank, 5, bits))
+        for level, bits, rank in ((1, 11, 3), (2, 8, 1), (4, 16, 5))
+    }
     plant = Plant(
-        EVERYTHING, clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.0), rd.Clip(5, 1, "down")),
+        EVERYTHING,
+        clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.0), rd.Clip(5, 1, "down")),
         rest=coded_rest(EVERYTHING, Chance(71), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
-        vertex_source=random.permutation(vertices).tolist(), is_float64=True, heads=HEADS | bases,
+        vertex_source=random.permutation(vertices).tolist(),
+        is_float64=True,
+        heads=HEADS | bases,
         scripts={(rd.STEMS, level): lambda level=level: Chance(72 + level) for level in range(5)}
         | {(rd.AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
         | {(rd.CORRECTIONS, 4): lambda: Chance(90)}
-        | {(rd.SHAPES, 1, 0): [2, *row((1, 2, -3), (0, 0, 9)), *row((5, 0, 0)), 1, *row((3, 1, 4)), 0, 0,
-                               9, *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0)))],
-           (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))]})
-    return plant.draft().with_header(level_count=6, full_level_count=6).add(
-        Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1), Entry(rd.METADATA, b"\1" + WIND_FRAME),
-        Entry(rd.FACES, numbers(FACES_3)), Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
-        Entry(0x8009, FUTURE), Entry(0x8015, FUTURE, 1, 1),
-        Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
-        Entry(rd.ATTRIBUTE, element(NESTED_16, b"\1", "a")), Entry(0x8040, FUTURE))
+        | {
+            (rd.SHAPES, 1, 0): [
+                2,
+                *row((1, 2, -3), (0, 0, 9)),
+                *row((5, 0, 0)),
+                1,
+                *row((3, 1, 4)),
+                0,
+                0,
+                9,
+                *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0))),
+            ],
+            (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
+        },
+    )
+    return (
+        plant.draft()
+        .with_header(level_count=6, full_level_count=6)
+        .add(
+            Entry(rd.EXACT, b"", 5, 0),
+            Entry(rd.EXACT, b"", 5, 1),
+            Entry(rd.METADATA, b"\1" + WIND_FRAME),
+            Entry(rd.FACES, numbers(FACES_3)),
+            Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
+            Entry(0x8009, FUTURE),
+            Entry(0x8015, FUTURE, 1, 1),
+            Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
+            Entry(rd.ATTRIBUTE, element(NESTED_16, b"\1", "a")),
+            Entry(0x8040, FUTURE),
+        )
+    )
 
 
 valid("everything", "every kind of chunk, flag, method and stream in one file", everything)
@@ -677,37 +1267,52 @@ def encoded(name: str) -> bytes:
     import athcodec
     from athcodec.clip import MotionClip
 
-    stems = {"encoded-tree": [Stem(-1, 9), Stem(0, 6, 4), Stem(1, 5, 3), Stem(0, 5, 8), Stem(3, 3, 2)],
-             "encoded-wide": [Stem(-1, 5), Stem(0, 4, 3)],
-             "encoded-exact-rest": [Stem(-1, 4), Stem(0, 3, 1), Stem(-1, 2)],
-             "encoded-noise": [Stem(-1, 4), Stem(0, 3, 2)],
-             "encoded-clips": [Stem(-1, 4), Stem(0, 3, 2)],
-             "encoded-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
-             "encoded-lossless-wide": [Stem(-1, 3), Stem(0, 2, 1)]}[name]
+    stems = {
+        "encoded-tree": [Stem(-1, 9), Stem(0, 6, 4), Stem(1, 5, 3), Stem(0, 5, 8), Stem(3, 3, 2)],
+        "encoded-wide": [Stem(-1, 5), Stem(0, 4, 3)],
+        "encoded-exact-rest": [Stem(-1, 4), Stem(0, 3, 1), Stem(-1, 2)],
+        "encoded-noise": [Stem(-1, 4), Stem(0, 3, 2)],
+        "encoded-clips": [Stem(-1, 4), Stem(0, 3, 2)],
+        "encoded-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
+        "encoded-lossless-wide": [Stem(-1, 3), Stem(0, 2, 1)],
+    }[name]
     random = np.random.default_rng(7)
     rest = np.array(grown(stems, 7)) * 0.1
     lift = np.linalg.norm(rest - rest[0], axis=1)[:, None]
     swing = np.sin(np.linspace(0, 6, 40)[:, None, None] * [1.0, 2.0, 3.0] + 2 * lift) * lift**2 * 0.05
     noise = random.normal(size=(40, *rest.shape)) * (0.1 if name == "encoded-noise" else 1e-4)
-    clip = MotionClip(positions=(rest + swing + noise).astype(np.float64 if "wide" in name else np.float32),
-                      rest=rest, time=np.arange(40) / 30,
-                      vertex_branch=np.repeat(np.arange(len(stems)), [s.count for s in stems]),
-                      branch_parent=np.array([s.parent for s in stems]), metadata={"unit": "m"})
+    clip = MotionClip(
+        positions=(rest + swing + noise).astype(np.float64 if "wide" in name else np.float32),
+        rest=rest,
+        time=np.arange(40) / 30,
+        vertex_branch=np.repeat(np.arange(len(stems)), [s.count for s in stems]),
+        branch_parent=np.array([s.parent for s in stems]),
+        metadata={"unit": "m"},
+    )
     if name == "encoded-clips":
         clip = athcodec.join({"whole": clip, "loop": athcodec.looped(clip, blend=9)})
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "clip.ath"
-        athcodec.encode(clip, target, rel_error=2e-3, segment_frames=20,
-                        exact_rest=name == "encoded-exact-rest", lossless="lossless" in name)
+        athcodec.encode(
+            clip,
+            target,
+            rel_error=2e-3,
+            segment_frames=20,
+            exact_rest=name == "encoded-exact-rest",
+            lossless="lossless" in name,
+        )
         return target.read_bytes()
 
 
-for name, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "binary64 positions"),
-                  ("encoded-exact-rest", "a rest pose bit for bit"),
-                  ("encoded-noise", "vertices that follow no plant"),
-                  ("encoded-clips", "two clips, one of them a loop"),
-                  ("encoded-lossless", "every bit of the source at the last level"),
-                  ("encoded-lossless-wide", "every bit of binary64 positions at the last level")):
+for name, why in (
+    ("encoded-tree", "a small tree in wind"),
+    ("encoded-wide", "binary64 positions"),
+    ("encoded-exact-rest", "a rest pose bit for bit"),
+    ("encoded-noise", "vertices that follow no plant"),
+    ("encoded-clips", "two clips, one of them a loop"),
+    ("encoded-lossless", "every bit of the source at the last level"),
+    ("encoded-lossless-wide", "every bit of binary64 positions at the last level"),
+):
     valid(name, f"what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
 
 
@@ -715,65 +1320,98 @@ for name, why in (("encoded-tree", "a small tree in wind"), ("encoded-wide", "bi
 
 
 def header(name: str, error: str, reason: str, **fields) -> None:
-    invalid(f"header-{name}", error, "open", reason, lambda: replace(
-        lone().draft().with_header(**fields), errors=bytes(16)))
+    invalid(
+        f"header-{name}", error, "open", reason, lambda: replace(lone().draft().with_header(**fields), errors=bytes(16))
+    )
 
 
 def first_bytes(count: int, change: bytes = b"") -> bytes:
     data = lone().file()[:count]
-    return data[:len(data) - len(change)] + change
+    return data[: len(data) - len(change)] + change
 
 
 invalid("empty", "NOT_AN_ATH_FILE", "open", "a file of no bytes", b"")
-invalid("magic-other", "NOT_AN_ATH_FILE", "open", "something else",
-        b"PK\x03\x04 something else entirely, longer than a header would be")
+invalid(
+    "magic-other",
+    "NOT_AN_ATH_FILE",
+    "open",
+    "something else",
+    b"PK\x03\x04 something else entirely, longer than a header would be",
+)
 invalid("magic-first-byte", "NOT_AN_ATH_FILE", "open", "one byte, not that of Magic", b"P")
-header("magic-newline", "NOT_AN_ATH_FILE", "CR LF of Magic became LF on the way",
-       magic=b"\x89ATH\n\x1a\n\x00")
+header("magic-newline", "NOT_AN_ATH_FILE", "CR LF of Magic became LF on the way", magic=b"\x89ATH\n\x1a\n\x00")
 header("magic-last-byte", "NOT_AN_ATH_FILE", "the last byte of Magic is another", magic=b"\x89ATH\r\n\x1a\r")
 invalid("cut-in-magic", "TRUNCATED", "open", "three bytes, those of Magic", lambda: first_bytes(3))
-invalid("cut-before-version", "TRUNCATED", "open",
-        "11 bytes: the versions are not all there, and not looked at",
-        lambda: first_bytes(11, b"\xff\xff\xff"))
-invalid("cut-behind-version", "UNSUPPORTED_VERSION", "open", "12 bytes are enough to refuse a version",
-        lambda: first_bytes(12, b"\xff\xff\xff\xff"))
+invalid(
+    "cut-before-version",
+    "TRUNCATED",
+    "open",
+    "11 bytes: the versions are not all there, and not looked at",
+    lambda: first_bytes(11, b"\xff\xff\xff"),
+)
+invalid(
+    "cut-behind-version",
+    "UNSUPPORTED_VERSION",
+    "open",
+    "12 bytes are enough to refuse a version",
+    lambda: first_bytes(12, b"\xff\xff\xff\xff"),
+)
 invalid("cut-in-header", "TRUNCATED", "open", "63 bytes", lambda: first_bytes(63))
 invalid("cut-in-tables", "TRUNCATED", "open", "ends inside the chunk table", lambda: first_bytes(100))
-invalid("cut-in-error-table", "TRUNCATED", "open", "ends inside the error table",
-        lambda: first_bytes(64 + 5 * 16 + 15))
+invalid("cut-in-error-table", "TRUNCATED", "open", "ends inside the error table", lambda: first_bytes(64 + 5 * 16 + 15))
 header("major-1", "UNSUPPORTED_VERSION", "Major_Version 1, which is to come", major=1)
-header("minor-less", "UNSUPPORTED_VERSION", "Minor_Version less by 1, while Major_Version is 0",
-       minor=rd.VERSION[1] - 1)
+header(
+    "minor-less", "UNSUPPORTED_VERSION", "Minor_Version less by 1, while Major_Version is 0", minor=rd.VERSION[1] - 1
+)
 header("minor-more", "UNSUPPORTED_VERSION", "Minor_Version more by 1", minor=rd.VERSION[1] + 1)
 header("vertices-0", "BAD_HEADER", "Vertex_Count 0", vertex_count=0)
 header("vertices-limit", "LIMIT_EXCEEDED", "Vertex_Count 2^26 + 1", vertex_count=(1 << 26) + 1)
 header("branches-0", "BAD_HEADER", "Branch_Count 0", branch_count=0)
-header("branches-limit", "LIMIT_EXCEEDED", "Branch_Count 2^20 + 1, more than vertices as well",
-       branch_count=(1 << 20) + 1)
+header(
+    "branches-limit", "LIMIT_EXCEEDED", "Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1
+)
 header("branches-more-than-vertices", "BAD_HEADER", "two branches, one vertex", branch_count=2)
 header("frames-0", "BAD_HEADER", "Frame_Count 0", frame_count=0)
 header("frames-limit", "LIMIT_EXCEEDED", "Frame_Count 2^20 + 1", frame_count=(1 << 20) + 1)
 header("frames-257", "BAD_HEADER", "257 frames in one segment", frame_count=257)
 header("segments-0", "BAD_HEADER", "Segment_Count 0", segment_count=0)
-header("segments-limit", "LIMIT_EXCEEDED", "Segment_Count 2^20 + 1, more than frames as well",
-       segment_count=(1 << 20) + 1)
+header(
+    "segments-limit", "LIMIT_EXCEEDED", "Segment_Count 2^20 + 1, more than frames as well", segment_count=(1 << 20) + 1
+)
 header("segments-more-than-frames", "BAD_HEADER", "two segments, one frame", segment_count=2)
 header("chunks-0", "BAD_HEADER", "Chunk_Count 0", chunk_count=0)
 header("chunks-limit", "LIMIT_EXCEEDED", "Chunk_Count 2^20 + 1", chunk_count=(1 << 20) + 1)
-header("tables-limit", "LIMIT_EXCEEDED",
-       "2^20 chunks and an error table: more than Max_Table_Bytes, and not there", chunk_count=1 << 20)
+header(
+    "tables-limit",
+    "LIMIT_EXCEEDED",
+    "2^20 chunks and an error table: more than Max_Table_Bytes, and not there",
+    chunk_count=1 << 20,
+)
 header("chunks-more", "TRUNCATED", "more chunks announced than the file has room for", chunk_count=1000)
 header("levels-0", "BAD_HEADER", "Level_Count 0", level_count=0)
 header("levels-more-than-full", "BAD_HEADER", "Level_Count above Full_Level_Count", level_count=3)
 header("full-levels-1", "BAD_HEADER", "Full_Level_Count 1", level_count=1, full_level_count=1)
 header("full-levels-33", "BAD_HEADER", "Full_Level_Count 33", full_level_count=33)
-header("full-levels-not-those", "BAD_HEADER", "Full_Level_Count 4, the hierarchy has 2, or 3 with EXACT",
-       full_level_count=4)
-invalid("header-full-levels-less", "BAD_HEADER", "open", "Full_Level_Count 2, the hierarchy has 3",
-        lambda: fork().upto(1).with_header(full_level_count=2))
-invalid("hierarchy-31-deep", "BAD_HEADER", "open",
-        "32 branches, each on the one before: no Full_Level_Count can say 33",
-        lambda: moving(chain(32), 1).draft().upto(31).with_header(full_level_count=32))
+header(
+    "full-levels-not-those",
+    "BAD_HEADER",
+    "Full_Level_Count 4, the hierarchy has 2, or 3 with EXACT",
+    full_level_count=4,
+)
+invalid(
+    "header-full-levels-less",
+    "BAD_HEADER",
+    "open",
+    "Full_Level_Count 2, the hierarchy has 3",
+    lambda: fork().upto(1).with_header(full_level_count=2),
+)
+invalid(
+    "hierarchy-31-deep",
+    "BAD_HEADER",
+    "open",
+    "32 branches, each on the one before: no Full_Level_Count can say 33",
+    lambda: moving(chain(32), 1).draft().upto(31).with_header(full_level_count=32),
+)
 header("clips-0", "BAD_HEADER", "Clip_Count 0", clip_count=0)
 for bit in range(1, 8):
     header(f"flags-{bit}", "BAD_HEADER", f"reserved bit {bit} of Flags is set", flags=1 << bit)
@@ -781,41 +1419,59 @@ header("max-error-nan", "BAD_HEADER", "Max_Error is NaN", max_error=NAN)
 header("max-error-infinite", "BAD_HEADER", "Max_Error is infinite", max_error=INFINITY)
 header("max-error-negative", "BAD_HEADER", "Max_Error is below 0", max_error=-TINY)
 header("reserved", "BAD_HEADER", "Reserved is 2^63", reserved=1 << 63)
-header("first-rule-counts", "BAD_HEADER", "Vertex_Count 0 comes before a Branch_Count beyond its limit",
-       vertex_count=0,
-       branch_count=2**32 - 1)
-header("limit-before-rules", "LIMIT_EXCEEDED", "a count beyond its limit comes before reserved bits",
-       chunk_count=2**32 - 1, flags=255)
+header(
+    "first-rule-counts",
+    "BAD_HEADER",
+    "Vertex_Count 0 comes before a Branch_Count beyond its limit",
+    vertex_count=0,
+    branch_count=2**32 - 1,
+)
+header(
+    "limit-before-rules",
+    "LIMIT_EXCEEDED",
+    "a count beyond its limit comes before reserved bits",
+    chunk_count=2**32 - 1,
+    flags=255,
+)
 header("checksum", "BAD_CHECKSUM", "Front_Checksum is another", checksum=0)
-header("memory-limit", "LIMIT_EXCEEDED", "2^22 vertices take more than Max_Memory_Bytes",
-       vertex_count=1 << 22)
+header("memory-limit", "LIMIT_EXCEEDED", "2^22 vertices take more than Max_Memory_Bytes", vertex_count=1 << 22)
 header("file-length-0", "BAD_CHUNK_TABLE", "File_Length 0", file_length=0)
-header("file-length-less", "BAD_CHUNK_TABLE", "File_Length ends inside the last chunk",
-       file_length=len(lone().file()) - 1)
-header("file-length-more", "BAD_CHUNK_TABLE", "File_Length is behind the last chunk",
-       file_length=len(lone().file()) + 1)
+header(
+    "file-length-less", "BAD_CHUNK_TABLE", "File_Length ends inside the last chunk", file_length=len(lone().file()) - 1
+)
+header(
+    "file-length-more", "BAD_CHUNK_TABLE", "File_Length is behind the last chunk", file_length=len(lone().file()) + 1
+)
 header("file-length-largest", "BAD_CHUNK_TABLE", "File_Length 2^64 - 1", file_length=2**64 - 1)
 
 # ---- invalid: tables ---------------------------------------------------------------------------------------
 
 
 def flipped(data: bytes, place: int) -> bytes:
-    return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1:]
+    return data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :]
 
 
 def error_table(*values: float) -> Draft:
     return replace(lone().draft(), errors=struct.pack("<4f", *values))
 
 
-invalid("table-damaged", "BAD_CHECKSUM", "open", "a bit of the chunk table is flipped",
-        lambda: flipped(lone().file(), 70))
-invalid("error-table-damaged", "BAD_CHECKSUM", "open", "a bit of the error table is flipped",
-        lambda: flipped(lone().file(), 64 + 80))
+invalid(
+    "table-damaged", "BAD_CHECKSUM", "open", "a bit of the chunk table is flipped", lambda: flipped(lone().file(), 70)
+)
+invalid(
+    "error-table-damaged",
+    "BAD_CHECKSUM",
+    "open",
+    "a bit of the error table is flipped",
+    lambda: flipped(lone().file(), 64 + 80),
+)
 invalid("errors-nan", "BAD_CHUNK_TABLE", "open", "Level_Max_Error is NaN", lambda: error_table(NAN, 0, 0, 0))
-invalid("errors-infinite", "BAD_CHUNK_TABLE", "open", "Level_RMS_Error is infinite",
-        lambda: error_table(0, INFINITY, 0, 0))
-invalid("errors-negative", "BAD_CHUNK_TABLE", "open", "the last error is below 0",
-        lambda: error_table(0, 0, 0, -FLOAT_TINY))
+invalid(
+    "errors-infinite", "BAD_CHUNK_TABLE", "open", "Level_RMS_Error is infinite", lambda: error_table(0, INFINITY, 0, 0)
+)
+invalid(
+    "errors-negative", "BAD_CHUNK_TABLE", "open", "the last error is below 0", lambda: error_table(0, 0, 0, -FLOAT_TINY)
+)
 
 
 def table(name: str, error: str, reason: str, make: Callable[[], Draft]) -> None:
@@ -833,8 +1489,7 @@ def moved(kind: int, **place: int) -> Draft:
     """The last chunk of a kind, with another level or segment in the table."""
     draft = fork()
     i = max(i for i, entry in enumerate(draft.entries) if entry.kind == kind)
-    return replace(draft,
-                   entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1:]))
+    return replace(draft, entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1 :]))
 
 
 def inserted(at: int, *entries: Entry) -> Draft:
@@ -842,83 +1497,195 @@ def inserted(at: int, *entries: Entry) -> Draft:
     return replace(draft, entries=(*draft.entries[:at], *entries, *draft.entries[at:]))
 
 
-for kind, level, why in ((0x0000, 255, "kind 0"), (0x0008, 255, "in the prelude"), (0x0015, 0, "of motion"),
-                         (0x0021, 255, "behind the motion"), (0x7FFF, 255, "the last one")):
-    table(f"unknown-{kind:04x}", "UNKNOWN_CHUNK", f"a required kind that is not known, {why}",
-          lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)))
-for kind, level, name in ((0x8001, 255, "HIERARCHY"), (0x0004, 255, "METADATA"), (0x8010, 1, "STEMS"),
-                          (0x8013, 1, "SHAPES"),
-                          (0x8007, 255, "CLIPS"), (0x0020, 255, "ATTRIBUTE")):
-    table(f"twin-{kind:04x}", "UNKNOWN_CHUNK", f"{name} with the wrong bit 15",
-          lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)))
+for kind, level, why in (
+    (0x0000, 255, "kind 0"),
+    (0x0008, 255, "in the prelude"),
+    (0x0015, 0, "of motion"),
+    (0x0021, 255, "behind the motion"),
+    (0x7FFF, 255, "the last one"),
+):
+    table(
+        f"unknown-{kind:04x}",
+        "UNKNOWN_CHUNK",
+        f"a required kind that is not known, {why}",
+        lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
+    )
+for kind, level, name in (
+    (0x8001, 255, "HIERARCHY"),
+    (0x0004, 255, "METADATA"),
+    (0x8010, 1, "STEMS"),
+    (0x8013, 1, "SHAPES"),
+    (0x8007, 255, "CLIPS"),
+    (0x0020, 255, "ATTRIBUTE"),
+):
+    table(
+        f"twin-{kind:04x}",
+        "UNKNOWN_CHUNK",
+        f"{name} with the wrong bit 15",
+        lambda kind=kind, level=level: fork().add(Entry(kind, b"", level)),
+    )
 table("reserved", "BAD_CHUNK_TABLE", "Reserved is 1", lambda: fork().change(rd.STEMS, 1, 0, reserved=1))
-table("level-of-prelude", "BAD_CHUNK_TABLE", "HIERARCHY with Level 0",
-      lambda: moved(rd.HIERARCHY, level=0))
-table("segment-of-prelude", "BAD_CHUNK_TABLE", "REST with Segment 1",
-      lambda: moved(rd.REST, segment=1))
-table("level-of-attribute", "BAD_CHUNK_TABLE", "ATTRIBUTE with Level 0",
-      lambda: fork().add(Entry(rd.ATTRIBUTE, element("|u1", b"a"), 0)))
-table("no-level", "BAD_CHUNK_TABLE", "the last CORRECTIONS with Level 255",
-      lambda: moved(rd.CORRECTIONS, level=255))
-table("level-beyond", "BAD_CHUNK_TABLE", "a motion chunk of a level that is not stored",
-      lambda: moved(rd.CORRECTIONS, level=3))
-table("segment-beyond", "BAD_CHUNK_TABLE", "a motion chunk of a segment that is not there",
-      lambda: moved(rd.CORRECTIONS, segment=2))
-table("unknown-with-level", "BAD_CHUNK_TABLE", "an unknown optional kind of the prelude with Level 0",
-      lambda: fork().add(Entry(0x8009, b"", 0)))
-table("unknown-without-level", "BAD_CHUNK_TABLE", "an unknown optional motion kind with Level 255",
-      lambda: fork().add(Entry(0x8015, b"")))
-table("unknown-segment", "BAD_CHUNK_TABLE", "an unknown optional kind behind the motion with Segment 1",
-      lambda: fork().add(Entry(0x8021, b"", segment=1)))
+table("level-of-prelude", "BAD_CHUNK_TABLE", "HIERARCHY with Level 0", lambda: moved(rd.HIERARCHY, level=0))
+table("segment-of-prelude", "BAD_CHUNK_TABLE", "REST with Segment 1", lambda: moved(rd.REST, segment=1))
+table(
+    "level-of-attribute",
+    "BAD_CHUNK_TABLE",
+    "ATTRIBUTE with Level 0",
+    lambda: fork().add(Entry(rd.ATTRIBUTE, element("|u1", b"a"), 0)),
+)
+table("no-level", "BAD_CHUNK_TABLE", "the last CORRECTIONS with Level 255", lambda: moved(rd.CORRECTIONS, level=255))
+table(
+    "level-beyond",
+    "BAD_CHUNK_TABLE",
+    "a motion chunk of a level that is not stored",
+    lambda: moved(rd.CORRECTIONS, level=3),
+)
+table(
+    "segment-beyond",
+    "BAD_CHUNK_TABLE",
+    "a motion chunk of a segment that is not there",
+    lambda: moved(rd.CORRECTIONS, segment=2),
+)
+table(
+    "unknown-with-level",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional kind of the prelude with Level 0",
+    lambda: fork().add(Entry(0x8009, b"", 0)),
+)
+table(
+    "unknown-without-level",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional motion kind with Level 255",
+    lambda: fork().add(Entry(0x8015, b"")),
+)
+table(
+    "unknown-segment",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional kind behind the motion with Segment 1",
+    lambda: fork().add(Entry(0x8021, b"", segment=1)),
+)
 table("order-prelude", "BAD_CHUNK_TABLE", "REST before HIERARCHY", lambda: swapped(0, 1))
 table("order-motion-first", "BAD_CHUNK_TABLE", "a motion chunk before TIME", lambda: swapped(2, 3))
 table("order-levels", "BAD_CHUNK_TABLE", "level 1 before level 0", lambda: swapped(4, 5))
 table("order-segments", "BAD_CHUNK_TABLE", "segment 1 before segment 0", lambda: swapped(3, 4))
 table("order-kinds", "BAD_CHUNK_TABLE", "SHAPES before STEMS", lambda: swapped(5, 6))
-table("order-optional", "BAD_CHUNK_TABLE",
-      "an unknown optional motion kind before the known ones of its level: bit 15 counts",
-      lambda: inserted(3, Entry(0x8015, b"", 0, 0)))
-table("order-attributes", "BAD_CHUNK_TABLE", "ATTRIBUTE before the motion",
-      lambda: inserted(3, Entry(rd.ATTRIBUTE, element("|u1", b"a"))))
-table("order-behind", "BAD_CHUNK_TABLE", "METADATA behind the motion",
-      lambda: inserted(len(fork().entries), Entry(rd.METADATA, b"\0{}")))
+table(
+    "order-optional",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional motion kind before the known ones of its level: bit 15 counts",
+    lambda: inserted(3, Entry(0x8015, b"", 0, 0)),
+)
+table(
+    "order-attributes",
+    "BAD_CHUNK_TABLE",
+    "ATTRIBUTE before the motion",
+    lambda: inserted(3, Entry(rd.ATTRIBUTE, element("|u1", b"a"))),
+)
+table(
+    "order-behind",
+    "BAD_CHUNK_TABLE",
+    "METADATA behind the motion",
+    lambda: inserted(len(fork().entries), Entry(rd.METADATA, b"\0{}")),
+)
 table("twice-time", "BAD_CHUNK_TABLE", "TIME twice", lambda: fork().add(Entry(rd.TIME, steady_time())))
-table("twice-metadata", "BAD_CHUNK_TABLE", "METADATA twice: only kinds from 32 on may repeat",
-      lambda: fork().add(Entry(rd.METADATA, b"\0{}"), Entry(rd.METADATA, b"\0{}")))
-table("twice-stems", "BAD_CHUNK_TABLE", "STEMS of a level and segment twice",
-      lambda: fork().add(Entry(rd.STEMS, fork().content(rd.STEMS, 1, 0), 1, 0)))
-table("twice-unknown", "BAD_CHUNK_TABLE", "an unknown optional kind of the prelude twice",
-      lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")))
-table("twice-unknown-motion", "BAD_CHUNK_TABLE", "an unknown optional motion kind twice",
-      lambda: fork().add(Entry(0x8015, b"", 0, 0), Entry(0x8015, b"", 0, 0)))
-table("length-limit", "LIMIT_EXCEEDED", "a chunk of 2^28 + 1 bytes",
-      lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)).with_header(file_length=1 << 30))
-table("length-limit-of-unknown", "UNKNOWN_CHUNK", "the Kind is checked before the Length",
-      lambda: fork().add(Entry(8, b"", length=2**32 - 1)))
-table("length-limit-before-place", "LIMIT_EXCEEDED", "the Length is checked before the Level",
-      lambda: fork().add(Entry(0x8009, b"", 0, length=2**32 - 1)))
-table("length-more", "BAD_CHUNK_TABLE", "chunks that end behind File_Length",
-      lambda: fork().change(rd.TIME, length=1000))
+table(
+    "twice-metadata",
+    "BAD_CHUNK_TABLE",
+    "METADATA twice: only kinds from 32 on may repeat",
+    lambda: fork().add(Entry(rd.METADATA, b"\0{}"), Entry(rd.METADATA, b"\0{}")),
+)
+table(
+    "twice-stems",
+    "BAD_CHUNK_TABLE",
+    "STEMS of a level and segment twice",
+    lambda: fork().add(Entry(rd.STEMS, fork().content(rd.STEMS, 1, 0), 1, 0)),
+)
+table(
+    "twice-unknown",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional kind of the prelude twice",
+    lambda: fork().add(Entry(0x8009, b""), Entry(0x8009, b"")),
+)
+table(
+    "twice-unknown-motion",
+    "BAD_CHUNK_TABLE",
+    "an unknown optional motion kind twice",
+    lambda: fork().add(Entry(0x8015, b"", 0, 0), Entry(0x8015, b"", 0, 0)),
+)
+table(
+    "length-limit",
+    "LIMIT_EXCEEDED",
+    "a chunk of 2^28 + 1 bytes",
+    lambda: fork().add(Entry(0x8009, b"", length=(1 << 28) + 1)).with_header(file_length=1 << 30),
+)
+table(
+    "length-limit-of-unknown",
+    "UNKNOWN_CHUNK",
+    "the Kind is checked before the Length",
+    lambda: fork().add(Entry(8, b"", length=2**32 - 1)),
+)
+table(
+    "length-limit-before-place",
+    "LIMIT_EXCEEDED",
+    "the Length is checked before the Level",
+    lambda: fork().add(Entry(0x8009, b"", 0, length=2**32 - 1)),
+)
+table(
+    "length-more", "BAD_CHUNK_TABLE", "chunks that end behind File_Length", lambda: fork().change(rd.TIME, length=1000)
+)
 for kind in (rd.HIERARCHY, rd.REST, rd.TIME):
-    table(f"no-{rd.KINDS[kind].lower()}", "BAD_CHUNK_TABLE", f"{rd.KINDS[kind]} is missing",
-          lambda kind=kind: fork().without(kind))
-table("no-chunk-of-motion", "BAD_CHUNK_TABLE", "a file without motion",
-      lambda: replace(fork(), entries=fork().entries[:3]))
+    table(
+        f"no-{rd.KINDS[kind].lower()}",
+        "BAD_CHUNK_TABLE",
+        f"{rd.KINDS[kind]} is missing",
+        lambda kind=kind: fork().without(kind),
+    )
+table(
+    "no-chunk-of-motion",
+    "BAD_CHUNK_TABLE",
+    "a file without motion",
+    lambda: replace(fork(), entries=fork().entries[:3]),
+)
 table("no-stems", "BAD_CHUNK_TABLE", "STEMS of a segment is missing", lambda: fork().without(rd.STEMS, 2, 1))
-table("no-affines", "BAD_CHUNK_TABLE", "AFFINES of level 0 is missing in one segment",
-      lambda: fork().without(rd.AFFINES, 0, 1))
-table("more-stems", "BAD_CHUNK_TABLE", "STEMS of a level that has no pieces",
-      lambda: fork().add(Entry(rd.STEMS, stems_head(), 0, 0)))
-table("more-affines", "BAD_CHUNK_TABLE", "AFFINES of a level without coded nodes",
-      lambda: fork().add(Entry(rd.AFFINES, b"", 1, 0)))
-table("more-corrections", "BAD_CHUNK_TABLE", "CORRECTIONS of a level that is not the last",
-      lambda: fork().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)))
-table("corrections-of-short-file", "BAD_CHUNK_TABLE", "CORRECTIONS on the last level of a shortened file",
-      lambda: fork().upto(1).add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)))
-table("more-shapes", "BAD_CHUNK_TABLE", "SHAPES of a level without STEMS",
-      lambda: fork().add(Entry(rd.SHAPES, b"", 0, 0)))
-table("shapes-of-segment-1", "BAD_CHUNK_TABLE", "SHAPES stands with segment 0",
-      lambda: fork().add(Entry(rd.SHAPES, b"", 1, 1)))
+table(
+    "no-affines",
+    "BAD_CHUNK_TABLE",
+    "AFFINES of level 0 is missing in one segment",
+    lambda: fork().without(rd.AFFINES, 0, 1),
+)
+table(
+    "more-stems",
+    "BAD_CHUNK_TABLE",
+    "STEMS of a level that has no pieces",
+    lambda: fork().add(Entry(rd.STEMS, stems_head(), 0, 0)),
+)
+table(
+    "more-affines",
+    "BAD_CHUNK_TABLE",
+    "AFFINES of a level without coded nodes",
+    lambda: fork().add(Entry(rd.AFFINES, b"", 1, 0)),
+)
+table(
+    "more-corrections",
+    "BAD_CHUNK_TABLE",
+    "CORRECTIONS of a level that is not the last",
+    lambda: fork().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+)
+table(
+    "corrections-of-short-file",
+    "BAD_CHUNK_TABLE",
+    "CORRECTIONS on the last level of a shortened file",
+    lambda: fork().upto(1).add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+)
+table(
+    "more-shapes", "BAD_CHUNK_TABLE", "SHAPES of a level without STEMS", lambda: fork().add(Entry(rd.SHAPES, b"", 0, 0))
+)
+table(
+    "shapes-of-segment-1",
+    "BAD_CHUNK_TABLE",
+    "SHAPES stands with segment 0",
+    lambda: fork().add(Entry(rd.SHAPES, b"", 1, 1)),
+)
 
 # ---- invalid: ends and checksums ---------------------------------------------------------------------------
 
@@ -926,11 +1693,11 @@ table("shapes-of-segment-1", "BAD_CHUNK_TABLE", "SHAPES stands with segment 0",
 def cut(short: Callable[[Draft], int]) -> bytes:
     """The first chunks of the fork, less some bytes."""
     draft = fork()
-    return draft.file()[:short(draft)]
+    return draft.file()[: short(draft)]
 
 
 def end_of(draft: Draft, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> int:
-    behind = draft.entries[draft.index(kind, level, segment) + 1:]
+    behind = draft.entries[draft.index(kind, level, segment) + 1 :]
     return len(draft.file()) - sum(len(entry.content) for entry in behind)
 
 
@@ -940,46 +1707,93 @@ def cut_static() -> bytes:
 
 invalid("trailing-byte", "TRAILING_BYTES", "strict", "a byte behind the end", lambda: fork().file() + b"\0")
 invalid("trailing-file", "TRAILING_BYTES", "strict", "the file twice", lambda: fork().file() * 2)
-invalid("cut-in-prelude", "TRUNCATED", "open", "the last byte of TIME is missing",
-        lambda: cut(lambda d: end_of(d, rd.TIME) - 1))
-invalid("cut-behind-prelude", "TRUNCATED", 0, "no motion has arrived",
-        lambda: cut(lambda d: end_of(d, rd.TIME)))
-invalid("cut-in-level-0", "TRUNCATED", 0, "one segment of level 0 has arrived",
-        lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1) - 1))
-invalid("cut-behind-level-0", "TRUNCATED", 1, "level 0 has arrived and plays",
-        lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1)))
-invalid("cut-in-last-level", "TRUNCATED", 2, "the last byte is missing",
-        lambda: cut(lambda d: len(d.file()) - 1))
-invalid("cut-in-attributes", "TRUNCATED", "strict",
-        "all motion has arrived and plays, one of two attributes has", cut_static)
+invalid(
+    "cut-in-prelude",
+    "TRUNCATED",
+    "open",
+    "the last byte of TIME is missing",
+    lambda: cut(lambda d: end_of(d, rd.TIME) - 1),
+)
+invalid("cut-behind-prelude", "TRUNCATED", 0, "no motion has arrived", lambda: cut(lambda d: end_of(d, rd.TIME)))
+invalid(
+    "cut-in-level-0",
+    "TRUNCATED",
+    0,
+    "one segment of level 0 has arrived",
+    lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1) - 1),
+)
+invalid(
+    "cut-behind-level-0",
+    "TRUNCATED",
+    1,
+    "level 0 has arrived and plays",
+    lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1)),
+)
+invalid("cut-in-last-level", "TRUNCATED", 2, "the last byte is missing", lambda: cut(lambda d: len(d.file()) - 1))
+invalid(
+    "cut-in-attributes",
+    "TRUNCATED",
+    "strict",
+    "all motion has arrived and plays, one of two attributes has",
+    cut_static,
+)
 
 for kind, item in ((rd.HIERARCHY, "open"), (rd.REST, "open"), (rd.TIME, "open")):
-    invalid(f"damaged-{rd.KINDS[kind].lower()}", "BAD_CHECKSUM", item,
-            f"a bit of {rd.KINDS[kind]} is flipped",
-            lambda kind=kind: flipped(fork().file(), end_of(fork(), kind) - 1))
+    invalid(
+        f"damaged-{rd.KINDS[kind].lower()}",
+        "BAD_CHECKSUM",
+        item,
+        f"a bit of {rd.KINDS[kind]} is flipped",
+        lambda kind=kind: flipped(fork().file(), end_of(fork(), kind) - 1),
+    )
 for kind, level in ((rd.AFFINES, 0), (rd.STEMS, 1), (rd.SHAPES, 1), (rd.CORRECTIONS, 2)):
-    invalid(f"damaged-{rd.KINDS[kind].lower()}", "BAD_CHECKSUM", level,
-            f"a bit of {rd.KINDS[kind]} is flipped",
-            lambda kind=kind, level=level: flipped(fork().file(), end_of(fork(), kind, level) - 1))
-invalid("damaged-metadata", "BAD_CHECKSUM", "static", "a bit of METADATA is flipped; the motion plays",
-        lambda: metadata("{}").change(rd.METADATA, checksum=0))
-invalid("damaged-attribute", "BAD_CHECKSUM", "static", "a bit of an attribute is flipped; the motion plays",
-        lambda: attributes(element("|u1", b"1")).change(rd.ATTRIBUTE, checksum=0))
-invalid("damaged-before-table", "BAD_CHECKSUM", "open",
-        "HIERARCHY is damaged and STEMS is missing: HIERARCHY comes first",
-        lambda: fork().without(rd.STEMS, 2, 1).change(rd.HIERARCHY, checksum=0))
-invalid("hierarchy-before-rest", "BAD_CHUNK", "open",
-        "HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
-        lambda: fork().change(rd.HIERARCHY, content=b"").change(rd.REST, checksum=0))
-invalid("table-before-rest", "BAD_CHUNK_TABLE", "open",
-        "STEMS is missing and REST is damaged: the table comes first",
-        lambda: fork().without(rd.STEMS, 2, 1).change(rd.REST, checksum=0))
+    invalid(
+        f"damaged-{rd.KINDS[kind].lower()}",
+        "BAD_CHECKSUM",
+        level,
+        f"a bit of {rd.KINDS[kind]} is flipped",
+        lambda kind=kind, level=level: flipped(fork().file(), end_of(fork(), kind, level) - 1),
+    )
+invalid(
+    "damaged-metadata",
+    "BAD_CHECKSUM",
+    "static",
+    "a bit of METADATA is flipped; the motion plays",
+    lambda: metadata("{}").change(rd.METADATA, checksum=0),
+)
+invalid(
+    "damaged-attribute",
+    "BAD_CHECKSUM",
+    "static",
+    "a bit of an attribute is flipped; the motion plays",
+    lambda: attributes(element("|u1", b"1")).change(rd.ATTRIBUTE, checksum=0),
+)
+invalid(
+    "damaged-before-table",
+    "BAD_CHECKSUM",
+    "open",
+    "HIERARCHY is damaged and STEMS is missing: HIERARCHY comes first",
+    lambda: fork().without(rd.STEMS, 2, 1).change(rd.HIERARCHY, checksum=0),
+)
+invalid(
+    "hierarchy-before-rest",
+    "BAD_CHUNK",
+    "open",
+    "HIERARCHY is not valid and REST is damaged: HIERARCHY comes first",
+    lambda: fork().change(rd.HIERARCHY, content=b"").change(rd.REST, checksum=0),
+)
+invalid(
+    "table-before-rest",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "STEMS is missing and REST is damaged: the table comes first",
+    lambda: fork().without(rd.STEMS, 2, 1).change(rd.REST, checksum=0),
+)
 
 # ---- invalid: the prelude's chunks -------------------------------------------------------------------------
 
 
-def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], bytes],
-            error: str = "BAD_CHUNK") -> None:
+def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], bytes], error: str = "BAD_CHUNK") -> None:
     def make() -> Draft:
         return fork().change(kind, content=content() if callable(content) else content)
 
@@ -988,10 +1802,10 @@ def prelude(name: str, kind: int, reason: str, content: bytes | Callable[[], byt
 
 def hierarchy(name: str, reason: str, stems: list[Stem], **sources) -> None:
     """Written for the five vertices and two branches of the fork, or as many branches as there are."""
+
     def make() -> Draft:
         stream = write(rd.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
-        return fork().with_header(branch_count=len(stems)).change(rd.HIERARCHY,
-                                                                  content=hierarchy_chunk(stream))
+        return fork().with_header(branch_count=len(stems)).change(rd.HIERARCHY, content=hierarchy_chunk(stream))
 
     invalid(f"hierarchy-{name}", "BAD_CHUNK", "open", reason, make)
 
@@ -1004,12 +1818,21 @@ prelude("empty", rd.HIERARCHY, "no bytes", b"")
 prelude("short", rd.HIERARCHY, "15 bytes", bytes(15))
 for field_name in ("epsilon", "xi"):
     for what, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -1.0)):
-        prelude(f"{field_name}-{what}", rd.HIERARCHY, f"{field_name.capitalize()} is {value}",
-                lambda field_name=field_name, value=value: corrupted_hierarchy(**{field_name: value}))
+        prelude(
+            f"{field_name}-{what}",
+            rd.HIERARCHY,
+            f"{field_name.capitalize()} is {value}",
+            lambda field_name=field_name, value=value: corrupted_hierarchy(**{field_name: value}),
+        )
 prelude("zero-behind", rd.HIERARCHY, "a zero byte behind the stream", lambda: corrupted_hierarchy() + b"\0")
 prelude("bytes-behind", rd.HIERARCHY, "bytes behind the stream", lambda: corrupted_hierarchy() + b"\1" * 12)
-invalid("hierarchy-above-root", "BAD_CHUNK", "open", "a parent above the root", lambda: fork().change(
-    rd.HIERARCHY, content=hierarchy_chunk(write(rd.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5))))
+invalid(
+    "hierarchy-above-root",
+    "BAD_CHUNK",
+    "open",
+    "a parent above the root",
+    lambda: fork().change(rd.HIERARCHY, content=hierarchy_chunk(write(rd.decode_hierarchy, [2, 0, 0, 0, 1, 2], 2, 5))),
+)
 hierarchy("too-many-vertices", "stems have more vertices than the file", [Stem(-1, 4), Stem(0, 3)])
 hierarchy("too-few-vertices", "stems have fewer vertices than the file", [Stem(-1, 3), Stem(0, 1)])
 hierarchy("no-vertex-left", "nothing is left for the last stem", [Stem(-1, 5), Stem(0, 1)])
@@ -1017,27 +1840,40 @@ hierarchy("lag-negative", "Lag -1", [Stem(-1, 3), Stem(0, 2, 1, lag=-1)])
 hierarchy("lag-65536", "Lag 65536", [Stem(-1, 3, lag=65536), Stem(0, 2, 1)])
 hierarchy("root-loose", "a root is LOOSE", [Stem(-1, 3, 0, LOOSE), Stem(0, 2, 1)])
 hierarchy("second-root-loose", "another root is LOOSE", [Stem(-1, 3), Stem(-1, 2, 0, LOOSE)])
-hierarchy("whole-in-whole", "a WHOLE branch in the subtree of another",
-          [Stem(-1, 2), Stem(0, 1, 0, WHOLE), Stem(1, 1), Stem(2, 1, 0, WHOLE)])
+hierarchy(
+    "whole-in-whole",
+    "a WHOLE branch in the subtree of another",
+    [Stem(-1, 2), Stem(0, 1, 0, WHOLE), Stem(1, 1), Stem(2, 1, 0, WHOLE)],
+)
 hierarchy("attach-beyond", "a branch hangs behind the end of its parent", [Stem(-1, 3), Stem(0, 2, 3)])
 hierarchy("attach-before", "a branch hangs before the beginning of its parent", [Stem(-1, 3), Stem(0, 2, -1)])
 hierarchy("attach-far", "a step of 2^28 + 1 along the parent", [Stem(-1, 3), Stem(0, 2, (1 << 28) + 1)])
-hierarchy("branch-twice", "two branches with the same number", [Stem(-1, 3), Stem(0, 2, 1)],
-          branch_source=[1, 1])
-hierarchy("branch-beyond", "a branch with a number beyond the last", [Stem(-1, 3), Stem(0, 2, 1)],
-          branch_source=[0, 2])
-hierarchy("branch-negative", "a branch with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)],
-          branch_source=[-1, 0])
-hierarchy("vertex-twice", "two vertices with the same number", [Stem(-1, 3), Stem(0, 2, 1)],
-          vertex_source=[0, 1, 2, 3, 3])
-hierarchy("vertex-beyond", "a vertex with a number beyond the last", [Stem(-1, 3), Stem(0, 2, 1)],
-          vertex_source=[0, 1, 2, 3, 5])
-hierarchy("vertex-negative", "a vertex with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)],
-          vertex_source=[-1, 0, 1, 2, 3])
-invalid("hierarchy-depth-limit", "LIMIT_EXCEEDED", "open", "4097 branches, each on the one before",
-        lambda: still(
-    [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))],
-    points=[[0.0] * 3] * 4097).draft().upto(0))
+hierarchy("branch-twice", "two branches with the same number", [Stem(-1, 3), Stem(0, 2, 1)], branch_source=[1, 1])
+hierarchy("branch-beyond", "a branch with a number beyond the last", [Stem(-1, 3), Stem(0, 2, 1)], branch_source=[0, 2])
+hierarchy("branch-negative", "a branch with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)], branch_source=[-1, 0])
+hierarchy(
+    "vertex-twice", "two vertices with the same number", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=[0, 1, 2, 3, 3]
+)
+hierarchy(
+    "vertex-beyond",
+    "a vertex with a number beyond the last",
+    [Stem(-1, 3), Stem(0, 2, 1)],
+    vertex_source=[0, 1, 2, 3, 5],
+)
+hierarchy(
+    "vertex-negative", "a vertex with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=[-1, 0, 1, 2, 3]
+)
+invalid(
+    "hierarchy-depth-limit",
+    "LIMIT_EXCEEDED",
+    "open",
+    "4097 branches, each on the one before",
+    lambda: (
+        still([replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097)
+        .draft()
+        .upto(0)
+    ),
+)
 
 
 def corrupted_rest(**fields) -> bytes:
@@ -1055,29 +1891,53 @@ prelude("method-2", rd.REST, "Method 2", lambda: corrupted_rest(exact=2))
 prelude("type-2", rd.REST, "Rest_Type 2", lambda: corrupted_rest(rest_type=2))
 prelude("reserved", rd.REST, "Reserved is not 0", lambda: corrupted_rest(reserved=0x8000))
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
-    prelude(f"origin-{what}", rd.REST, f"Origin has {value}",
-            lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
+    prelude(
+        f"origin-{what}", rd.REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value))
+    )
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     prelude(f"step-{what}", rd.REST, f"Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
-prelude("step-of-exact", rd.REST, "Rest_Step is 0 with Method 1, where it has no meaning",
-        lambda: exact_of_fork([0.0] * 15, False, step=0.0))
+prelude(
+    "step-of-exact",
+    rd.REST,
+    "Rest_Step is 0 with Method 1, where it has no meaning",
+    lambda: exact_of_fork([0.0] * 15, False, step=0.0),
+)
 prelude("overflows", rd.REST, "a coded position beyond binary64", lambda: corrupted_rest(step=HIGHEST))
 prelude("zero-behind", rd.REST, "a zero byte behind the stream", lambda: corrupted_rest() + b"\0")
 prelude("bytes-behind", rd.REST, "bytes behind the stream", lambda: corrupted_rest() + b"\1" * 12)
-prelude("exact-infinite", rd.REST, "an infinite binary32 number",
-        lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False))
-prelude("exact-wide-infinite", rd.REST, "an infinite binary64 number",
-        lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True))
-prelude("exact-nan", rd.REST, "a number that is NaN",
-        lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
-prelude("exact-overflows", rd.REST, "a position less Origin beyond binary64",
-        lambda: exact_of_fork([LOWEST] + [0.0] * 14, True, origin=(HIGHEST, 0.0, 0.0)))
-prelude("exact-zero-behind", rd.REST, "a zero byte behind the stream of exact numbers",
-        lambda: exact_of_fork([0.5] * 15, False) + b"\0")
-invalid("rest-beam-frequencies", "BAD_CHUNK", "open", "a run of two vertices codes three frequencies",
-        lambda: with_rest(
-    [Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], [])).draft().change(rd.REST, content=coded_rest(
-        [Stem(-1, 3, lag=0)], [0, 0, 0, 3])))
+prelude(
+    "exact-infinite", rd.REST, "an infinite binary32 number", lambda: exact_of_fork([0.0, INFINITE_BITS[False]], False)
+)
+prelude(
+    "exact-wide-infinite",
+    rd.REST,
+    "an infinite binary64 number",
+    lambda: exact_of_fork([0.0, INFINITE_BITS[True]], True),
+)
+prelude("exact-nan", rd.REST, "a number that is NaN", lambda: exact_of_fork([((0xFF << 23) + 1, False)], False))
+prelude(
+    "exact-overflows",
+    rd.REST,
+    "a position less Origin beyond binary64",
+    lambda: exact_of_fork([LOWEST] + [0.0] * 14, True, origin=(HIGHEST, 0.0, 0.0)),
+)
+prelude(
+    "exact-zero-behind",
+    rd.REST,
+    "a zero byte behind the stream of exact numbers",
+    lambda: exact_of_fork([0.5] * 15, False) + b"\0",
+)
+invalid(
+    "rest-beam-frequencies",
+    "BAD_CHUNK",
+    "open",
+    "a run of two vertices codes three frequencies",
+    lambda: (
+        with_rest([Stem(-1, 3, lag=0)], coded_rest([Stem(-1, 3, lag=0)], []))
+        .draft()
+        .change(rd.REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
+    ),
+)
 
 
 def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
@@ -1099,16 +1959,28 @@ prelude("rate-overflows", rd.TIME, "a rate so low that times are infinite", stea
 prelude("equal", rd.TIME, "a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
 prelude("descends", rd.TIME, "a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
 prelude("zeros", rd.TIME, "-0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
-prelude("infinite", rd.TIME, "an infinite time at the end", lambda: uneven_time(0.0, 1.0, 2.0, (
-    rd.ordered(0x7FF << 52, 64) - rd.ordered(rd.to_bits(3.0, 64), 64), False)))
-prelude("zero-behind", rd.TIME, "a zero byte behind the stream",
-        lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
-prelude("bytes-behind", rd.TIME, "bytes behind the stream",
-        lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
-invalid("time-code-outside", "BAD_CHUNK", "open", "a stream whose code is outside the final interval",
-        lambda: lone().draft().change(rd.TIME, content=b"\2" + b"\xff" * 8))
-invalid("time-of-one-infinite", "BAD_CHUNK", "open", "First of a single frame is infinite",
-        lambda: lone().draft().change(rd.TIME, content=steady_time(INFINITY)))
+prelude(
+    "infinite",
+    rd.TIME,
+    "an infinite time at the end",
+    lambda: uneven_time(0.0, 1.0, 2.0, (rd.ordered(0x7FF << 52, 64) - rd.ordered(rd.to_bits(3.0, 64), 64), False)),
+)
+prelude("zero-behind", rd.TIME, "a zero byte behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\0")
+prelude("bytes-behind", rd.TIME, "bytes behind the stream", lambda: uneven_time(0.0, 1.0, 2.5, 3.0) + b"\1" * 12)
+invalid(
+    "time-code-outside",
+    "BAD_CHUNK",
+    "open",
+    "a stream whose code is outside the final interval",
+    lambda: lone().draft().change(rd.TIME, content=b"\2" + b"\xff" * 8),
+)
+invalid(
+    "time-of-one-infinite",
+    "BAD_CHUNK",
+    "open",
+    "First of a single frame is infinite",
+    lambda: lone().draft().change(rd.TIME, content=steady_time(INFINITY)),
+)
 
 # ---- invalid: clips ----------------------------------------------------------------------------------------
 
@@ -1117,8 +1989,13 @@ CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
 
 def clips(name: str, reason: str, *entries: bytes, count: int = 2) -> None:
     """The two clips with another CLIPS."""
-    invalid(f"clips-{name}", "BAD_CHUNK", "open", reason,
-            lambda: two_clips().with_header(clip_count=count).change(rd.CLIPS, content=b"".join(entries)))
+    invalid(
+        f"clips-{name}",
+        "BAD_CHUNK",
+        "open",
+        reason,
+        lambda: two_clips().with_header(clip_count=count).change(rd.CLIPS, content=b"".join(entries)),
+    )
 
 
 def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
@@ -1127,8 +2004,7 @@ def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> 
     return draft.with_header(clip_count=len(entries), **header_fields)
 
 
-invalid("clips-missing", "BAD_CHUNK_TABLE", "open", "two clips and no CLIPS",
-        lambda: two_clips().without(rd.CLIPS))
+invalid("clips-missing", "BAD_CHUNK_TABLE", "open", "two clips and no CLIPS", lambda: two_clips().without(rd.CLIPS))
 clips("empty", "no bytes")
 clips("cut-in-entry", "ends inside the fields of the first clip", CALM_ENTRY[:9])
 clips("cut-before-name", "ends before the Name of the first clip", CALM_ENTRY[:10])
@@ -1140,113 +2016,211 @@ clips("more-than-one", "two clips where Clip_Count is 1", CALM_ENTRY, STORM_ENTR
 clips("byte-behind", "a byte behind the last clip", CALM_ENTRY, STORM_ENTRY, b"\0")
 clips("frames-0", "Clip_Frames and Clip_Segments are 0", clip_entry(0, 0, "calm"), clip_entry(7, 3, "storm"))
 clips("segments-0", "Clip_Segments 0", clip_entry(3, 0, "calm"), clip_entry(4, 3, "storm"))
-clips("segments-more-than-frames", "Clip_Segments above Clip_Frames",
-      clip_entry(1, 2, "calm"), clip_entry(6, 1, "storm"))
-invalid("clips-frames-257", "BAD_CHUNK", "open", "Clip_Frames 257 in one segment",
-        lambda: lone_clips(513, 3, clip_entry(257, 1, "long"), clip_entry(256, 2, "short")))
-clips("frames-do-not-add-up", "Clip_Frames add up to less than Frame_Count",
-      clip_entry(2, 1, "calm"), STORM_ENTRY)
-clips("frames-add-up-to-more", "Clip_Frames add up to more than Frame_Count",
-      CALM_ENTRY, clip_entry(5, 2, "storm"))
-clips("segments-do-not-add-up", "Clip_Segments add up to less than Segment_Count",
-      CALM_ENTRY, clip_entry(4, 1, "storm"))
-clips("segments-add-up-to-more", "Clip_Segments add up to more than Segment_Count",
-      clip_entry(3, 2, "calm"), STORM_ENTRY)
-clips("sums-wrap", "Clip_Frames and Clip_Segments add up to 2^32 more than they should",
-      clip_entry(2**32 - 4, 2**32 - 4, "calm"), clip_entry(11, 7, "storm"))
+clips(
+    "segments-more-than-frames", "Clip_Segments above Clip_Frames", clip_entry(1, 2, "calm"), clip_entry(6, 1, "storm")
+)
+invalid(
+    "clips-frames-257",
+    "BAD_CHUNK",
+    "open",
+    "Clip_Frames 257 in one segment",
+    lambda: lone_clips(513, 3, clip_entry(257, 1, "long"), clip_entry(256, 2, "short")),
+)
+clips("frames-do-not-add-up", "Clip_Frames add up to less than Frame_Count", clip_entry(2, 1, "calm"), STORM_ENTRY)
+clips("frames-add-up-to-more", "Clip_Frames add up to more than Frame_Count", CALM_ENTRY, clip_entry(5, 2, "storm"))
+clips(
+    "segments-do-not-add-up", "Clip_Segments add up to less than Segment_Count", CALM_ENTRY, clip_entry(4, 1, "storm")
+)
+clips(
+    "segments-add-up-to-more", "Clip_Segments add up to more than Segment_Count", clip_entry(3, 2, "calm"), STORM_ENTRY
+)
+clips(
+    "sums-wrap",
+    "Clip_Frames and Clip_Segments add up to 2^32 more than they should",
+    clip_entry(2**32 - 4, 2**32 - 4, "calm"),
+    clip_entry(11, 7, "storm"),
+)
 clips("of-one-do-not-add-up", "the only clip has less frames than the file", clip_entry(6, 3, "all"), count=1)
 for bit in range(1, 8):
-    clips(f"flags-{bit}", f"reserved bit {bit} of Clip_Flags is set",
-          clip_entry(3, 1, "calm", flags=1 << bit), STORM_ENTRY)
+    clips(
+        f"flags-{bit}",
+        f"reserved bit {bit} of Clip_Flags is set",
+        clip_entry(3, 1, "calm", flags=1 << bit),
+        STORM_ENTRY,
+    )
 clips("name-none", "Name_Length 0 in a file of two clips", CALM_ENTRY, clip_entry(4, 2))
 clips("name-twice", "two clips with the same Name", CALM_ENTRY, clip_entry(4, 2, "calm"))
-clips("name-twice-apart", "the first and the third clip with the same Name",
-      CALM_ENTRY, clip_entry(1, 1, "storm"), clip_entry(3, 1, "calm"), count=3)
-clips("name-length-more", "Name_Length is more than the chunk holds",
-      CALM_ENTRY, clip_entry(4, 2, "storm", length=6))
-clips("name-length-less", "Name_Length is less: a byte remains",
-      CALM_ENTRY, clip_entry(4, 2, "storm", length=4))
+clips(
+    "name-twice-apart",
+    "the first and the third clip with the same Name",
+    CALM_ENTRY,
+    clip_entry(1, 1, "storm"),
+    clip_entry(3, 1, "calm"),
+    count=3,
+)
+clips("name-length-more", "Name_Length is more than the chunk holds", CALM_ENTRY, clip_entry(4, 2, "storm", length=6))
+clips("name-length-less", "Name_Length is less: a byte remains", CALM_ENTRY, clip_entry(4, 2, "storm", length=4))
 for name, why, text in (
-        ("continuation", "a continuation byte alone", b"\x80"), ("latin-1", "Latin-1", b"B\xf6e"),
-        ("overlong-2", "an overlong form of two bytes", b"\xc1\xbf"),
-        ("overlong-nul", "U+0000 in two bytes", b"\xc0\x80"),
-        ("overlong-3", "an overlong form of three bytes", b"\xe0\x9f\xbf"),
-        ("overlong-4", "an overlong form of four bytes", b"\xf0\x8f\xbf\xbf"),
-        ("surrogate-first", "the first surrogate", b"\xed\xa0\x80"),
-        ("surrogate-last", "the last surrogate", b"\xed\xbf\xbf"),
-        ("surrogates", "a surrogate pair", b"\xed\xa0\xbc\xed\xbc\xb3"),
-        ("beyond", "U+110000", b"\xf4\x90\x80\x80"), ("far-beyond", "U+140000", b"\xf5\x80\x80\x80"),
-        ("five-bytes", "a sequence of five bytes", b"\xf8\x88\x80\x80\x80"),
-        ("fe", "the byte FE", b"a\xfe"), ("ff", "the byte FF", b"a\xff"),
-        ("cut-2", "a sequence cut before its second byte", b"a\xc3"),
-        ("cut-3", "a sequence cut before its third byte", b"a\xe9\xa3"),
-        ("cut-4", "a sequence cut before its fourth byte", b"a\xf0\x9f\x8c"),
-        ("broken", "a letter inside a sequence", b"\xe9\xa3a"),
-        ("broken-4", "a letter behind a first byte", b"\xf0a\x8c\xb3")):
+    ("continuation", "a continuation byte alone", b"\x80"),
+    ("latin-1", "Latin-1", b"B\xf6e"),
+    ("overlong-2", "an overlong form of two bytes", b"\xc1\xbf"),
+    ("overlong-nul", "U+0000 in two bytes", b"\xc0\x80"),
+    ("overlong-3", "an overlong form of three bytes", b"\xe0\x9f\xbf"),
+    ("overlong-4", "an overlong form of four bytes", b"\xf0\x8f\xbf\xbf"),
+    ("surrogate-first", "the first surrogate", b"\xed\xa0\x80"),
+    ("surrogate-last", "the last surrogate", b"\xed\xbf\xbf"),
+    ("surrogates", "a surrogate pair", b"\xed\xa0\xbc\xed\xbc\xb3"),
+    ("beyond", "U+110000", b"\xf4\x90\x80\x80"),
+    ("far-beyond", "U+140000", b"\xf5\x80\x80\x80"),
+    ("five-bytes", "a sequence of five bytes", b"\xf8\x88\x80\x80\x80"),
+    ("fe", "the byte FE", b"a\xfe"),
+    ("ff", "the byte FF", b"a\xff"),
+    ("cut-2", "a sequence cut before its second byte", b"a\xc3"),
+    ("cut-3", "a sequence cut before its third byte", b"a\xe9\xa3"),
+    ("cut-4", "a sequence cut before its fourth byte", b"a\xf0\x9f\x8c"),
+    ("broken", "a letter inside a sequence", b"\xe9\xa3a"),
+    ("broken-4", "a letter behind a first byte", b"\xf0a\x8c\xb3"),
+):
     clips(f"name-{name}", f"a Name that is not UTF-8: {why}", CALM_ENTRY, clip_entry(4, 2, text))
-invalid("clips-name-cut-before-continuation", "BAD_CHUNK", "open",
-        "a Name that ends inside a sequence, which the Clip_Frames behind it would complete",
-        lambda: lone_clips(131, 2, clip_entry(3, 1, b"\xc3"), clip_entry(128, 1, "b")))
+invalid(
+    "clips-name-cut-before-continuation",
+    "BAD_CHUNK",
+    "open",
+    "a Name that ends inside a sequence, which the Clip_Frames behind it would complete",
+    lambda: lone_clips(131, 2, clip_entry(3, 1, b"\xc3"), clip_entry(128, 1, "b")),
+)
 for code in (0x00, 0x01, 0x0A, 0x1F, 0x7F):
-    clips(f"name-control-{code:02x}", f"U+{code:04X} in a Name",
-          CALM_ENTRY, clip_entry(4, 2, f"st{chr(code)}rm"))
+    clips(f"name-control-{code:02x}", f"U+{code:04X} in a Name", CALM_ENTRY, clip_entry(4, 2, f"st{chr(code)}rm"))
 for what, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
-    clips(f"seam-{what}", f"the last of Seam_Errors is {value}",
-          CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
+    clips(
+        f"seam-{what}", f"the last of Seam_Errors is {value}", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value))
+    )
 clips("seams-missing", "a Loop without Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", flags=1))
 clips("seams-cut", "ends inside Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0, 1.0))[:-1])
 clips("seams-less", "Seam_Errors of two levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0)))
 clips("seams-more", "Seam_Errors of four levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0,) * 4))
-clips("seams-of-none", "Seam_Errors of a clip that is no loop",
-      CALM_ENTRY, clip_entry(4, 2, "storm", (0.0,) * 3, flags=0))
-invalid("clips-seams-of-stored-levels", "BAD_CHUNK", "open",
-        "a shortened file with Seam_Errors of its level 0 alone",
-        lambda: two_clips(clips=(CALM, loop(STORM, 1.0))).upto(0))
-invalid("clips-seam-not-stored-nan", "BAD_CHUNK", "open",
-        "a shortened file whose Seam_Errors of a level not stored is NaN",
-        lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, NAN))).upto(0))
+clips(
+    "seams-of-none", "Seam_Errors of a clip that is no loop", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0,) * 3, flags=0)
+)
+invalid(
+    "clips-seams-of-stored-levels",
+    "BAD_CHUNK",
+    "open",
+    "a shortened file with Seam_Errors of its level 0 alone",
+    lambda: two_clips(clips=(CALM, loop(STORM, 1.0))).upto(0),
+)
+invalid(
+    "clips-seam-not-stored-nan",
+    "BAD_CHUNK",
+    "open",
+    "a shortened file whose Seam_Errors of a level not stored is NaN",
+    lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, NAN))).upto(0),
+)
 
 table("twice-clips", "BAD_CHUNK_TABLE", "CLIPS twice", lambda: two_clips().add(Entry(rd.CLIPS, CALM_ENTRY)))
-table("level-of-clips", "BAD_CHUNK_TABLE", "CLIPS with Level 0",
-      lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), level=0)))
-table("segment-of-clips", "BAD_CHUNK_TABLE", "CLIPS with Segment 1",
-      lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), segment=1)))
-table("order-clips", "BAD_CHUNK_TABLE", "METADATA behind CLIPS",
-      lambda: inserted(3, Entry(rd.CLIPS, clip_entry(4, 2)), Entry(rd.METADATA, b"\0{}")))
-table("order-clips-motion", "BAD_CHUNK_TABLE", "CLIPS behind the first motion chunk",
-      lambda: inserted(4, Entry(rd.CLIPS, clip_entry(4, 2))))
+table(
+    "level-of-clips",
+    "BAD_CHUNK_TABLE",
+    "CLIPS with Level 0",
+    lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), level=0)),
+)
+table(
+    "segment-of-clips",
+    "BAD_CHUNK_TABLE",
+    "CLIPS with Segment 1",
+    lambda: fork().add(Entry(rd.CLIPS, clip_entry(4, 2), segment=1)),
+)
+table(
+    "order-clips",
+    "BAD_CHUNK_TABLE",
+    "METADATA behind CLIPS",
+    lambda: inserted(3, Entry(rd.CLIPS, clip_entry(4, 2)), Entry(rd.METADATA, b"\0{}")),
+)
+table(
+    "order-clips-motion",
+    "BAD_CHUNK_TABLE",
+    "CLIPS behind the first motion chunk",
+    lambda: inserted(4, Entry(rd.CLIPS, clip_entry(4, 2))),
+)
 
-invalid("clips-damaged", "BAD_CHECKSUM", "open", "a bit of CLIPS is flipped",
-        lambda: flipped(two_clips().file(), end_of(two_clips(), rd.CLIPS) - 1))
-invalid("clips-cut", "TRUNCATED", "open", "the file ends inside CLIPS",
-        lambda: two_clips().file()[:end_of(two_clips(), rd.CLIPS) - 1])
-invalid("clips-cut-in-motion", "TRUNCATED", 0, "level 0 of the first clip alone has arrived",
-        lambda: two_clips().file()[:end_of(two_clips(), rd.AFFINES, 0, 0)])
-invalid("clips-before-hierarchy", "BAD_CHUNK", "open",
-        "CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first",
-        lambda: two_clips().change(rd.CLIPS, content=CALM_ENTRY).change(rd.HIERARCHY, checksum=0))
-invalid("clips-missing-before-hierarchy", "BAD_CHUNK_TABLE", "open",
-        "CLIPS is missing and HIERARCHY is damaged: CLIPS comes first",
-        lambda: two_clips().without(rd.CLIPS).change(rd.HIERARCHY, checksum=0))
-invalid("clips-damaged-before-hierarchy", "BAD_CHECKSUM", "open",
-        "CLIPS is damaged and HIERARCHY is missing: CLIPS comes first",
-        lambda: two_clips().without(rd.HIERARCHY).change(rd.CLIPS, checksum=0))
-invalid("clips-before-levels", "BAD_CHUNK", "open",
-        "Seam_Errors of the three levels of the hierarchy, while Full_Level_Count says 5: CLIPS comes first",
-        lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5))
-invalid("clips-levels", "BAD_HEADER", "open",
-        "Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3",
-        lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5))
+invalid(
+    "clips-damaged",
+    "BAD_CHECKSUM",
+    "open",
+    "a bit of CLIPS is flipped",
+    lambda: flipped(two_clips().file(), end_of(two_clips(), rd.CLIPS) - 1),
+)
+invalid(
+    "clips-cut",
+    "TRUNCATED",
+    "open",
+    "the file ends inside CLIPS",
+    lambda: two_clips().file()[: end_of(two_clips(), rd.CLIPS) - 1],
+)
+invalid(
+    "clips-cut-in-motion",
+    "TRUNCATED",
+    0,
+    "level 0 of the first clip alone has arrived",
+    lambda: two_clips().file()[: end_of(two_clips(), rd.AFFINES, 0, 0)],
+)
+invalid(
+    "clips-before-hierarchy",
+    "BAD_CHUNK",
+    "open",
+    "CLIPS is not valid and HIERARCHY is damaged: CLIPS comes first",
+    lambda: two_clips().change(rd.CLIPS, content=CALM_ENTRY).change(rd.HIERARCHY, checksum=0),
+)
+invalid(
+    "clips-missing-before-hierarchy",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "CLIPS is missing and HIERARCHY is damaged: CLIPS comes first",
+    lambda: two_clips().without(rd.CLIPS).change(rd.HIERARCHY, checksum=0),
+)
+invalid(
+    "clips-damaged-before-hierarchy",
+    "BAD_CHECKSUM",
+    "open",
+    "CLIPS is damaged and HIERARCHY is missing: CLIPS comes first",
+    lambda: two_clips().without(rd.HIERARCHY).change(rd.CLIPS, checksum=0),
+)
+invalid(
+    "clips-before-levels",
+    "BAD_CHUNK",
+    "open",
+    "Seam_Errors of the three levels of the hierarchy, while Full_Level_Count says 5: CLIPS comes first",
+    lambda: two_clips(clips=(CALM, loop(STORM, 1.0, 1.0, 1.0))).with_header(full_level_count=5),
+)
+invalid(
+    "clips-levels",
+    "BAD_HEADER",
+    "open",
+    "Full_Level_Count 5, and as many Seam_Errors; the hierarchy has 3",
+    lambda: two_clips(clips=(CALM, loop(STORM, *[1.0] * 5))).with_header(full_level_count=5),
+)
 UNEVEN = clip_entry(256, 1, "long"), clip_entry(2, 2, "short")
-invalid("clips-memory", "LIMIT_EXCEEDED", "open",
-        "2^18 vertices and a segment of 256 frames, though the mean is 86",
-        lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18))
-invalid("clips-before-memory", "BAD_CHECKSUM", "open",
-        "CLIPS is damaged, and its longest segment takes too much memory",
-        lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(rd.CLIPS, checksum=0))
-invalid("clips-memory-of-mean", "LIMIT_EXCEEDED", "open",
-        "2^22 vertices are too many, before CLIPS is missed",
-        lambda: lone(frames=2, segments=2).draft().with_header(vertex_count=1 << 22, clip_count=2))
+invalid(
+    "clips-memory",
+    "LIMIT_EXCEEDED",
+    "open",
+    "2^18 vertices and a segment of 256 frames, though the mean is 86",
+    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18),
+)
+invalid(
+    "clips-before-memory",
+    "BAD_CHECKSUM",
+    "open",
+    "CLIPS is damaged, and its longest segment takes too much memory",
+    lambda: lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(rd.CLIPS, checksum=0),
+)
+invalid(
+    "clips-memory-of-mean",
+    "LIMIT_EXCEEDED",
+    "open",
+    "2^22 vertices are too many, before CLIPS is missed",
+    lambda: lone(frames=2, segments=2).draft().with_header(vertex_count=1 << 22, clip_count=2),
+)
 
 
 def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
@@ -1256,36 +2230,56 @@ def clip_times(name: str, reason: str, make: Callable[[], bytes]) -> None:
 
 STEADY = (0.0, 0.25)
 clip_times("of-one-clip", "First and Step of one clip of two", lambda: steady_times(STEADY))
-clip_times("of-three-clips", "First and Step of three clips where two are",
-           lambda: steady_times(STEADY, STEADY, STEADY))
-clip_times("without-last-step", "First of the second clip without its Step",
-           lambda: steady_times(STEADY, STEADY)[:-8])
-invalid("time-of-two-clips", "BAD_CHUNK", "open", "First and Step of two clips where one is",
-        lambda: lone().draft().change(rd.TIME, content=steady_times(STEADY, STEADY)))
+clip_times(
+    "of-three-clips", "First and Step of three clips where two are", lambda: steady_times(STEADY, STEADY, STEADY)
+)
+clip_times("without-last-step", "First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
+invalid(
+    "time-of-two-clips",
+    "BAD_CHUNK",
+    "open",
+    "First and Step of two clips where one is",
+    lambda: lone().draft().change(rd.TIME, content=steady_times(STEADY, STEADY)),
+)
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    clip_times(f"second-step-{what}", f"Step of the second clip is {value}",
-               lambda value=value: steady_times(STEADY, (0.0, value)))
-    clip_times(f"second-rate-{what}", f"Step of the second clip, by Method 1, is {value}",
-               lambda value=value: steady_times(STEADY, (0.0, value), method=1))
+    clip_times(
+        f"second-step-{what}",
+        f"Step of the second clip is {value}",
+        lambda value=value: steady_times(STEADY, (0.0, value)),
+    )
+    clip_times(
+        f"second-rate-{what}",
+        f"Step of the second clip, by Method 1, is {value}",
+        lambda value=value: steady_times(STEADY, (0.0, value), method=1),
+    )
 clip_times("second-first-nan", "First of the second clip is NaN", lambda: steady_times(STEADY, (NAN, 1.0)))
-clip_times("second-stands-still", "Step of the second clip vanishes beside its First",
-           lambda: steady_times(STEADY, (1e30, 1.0)))
-clip_times("first-stands-still", "Step of the first clip vanishes beside its First",
-           lambda: steady_times((1e30, 1.0), STEADY))
-clip_times("second-overflows", "times of the second clip beyond binary64",
-           lambda: steady_times(STEADY, (0.0, HIGHEST)))
-clip_times("uneven-second-equal", "a time twice in the second clip",
-           lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0))
-clip_times("uneven-first-descends", "a time of the first clip before the one before",
-           lambda: uneven_time(0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0))
-clip_times("uneven-more", "a time more than there are frames",
-           lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9))
+clip_times(
+    "second-stands-still",
+    "Step of the second clip vanishes beside its First",
+    lambda: steady_times(STEADY, (1e30, 1.0)),
+)
+clip_times(
+    "first-stands-still", "Step of the first clip vanishes beside its First", lambda: steady_times((1e30, 1.0), STEADY)
+)
+clip_times("second-overflows", "times of the second clip beyond binary64", lambda: steady_times(STEADY, (0.0, HIGHEST)))
+clip_times(
+    "uneven-second-equal", "a time twice in the second clip", lambda: uneven_time(0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 2.0)
+)
+clip_times(
+    "uneven-first-descends",
+    "a time of the first clip before the one before",
+    lambda: uneven_time(0.0, 2.0, 1.0, 3.0, 4.0, 5.0, 6.0),
+)
+clip_times(
+    "uneven-more", "a time more than there are frames", lambda: uneven_time(0.0, 1.5, 2.0, 0.0, 1.0, 2.0, 3.0, 1e-9)
+)
 
 # ---- invalid: motion ---------------------------------------------------------------------------------------
 
 
-def motion(name: str, kind: int, level: int, reason: str, content: bytes | Callable[[], bytes],
-           segment: int = 0) -> None:
+def motion(
+    name: str, kind: int, level: int, reason: str, content: bytes | Callable[[], bytes], segment: int = 0
+) -> None:
     def make() -> Draft:
         return fork().change(kind, level, segment, content=content() if callable(content) else content)
 
@@ -1310,27 +2304,68 @@ motion("bits-7", rd.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]],
 motion("bits-17", rd.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
 motion("rank-without-basis", rd.STEMS, 1, "Basis_Rank 1 though there is no basis", stems(0.5, 0, 0, 1))
 motion("rank-0", rd.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
-motion("rank-more-than-frames", rd.STEMS, 1, "Basis_Rank 3 in a segment of two frames",
-       basis(3, 8, basis_stream([[0, 0]] * 3, 8)))
-motion("basis-length-missing", rd.STEMS, 1, "the chunk ends inside Basis_Length",
-       lambda: stems_head(0.5, 0, 8, 1)[:11])
-motion("basis-length-more", rd.STEMS, 1, "Basis_Length is more than the chunk holds",
-       lambda: struct.pack("<fBBHI", 0.5, 0, 8, 1, 100) + basis_stream([[1, 2]], 8))
-motion("basis-beyond-1", rd.STEMS, 1, "an entry of a learned basis of 8 bits is 129",
-       basis(1, 8, basis_stream([[128, 129]], 8)))
-motion("basis-below-1", rd.STEMS, 1, "an entry of a learned basis of 8 bits is -129",
-       basis(1, 8, basis_stream([[-129, 0]], 8)))
-motion("basis-zero-behind", rd.STEMS, 1, "a zero byte behind the stream of a basis",
-       basis(1, 8, basis_stream([[1, 2]], 8) + b"\0"))
-motion("frequencies", rd.STEMS, 1, "a row codes three frequencies of two", lambda: stems_head() + write(
-    rd.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1))
-motion("frequencies-of-basis", rd.STEMS, 1, "a row codes two frequencies of a learned basis of rank 1",
-       lambda: basis(1, 8, basis_stream([[1, 2]], 8))() + write(
-           rd.decode_stems, [2], forked_plan(), stems_motion(basis(1, 8, basis_stream([[1, 2]], 8))(), 2), 1))
-motion("zero-behind", rd.STEMS, 1, "a zero byte behind the stream",
-       lambda: fork().content(rd.STEMS, 1, 0) + b"\0")
-motion("bytes-behind", rd.STEMS, 2, "bytes behind the stream of the second segment",
-       lambda: fork().content(rd.STEMS, 2, 1) + b"\1" * 12, 1)
+motion(
+    "rank-more-than-frames",
+    rd.STEMS,
+    1,
+    "Basis_Rank 3 in a segment of two frames",
+    basis(3, 8, basis_stream([[0, 0]] * 3, 8)),
+)
+motion("basis-length-missing", rd.STEMS, 1, "the chunk ends inside Basis_Length", lambda: stems_head(0.5, 0, 8, 1)[:11])
+motion(
+    "basis-length-more",
+    rd.STEMS,
+    1,
+    "Basis_Length is more than the chunk holds",
+    lambda: struct.pack("<fBBHI", 0.5, 0, 8, 1, 100) + basis_stream([[1, 2]], 8),
+)
+motion(
+    "basis-beyond-1",
+    rd.STEMS,
+    1,
+    "an entry of a learned basis of 8 bits is 129",
+    basis(1, 8, basis_stream([[128, 129]], 8)),
+)
+motion(
+    "basis-below-1",
+    rd.STEMS,
+    1,
+    "an entry of a learned basis of 8 bits is -129",
+    basis(1, 8, basis_stream([[-129, 0]], 8)),
+)
+motion(
+    "basis-zero-behind",
+    rd.STEMS,
+    1,
+    "a zero byte behind the stream of a basis",
+    basis(1, 8, basis_stream([[1, 2]], 8) + b"\0"),
+)
+motion(
+    "frequencies",
+    rd.STEMS,
+    1,
+    "a row codes three frequencies of two",
+    lambda: stems_head() + write(rd.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1),
+)
+motion(
+    "frequencies-of-basis",
+    rd.STEMS,
+    1,
+    "a row codes two frequencies of a learned basis of rank 1",
+    lambda: (
+        basis(1, 8, basis_stream([[1, 2]], 8))()
+        + write(rd.decode_stems, [2], forked_plan(), stems_motion(basis(1, 8, basis_stream([[1, 2]], 8))(), 2), 1)
+    ),
+)
+motion("zero-behind", rd.STEMS, 1, "a zero byte behind the stream", lambda: fork().content(rd.STEMS, 1, 0) + b"\0")
+motion(
+    "bytes-behind",
+    rd.STEMS,
+    2,
+    "bytes behind the stream of the second segment",
+    lambda: fork().content(rd.STEMS, 2, 1) + b"\1" * 12,
+    1,
+)
 
 
 def forked_plan() -> rd.Plan:
@@ -1352,13 +2387,21 @@ def affines(*script) -> Callable[[], bytes]:
 motion("step-beyond", rd.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
 motion("step-below", rd.AFFINES, 0, "the step of a map is 2^-100.5", affines(-201))
 motion("frequencies", rd.AFFINES, 0, "a row codes three frequencies of two frames", affines(0, 3))
-motion("zero-behind", rd.AFFINES, 0, "a zero byte behind the stream",
-       lambda: fork().content(rd.AFFINES, 0, 1) + b"\0", 1)
-motion("bytes-behind", rd.AFFINES, 0, "bytes behind the stream",
-       lambda: fork().content(rd.AFFINES, 0, 0) + b"\1" * 12)
-invalid("affines-change", "BAD_CHUNK", 0, "a step changes by more than 400", lambda: Plant(
-    [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)], points=[[0.0] * 3] * 6,
-    scripts={(rd.AFFINES, 0): [200, 0, -401]}))
+motion(
+    "zero-behind", rd.AFFINES, 0, "a zero byte behind the stream", lambda: fork().content(rd.AFFINES, 0, 1) + b"\0", 1
+)
+motion("bytes-behind", rd.AFFINES, 0, "bytes behind the stream", lambda: fork().content(rd.AFFINES, 0, 0) + b"\1" * 12)
+invalid(
+    "affines-change",
+    "BAD_CHUNK",
+    0,
+    "a step changes by more than 400",
+    lambda: Plant(
+        [Stem(-1, 2), Stem(0, 1, 1), Stem(-1, 2), Stem(2, 1, 1)],
+        points=[[0.0] * 3] * 6,
+        scripts={(rd.AFFINES, 0): [200, 0, -401]},
+    ),
+)
 
 
 def shapes(*script) -> Callable[[], bytes]:
@@ -1366,38 +2409,44 @@ def shapes(*script) -> Callable[[], bytes]:
 
 
 motion("too-many", rd.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))
-motion("too-many-of-base", rd.SHAPES, 1, "a piece whose base level has two modes has seven shapes there",
-       shapes(0, 7))
+motion("too-many-of-base", rd.SHAPES, 1, "a piece whose base level has two modes has seven shapes there", shapes(0, 7))
 motion("all-zero", rd.SHAPES, 1, "a shape is all 0", shapes(1, *row((0, 0, 0))))
 motion("empty-row", rd.SHAPES, 1, "a shape whose row is empty", shapes(1, 0))
 motion("modes", rd.SHAPES, 1, "a shape has numbers for four modes of three", shapes(1, 4))
-motion("zero-behind", rd.SHAPES, 1, "a zero byte behind the stream",
-       lambda: fork().content(rd.SHAPES, 1) + b"\0")
-motion("bytes-behind", rd.SHAPES, 1, "bytes behind the stream",
-       lambda: fork().content(rd.SHAPES, 1) + b"\1" * 12)
-invalid("shapes-too-many-at-last", "BAD_CHUNK", 1, "a level adds more shapes than the other modes have axes",
-        lambda: Plant(
-    [Stem(-1, 3)],
-    scripts={(rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rd.SHAPES, 1, 0): [4]}))
+motion("zero-behind", rd.SHAPES, 1, "a zero byte behind the stream", lambda: fork().content(rd.SHAPES, 1) + b"\0")
+motion("bytes-behind", rd.SHAPES, 1, "bytes behind the stream", lambda: fork().content(rd.SHAPES, 1) + b"\1" * 12)
+invalid(
+    "shapes-too-many-at-last",
+    "BAD_CHUNK",
+    1,
+    "a level adds more shapes than the other modes have axes",
+    lambda: Plant(
+        [Stem(-1, 3)],
+        scripts={(rd.SHAPES, 0, 0): [6, *(n for i in range(6) for n in row((1, i, 0)))], (rd.SHAPES, 1, 0): [4]},
+    ),
+)
 
 
 def lossless(first: bytes = b"") -> Draft:
     """An additional last level with empty streams."""
-    return fork().with_header(level_count=4, full_level_count=4).add(
-        Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
+    return (
+        fork()
+        .with_header(level_count=4, full_level_count=4)
+        .add(Entry(rd.EXACT, first, 3, 0), Entry(rd.EXACT, b"", 3, 1))
+    )
 
 
-table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT",
-      lambda: lossless().without(rd.EXACT, 3, 1))
-table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"",
-      2, 0)))
-table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2",
-      lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
-table("exact-with-corrections", "BAD_CHUNK_TABLE", "CORRECTIONS at level h + 2",
-      lambda: lossless().add(Entry(rd.CORRECTIONS, b"", 3, 0)))
+table("exact-missing", "BAD_CHUNK_TABLE", "a segment lacks its EXACT", lambda: lossless().without(rd.EXACT, 3, 1))
+table("exact-too-early", "BAD_CHUNK_TABLE", "EXACT at level h + 1", lambda: fork().add(Entry(rd.EXACT, b"", 2, 0)))
+table("exact-with-stems", "BAD_CHUNK_TABLE", "STEMS at level h + 2", lambda: lossless().add(Entry(rd.STEMS, b"", 3, 0)))
+table(
+    "exact-with-corrections",
+    "BAD_CHUNK_TABLE",
+    "CORRECTIONS at level h + 2",
+    lambda: lossless().add(Entry(rd.CORRECTIONS, b"", 3, 0)),
+)
 valid("exact-empty", "EXACT without bytes: differences of 32 bits, all of them ones", lossless)
-invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT",
-        lambda: lossless(b"\1" * 400))
+invalid("exact-bytes-behind", "BAD_CHUNK", 3, "bytes behind the stream of EXACT", lambda: lossless(b"\1" * 400))
 
 
 def corrections(step: float) -> Callable[[], bytes]:
@@ -1408,10 +2457,21 @@ motion("empty", rd.CORRECTIONS, 2, "no bytes", b"")
 motion("short", rd.CORRECTIONS, 2, "3 bytes", bytes(3))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     motion(f"step-{what}", rd.CORRECTIONS, 2, f"Correction_Step is {value}", corrections(value))
-motion("zero-behind", rd.CORRECTIONS, 2, "a zero byte behind the stream",
-       lambda: fork().content(rd.CORRECTIONS, 2, 0) + b"\0")
-motion("bytes-behind", rd.CORRECTIONS, 2, "bytes behind the stream",
-       lambda: fork().content(rd.CORRECTIONS, 2, 1) + b"\1" * 12, 1)
+motion(
+    "zero-behind",
+    rd.CORRECTIONS,
+    2,
+    "a zero byte behind the stream",
+    lambda: fork().content(rd.CORRECTIONS, 2, 0) + b"\0",
+)
+motion(
+    "bytes-behind",
+    rd.CORRECTIONS,
+    2,
+    "bytes behind the stream",
+    lambda: fork().content(rd.CORRECTIONS, 2, 1) + b"\1" * 12,
+    1,
+)
 
 # ---- invalid: static data ----------------------------------------------------------------------------------
 
@@ -1421,41 +2481,60 @@ def static(name: str, reason: str, make: Draft | Callable[[], Draft], error: str
 
 
 for name, why, text in (
-        ("empty-text", "no text", b""), ("array", "an array, not an object", b"[1]"),
-        ("number", "a number", b"1"),
-        ("cut", "an object that does not end", b'{"a": 1'), ("two", "two objects", b"{} {}"),
-        ("zero-behind", "a zero byte behind it", b"{}\0"),
-        ("comma", "a comma behind the last member", b'{"a": 1,}'), ("quotes", "single quotes", b"{'a': 1}"),
-        ("comment", "a comment", b'{"a": 1 /* metre */}'), ("nan", "NaN is no number", b'{"a": NaN}'),
-        ("infinity", "Infinity is no number", b'{"a": [1, -Infinity]}'),
-        ("overflow", "a number that rounds to infinity", b'{"a": {"b": 1.8e308}}'),
-        ("leading-zero", "a number with a zero before it", b'{"a": 01}'),
-        ("plus", "a number with a plus sign", b'{"a": +1}'),
-        ("point", "a number that ends in its point", b'{"a": 1.}'),
-        ("hex", "a hexadecimal number", b'{"a": 0x1}'),
-        ("twice", "two members of the same name", b'{"a": 1, "a": 1}'),
-        ("twice-escaped", "two members of the same name, one escaped", b'{"a": 1, "\\u0061": 2}'),
-        ("twice-inside", "two members of the same name, further inside", b'{"a": [{"b": {}, "b": {}}]}'),
-        ("surrogate", "half of a surrogate pair", b'{"a": "\\ud83c"}'),
-        ("surrogate-name", "a name that is half of a surrogate pair", b'{"\\udf33": 1}'),
-        ("surrogates-reversed", "a surrogate pair in the wrong order", b'{"a": "\\udf33\\ud83c"}'),
-        ("control", "a line break in a string", b'{"a": "b\nc"}'),
-        ("escape", "an escape that JSON does not have", b'{"a": "\\x41"}'),
-        ("latin-1", "not UTF-8", '{"a": "\u00e9"}'.encode("latin-1")),
-        ("utf-16", "UTF-16", '{"a": 1}'.encode("utf-16-le")),
-        ("surrogate-bytes", "a surrogate in UTF-8", b'{"a": "\xed\xa0\xbc"}'),
-        ("overlong", "an overlong form in UTF-8", b'{"a": "\xc1\x81"}'),
-        ("byte-order-mark", "a byte order mark", b"\xef\xbb\xbf{}"),
-        ("white-space", "white space that JSON does not have", b"\x0b{}")):
+    ("empty-text", "no text", b""),
+    ("array", "an array, not an object", b"[1]"),
+    ("number", "a number", b"1"),
+    ("cut", "an object that does not end", b'{"a": 1'),
+    ("two", "two objects", b"{} {}"),
+    ("zero-behind", "a zero byte behind it", b"{}\0"),
+    ("comma", "a comma behind the last member", b'{"a": 1,}'),
+    ("quotes", "single quotes", b"{'a': 1}"),
+    ("comment", "a comment", b'{"a": 1 /* metre */}'),
+    ("nan", "NaN is no number", b'{"a": NaN}'),
+    ("infinity", "Infinity is no number", b'{"a": [1, -Infinity]}'),
+    ("overflow", "a number that rounds to infinity", b'{"a": {"b": 1.8e308}}'),
+    ("leading-zero", "a number with a zero before it", b'{"a": 01}'),
+    ("plus", "a number with a plus sign", b'{"a": +1}'),
+    ("point", "a number that ends in its point", b'{"a": 1.}'),
+    ("hex", "a hexadecimal number", b'{"a": 0x1}'),
+    ("twice", "two members of the same name", b'{"a": 1, "a": 1}'),
+    ("twice-escaped", "two members of the same name, one escaped", b'{"a": 1, "\\u0061": 2}'),
+    ("twice-inside", "two members of the same name, further inside", b'{"a": [{"b": {}, "b": {}}]}'),
+    ("surrogate", "half of a surrogate pair", b'{"a": "\\ud83c"}'),
+    ("surrogate-name", "a name that is half of a surrogate pair", b'{"\\udf33": 1}'),
+    ("surrogates-reversed", "a surrogate pair in the wrong order", b'{"a": "\\udf33\\ud83c"}'),
+    ("control", "a line break in a string", b'{"a": "b\nc"}'),
+    ("escape", "an escape that JSON does not have", b'{"a": "\\x41"}'),
+    ("latin-1", "not UTF-8", '{"a": "\u00e9"}'.encode("latin-1")),
+    ("utf-16", "UTF-16", '{"a": 1}'.encode("utf-16-le")),
+    ("surrogate-bytes", "a surrogate in UTF-8", b'{"a": "\xed\xa0\xbc"}'),
+    ("overlong", "an overlong form in UTF-8", b'{"a": "\xc1\x81"}'),
+    ("byte-order-mark", "a byte order mark", b"\xef\xbb\xbf{}"),
+    ("white-space", "white space that JSON does not have", b"\x0b{}"),
+):
     static(f"metadata-{name}", why, lambda text=text: metadata(text))
 static("metadata-empty", "no bytes", lambda: with_static((rd.METADATA, b"")))
 static("metadata-method-2", "Method 2", lambda: metadata("{}", 2))
-static("metadata-limit", "a text of 2^20 + 1 bytes in a small frame", lambda: metadata(frame(
-    b"{" + b" " * ((1 << 20) - 1) + b"}", checksum=None, blocks=raw_block(b"{", False) + b"".join(
-        run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 1]) + raw_block(b"}", True)), 1),
-        "LIMIT_EXCEEDED")
-static("metadata-zstd-size", "a frame that does not state its size", lambda: metadata(
-    frame(b"{}", stated=None, single_segment=False, checksum=None), 1))
+static(
+    "metadata-limit",
+    "a text of 2^20 + 1 bytes in a small frame",
+    lambda: metadata(
+        frame(
+            b"{" + b" " * ((1 << 20) - 1) + b"}",
+            checksum=None,
+            blocks=raw_block(b"{", False)
+            + b"".join(run_block(b" ", n, False) for n in [1 << 17] * 7 + [(1 << 17) - 1])
+            + raw_block(b"}", True),
+        ),
+        1,
+    ),
+    "LIMIT_EXCEEDED",
+)
+static(
+    "metadata-zstd-size",
+    "a frame that does not state its size",
+    lambda: metadata(frame(b"{}", stated=None, single_segment=False, checksum=None), 1),
+)
 static("metadata-zstd-empty", "a frame of no bytes", lambda: metadata(plain(b""), 1))
 static("metadata-zstd-none", "no zstd frame", lambda: metadata("{}", 1))
 static("metadata-zstd-text", "a frame whose text is no object", lambda: metadata(plain(b"[]"), 1))
@@ -1476,28 +2555,41 @@ static("faces-one-dimension", "faces of one dimension", faces(numbers(np.array([
 static("faces-three-dimensions", "faces of three dimensions", faces(numbers(np.zeros((1, 1, 3), "<i4"))))
 static("faces-floats", "faces of binary32 numbers", faces(numbers(np.zeros((1, 3), "<f4"))))
 static("faces-booleans", "faces of booleans", faces(numbers(np.zeros((1, 3), "|u1"), "|b1")))
-static("faces-records", "faces of records",
-       faces(array_chunk({"dtype": [["a", "<i4"]], "shape": [1, 1]}, plain(bytes(4)))))
+static(
+    "faces-records", "faces of records", faces(array_chunk({"dtype": [["a", "<i4"]], "shape": [1, 1]}, plain(bytes(4))))
+)
 static("faces-beyond", "a face of a vertex behind the last", faces(numbers(np.array([[0, 1, 5]], "<u4"))))
 static("faces-negative", "a face of vertex -1", faces(numbers(np.array([[0, 1, -1]], "<i2"))))
 static("edges-three-columns", "edges of three columns", edges(numbers(np.zeros((1, 3), "<i4"))))
-static("edges-beyond", "an edge to a vertex behind the last, in big-endian numbers",
-       edges(numbers(np.array([[0, 5]], ">u2"))))
+static(
+    "edges-beyond",
+    "an edge to a vertex behind the last, in big-endian numbers",
+    edges(numbers(np.array([[0, 5]], ">u2"))),
+)
 static("edges-negative", "an edge to vertex -1", edges(numbers(np.array([[0, -1]], "|i1"))))
-static("edges-none", "EDGES with neither array nor \"derived\"", edges(array_chunk({"name": "edges"})))
-for name, type_ in (("float", "<f8"), ("list", ["<i4"]), ("order", "i4"), ("byte-order-of-a-byte", "<i1"),
-                    ("null", None), ("number", 4)):
-    static(f"edges-derived-{name}", f"\"derived\" is {json.dumps(type_)}",
-           edges(array_chunk({"derived": type_})))
-static("edges-derived-small", "130 vertices do not fit |i1",
-       lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(
-    Entry(rd.EDGES, array_chunk({"derived": "|i1"}))))
-static("edges-derived-with-data", "data behind \"derived\"",
-       edges(array_chunk({"derived": "<i4"}, plain(bytes(8)))))
+static("edges-none", 'EDGES with neither array nor "derived"', edges(array_chunk({"name": "edges"})))
+for name, type_ in (
+    ("float", "<f8"),
+    ("list", ["<i4"]),
+    ("order", "i4"),
+    ("byte-order-of-a-byte", "<i1"),
+    ("null", None),
+    ("number", 4),
+):
+    static(f"edges-derived-{name}", f'"derived" is {json.dumps(type_)}', edges(array_chunk({"derived": type_})))
+static(
+    "edges-derived-small",
+    "130 vertices do not fit |i1",
+    lambda: (
+        moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1)
+        .draft()
+        .add(Entry(rd.EDGES, array_chunk({"derived": "|i1"})))
+    ),
+)
+static("edges-derived-with-data", 'data behind "derived"', edges(array_chunk({"derived": "<i4"}, plain(bytes(8)))))
 
 
-def attribute(name: str, reason: str, head: dict | bytes, body: bytes = b"",
-              error: str = "BAD_CHUNK") -> None:
+def attribute(name: str, reason: str, head: dict | bytes, body: bytes = b"", error: str = "BAD_CHUNK") -> None:
     if isinstance(head, dict):
         head = {"name": "a"} | head
     static(f"attribute-{name}", reason, lambda: attributes(array_chunk(head, body)), error)
@@ -1507,70 +2599,106 @@ FOUR = {"dtype": "<f4", "shape": [4]}
 static("attribute-short", "one byte", lambda: attributes(b"\0"))
 static("attribute-head-length", "Head_Length is more than the chunk holds", lambda: attributes(b"\xff\x00{}"))
 attribute("head-array", "Head is an array", b"[]")
-attribute("head-twice", "Head has a member twice", b'{"name":"a","dtype":"|u1","shape":[],"shape":[]}',
-          plain(b"a"))
+attribute("head-twice", "Head has a member twice", b'{"name":"a","dtype":"|u1","shape":[],"shape":[]}', plain(b"a"))
 attribute("no-array", "an attribute without an array", {})
-static("attribute-no-name", "an attribute without a name",
-       lambda: attributes(array_chunk(FOUR, plain(bytes(16)))))
+static("attribute-no-name", "an attribute without a name", lambda: attributes(array_chunk(FOUR, plain(bytes(16)))))
 attribute("name-empty", "an empty name", FOUR | {"name": ""}, plain(bytes(16)))
 attribute("name-number", "a name that is a number", FOUR | {"name": 5}, plain(bytes(16)))
-attribute("name-limit", "a name of 4097 bytes", FOUR | {"name": "n" * 4097}, plain(bytes(16)),
-          "LIMIT_EXCEEDED")
-static("attribute-name-bytes-limit", "a name of 2049 letters and 4098 bytes", lambda: attributes(array_chunk(
-    json.dumps(FOUR | {"name": "\u00e9" * 2049}, ensure_ascii=False).encode(), plain(bytes(16)))),
-    "LIMIT_EXCEEDED")
-static("attribute-twice", "two attributes of the same name",
-       lambda: attributes(element("|u1", b"1"), element("|u1", b"2")))
-static("attributes-257", "257 attributes", lambda: lone().draft().add(*(
-    Entry(rd.ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))), "LIMIT_EXCEEDED")
+attribute("name-limit", "a name of 4097 bytes", FOUR | {"name": "n" * 4097}, plain(bytes(16)), "LIMIT_EXCEEDED")
+static(
+    "attribute-name-bytes-limit",
+    "a name of 2049 letters and 4098 bytes",
+    lambda: attributes(
+        array_chunk(json.dumps(FOUR | {"name": "\u00e9" * 2049}, ensure_ascii=False).encode(), plain(bytes(16)))
+    ),
+    "LIMIT_EXCEEDED",
+)
+static(
+    "attribute-twice", "two attributes of the same name", lambda: attributes(element("|u1", b"1"), element("|u1", b"2"))
+)
+static(
+    "attributes-257",
+    "257 attributes",
+    lambda: lone().draft().add(*(Entry(rd.ATTRIBUTE, element("|u1", b"a", str(i))) for i in range(257))),
+    "LIMIT_EXCEEDED",
+)
 for name, why, type_ in (
-        ("object", "an object", "|O"), ("order", "no byte order", "f4"),
-        ("native", "the machine's byte order", "=f4"),
-        ("size", "a size that floats do not have", "<f16"), ("boolean", "a boolean with byte order", "<b1"),
-        ("date", "a date", "<M8[s]"),
-        ("space", "a space behind it", "<f4 "), ("line", "a line break behind it", "<f4\n"),
-        ("capital", "a capital letter", "<F4"),
-        ("text-order", "bytes of text with byte order", "<S4"),
-        ("characters-order", "characters without byte order", "|U1"),
-        ("digits", "eight digits", "|V00000001"), ("no-digits", "no digits", "|S"),
-        ("foreign-digits", "digits that are not ASCII", "|S\u0661"),
-        ("null", "null", None), ("number", "a number", 7), ("member", "an object", {"a": "b"}),
-        ("list-empty", "no fields", []),
-        ("field-string", "a list that is no list of fields", ["a", "<f4"]),
-        ("field-short", "a field that is a name alone", [["a"]]),
-        ("field-long", "a field of four", [["a", "<f4", [], []]]),
-        ("field-name", "a field whose name is a number", [[1, "<f4"]]),
-        ("field-shape", "a field whose Shape is a number", [["a", "<f4", 2]]),
-        ("field-shape-negative", "a field with size -1", [["a", "<f4", [-1]]]),
-        ("field-shape-vast", "a field with a size of 2^31 beside one of 0",
-         [["a", "<f4", [1 << 31, 0]], ["b", "|u1"]]),
-        ("field-twice", "two fields of the same name", [["a", "<f4"], ["a", "<f4"]]),
-        ("gap-number", "a gap that is no V", [["", "<f4"], ["a", "|u1"]]),
-        ("gap-shape", "a gap with a Shape", [["", "|V4", [2]], ["a", "|u1"]]),
-        ("field-no-characters", "a field of texts without characters", [["a", "|S0", [2]], ["b", "|u1"]]),
-        ("nested-17", "records nested 17 deep", [["x", NESTED_16]]),
-        ("nothing", "elements of no bytes", "|V0"),
-        ("fields-nothing", "records of no bytes", [["a", "<f4", [0]]]),
-        ("element-limit", "elements of 2^20 + 1 bytes", "|V1048577"),
-        ("record-limit", "records of 2^20 + 1 bytes", [["a", "|V1048576"], ["b", "|u1"]]),
-        ("characters-limit", "texts of 2^20 + 4 bytes", "<U262145")):
+    ("object", "an object", "|O"),
+    ("order", "no byte order", "f4"),
+    ("native", "the machine's byte order", "=f4"),
+    ("size", "a size that floats do not have", "<f16"),
+    ("boolean", "a boolean with byte order", "<b1"),
+    ("date", "a date", "<M8[s]"),
+    ("space", "a space behind it", "<f4 "),
+    ("line", "a line break behind it", "<f4\n"),
+    ("capital", "a capital letter", "<F4"),
+    ("text-order", "bytes of text with byte order", "<S4"),
+    ("characters-order", "characters without byte order", "|U1"),
+    ("digits", "eight digits", "|V00000001"),
+    ("no-digits", "no digits", "|S"),
+    ("foreign-digits", "digits that are not ASCII", "|S\u0661"),
+    ("null", "null", None),
+    ("number", "a number", 7),
+    ("member", "an object", {"a": "b"}),
+    ("list-empty", "no fields", []),
+    ("field-string", "a list that is no list of fields", ["a", "<f4"]),
+    ("field-short", "a field that is a name alone", [["a"]]),
+    ("field-long", "a field of four", [["a", "<f4", [], []]]),
+    ("field-name", "a field whose name is a number", [[1, "<f4"]]),
+    ("field-shape", "a field whose Shape is a number", [["a", "<f4", 2]]),
+    ("field-shape-negative", "a field with size -1", [["a", "<f4", [-1]]]),
+    ("field-shape-vast", "a field with a size of 2^31 beside one of 0", [["a", "<f4", [1 << 31, 0]], ["b", "|u1"]]),
+    ("field-twice", "two fields of the same name", [["a", "<f4"], ["a", "<f4"]]),
+    ("gap-number", "a gap that is no V", [["", "<f4"], ["a", "|u1"]]),
+    ("gap-shape", "a gap with a Shape", [["", "|V4", [2]], ["a", "|u1"]]),
+    ("field-no-characters", "a field of texts without characters", [["a", "|S0", [2]], ["b", "|u1"]]),
+    ("nested-17", "records nested 17 deep", [["x", NESTED_16]]),
+    ("nothing", "elements of no bytes", "|V0"),
+    ("fields-nothing", "records of no bytes", [["a", "<f4", [0]]]),
+    ("element-limit", "elements of 2^20 + 1 bytes", "|V1048577"),
+    ("record-limit", "records of 2^20 + 1 bytes", [["a", "|V1048576"], ["b", "|u1"]]),
+    ("characters-limit", "texts of 2^20 + 4 bytes", "<U262145"),
+):
     attribute(f"type-{name}", f"a Type that is none: {why}", {"dtype": type_, "shape": [4]}, plain(bytes(16)))
 for name, why, shape in (
-        ("none", "no Shape", ...), ("number", "a number", 4), ("negative", "a size of -4", [-4]),
-        ("float", "a size with a fraction", [4.0]),
-        ("boolean", "a size that is true", [True]), ("text", "a size in quotes", ["4"]),
-        ("33", "33 dimensions", [1] * 33), ("vast", "a size of 2^40", [1 << 40])):
+    ("none", "no Shape", ...),
+    ("number", "a number", 4),
+    ("negative", "a size of -4", [-4]),
+    ("float", "a size with a fraction", [4.0]),
+    ("boolean", "a size that is true", [True]),
+    ("text", "a size in quotes", ["4"]),
+    ("33", "33 dimensions", [1] * 33),
+    ("vast", "a size of 2^40", [1 << 40]),
+):
     members = {"dtype": "<f4"} if shape is ... else {"dtype": "<f4", "shape": shape}
     attribute(f"shape-{name}", f"a Shape that is none: {why}", members, plain(bytes(16)))
-attribute("shape-exponent", "a Shape whose size is written with an exponent",
-          b'{"name":"a","dtype":"<f4","shape":[4e0]}', plain(bytes(16)))
-attribute("decoded-limit", "an array of 2^28 + 4 bytes", {"dtype": "<f4", "shape": [(1 << 26) + 1]},
-          plain(bytes(16)), "LIMIT_EXCEEDED")
-attribute("decoded-limit-vast", "an array of 2^80 bytes", {"dtype": "<f4", "shape": [1 << 39, 1 << 39]},
-          plain(bytes(16)), "LIMIT_EXCEEDED")
-attribute("decoded-limit-of-none", "no elements, but 2^28 + 4 bytes with its size of 0 taken as 1",
-          {"dtype": "<f4", "shape": [0, (1 << 26) + 1]},
-          b"", "LIMIT_EXCEEDED")
+attribute(
+    "shape-exponent",
+    "a Shape whose size is written with an exponent",
+    b'{"name":"a","dtype":"<f4","shape":[4e0]}',
+    plain(bytes(16)),
+)
+attribute(
+    "decoded-limit",
+    "an array of 2^28 + 4 bytes",
+    {"dtype": "<f4", "shape": [(1 << 26) + 1]},
+    plain(bytes(16)),
+    "LIMIT_EXCEEDED",
+)
+attribute(
+    "decoded-limit-vast",
+    "an array of 2^80 bytes",
+    {"dtype": "<f4", "shape": [1 << 39, 1 << 39]},
+    plain(bytes(16)),
+    "LIMIT_EXCEEDED",
+)
+attribute(
+    "decoded-limit-of-none",
+    "no elements, but 2^28 + 4 bytes with its size of 0 taken as 1",
+    {"dtype": "<f4", "shape": [0, (1 << 26) + 1]},
+    b"",
+    "LIMIT_EXCEEDED",
+)
 attribute("data-of-none", "no elements, but data", {"dtype": "<f4", "shape": [0]}, plain(b""))
 attribute("data-without-type", "data without a Type", {}, plain(bytes(4)))
 attribute("no-data", "elements, but no data", FOUR)
@@ -1587,35 +2715,47 @@ zstd_frame("magic-alone", "a frame that ends behind its magic number", rd.ZSTD_M
 zstd_frame("cut", "a frame that ends in its block", plain(b"plant")[:-1])
 zstd_frame("shorter", "a frame of 4 bytes where 5 are", plain(b"plan"))
 zstd_frame("longer", "a frame of 6 bytes where 5 are", plain(b"plants"))
-zstd_frame("size-not-stated", "a frame that does not state its size",
-           frame(b"plant", stated=None, single_segment=False, checksum=None))
-zstd_frame("size-lies-less", "a frame that states 5 bytes and holds 6",
-           frame(b"plants", stated=5, checksum=None))
-zstd_frame("size-lies-more", "a frame that states 5 bytes and holds 4",
-           frame(b"plan", stated=5, checksum=None))
-zstd_frame("size-memory", "a frame of 13 bytes that states some 2^62",
-           bytes.fromhex("28b52ffde06c06060663636363"))
+zstd_frame(
+    "size-not-stated",
+    "a frame that does not state its size",
+    frame(b"plant", stated=None, single_segment=False, checksum=None),
+)
+zstd_frame("size-lies-less", "a frame that states 5 bytes and holds 6", frame(b"plants", stated=5, checksum=None))
+zstd_frame("size-lies-more", "a frame that states 5 bytes and holds 4", frame(b"plan", stated=5, checksum=None))
+zstd_frame("size-memory", "a frame of 13 bytes that states some 2^62", bytes.fromhex("28b52ffde06c06060663636363"))
 zstd_frame("byte-behind", "a byte behind the frame", plain(b"plant") + b"\0")
 zstd_frame("two-frames", "two frames that make the array together", plain(b"pl") + plain(b"ant"))
 zstd_frame("frame-behind", "an empty frame behind the frame", plain(b"plant") + plain(b""))
-zstd_frame("skippable-behind", "a skippable frame behind the frame",
-           plain(b"plant") + bytes.fromhex("502a4d1800000000"))
-zstd_frame("skippable-before", "a skippable frame before the frame",
-           bytes.fromhex("502a4d1800000000") + plain(b"plant"))
-zstd_frame("skippable-alone", "a skippable frame of the right size",
-           bytes.fromhex("502a4d1805000000") + b"plant")
+zstd_frame(
+    "skippable-behind", "a skippable frame behind the frame", plain(b"plant") + bytes.fromhex("502a4d1800000000")
+)
+zstd_frame(
+    "skippable-before", "a skippable frame before the frame", bytes.fromhex("502a4d1800000000") + plain(b"plant")
+)
+zstd_frame("skippable-alone", "a skippable frame of the right size", bytes.fromhex("502a4d1805000000") + b"plant")
 zstd_frame("checksum", "a Content_Checksum that does not match", frame(b"plant", checksum=0))
 zstd_frame("dictionary", "a frame that needs a dictionary", frame(b"plant", checksum=None, dictionary=7))
-zstd_frame("reserved-bit", "the reserved bit of the frame header is set",
-           frame(b"plant", checksum=None, reserved=1))
-zstd_frame("reserved-block", "a block of the reserved type",
-           frame(b"plant", checksum=None, blocks=struct.pack("<I", 5 << 3 | 3 << 1 | 1)[:3] + b"plant"))
-zstd_frame("bomb", "a frame that states 5 bytes and holds a megabyte",
-           frame(b"plant", checksum=None, blocks=zeros(1 << 20)))
-zstd_frame("window", "a window of 9 MiB for 5 bytes", frame(
-    b"plant", checksum=None, single_segment=False, window=13 << 3 | 1), "LIMIT_EXCEEDED")
-zstd_frame("window-largest", "the largest window there is", frame(
-    b"plant", checksum=None, single_segment=False, window=255), "LIMIT_EXCEEDED")
+zstd_frame("reserved-bit", "the reserved bit of the frame header is set", frame(b"plant", checksum=None, reserved=1))
+zstd_frame(
+    "reserved-block",
+    "a block of the reserved type",
+    frame(b"plant", checksum=None, blocks=struct.pack("<I", 5 << 3 | 3 << 1 | 1)[:3] + b"plant"),
+)
+zstd_frame(
+    "bomb", "a frame that states 5 bytes and holds a megabyte", frame(b"plant", checksum=None, blocks=zeros(1 << 20))
+)
+zstd_frame(
+    "window",
+    "a window of 9 MiB for 5 bytes",
+    frame(b"plant", checksum=None, single_segment=False, window=13 << 3 | 1),
+    "LIMIT_EXCEEDED",
+)
+zstd_frame(
+    "window-largest",
+    "the largest window there is",
+    frame(b"plant", checksum=None, single_segment=False, window=255),
+    "LIMIT_EXCEEDED",
+)
 
 
 # ---- making them -------------------------------------------------------------------------------------------
@@ -1644,8 +2784,7 @@ def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"
-    lines = [] if every or not listed.exists() else [line for line in listed.read_text("utf-8").splitlines()
-                                                    if line]
+    lines = [] if every or not listed.exists() else [line for line in listed.read_text("utf-8").splitlines() if line]
     existing = {line.split()[0] for line in lines if not line.startswith("#")}
     made = 0
     for vector in VECTORS:
@@ -1662,8 +2801,7 @@ def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m spec.make_vectors",
-                                     description="Makes missing vectors.")
+    parser = argparse.ArgumentParser(prog="python -m spec.make_vectors", description="Makes missing vectors.")
     parser.add_argument("--all", action="store_true", help="make all again")
     print(f"{make(parser.parse_args().all)} vectors made, {len(VECTORS)} in all")
     return 0

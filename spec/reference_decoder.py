@@ -101,11 +101,21 @@ HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES, CLIPS = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
 ATTRIBUTE = OPTIONAL | 32
-KINDS = {HIERARCHY: "HIERARCHY", REST: "REST", TIME: "TIME", METADATA: "METADATA", FACES: "FACES",
-         EDGES: "EDGES", CLIPS: "CLIPS",
-         STEMS: "STEMS", AFFINES: "AFFINES", CORRECTIONS: "CORRECTIONS", SHAPES: "SHAPES",
-         EXACT: "EXACT",
-         ATTRIBUTE: "ATTRIBUTE"}
+KINDS = {
+    HIERARCHY: "HIERARCHY",
+    REST: "REST",
+    TIME: "TIME",
+    METADATA: "METADATA",
+    FACES: "FACES",
+    EDGES: "EDGES",
+    CLIPS: "CLIPS",
+    STEMS: "STEMS",
+    AFFINES: "AFFINES",
+    CORRECTIONS: "CORRECTIONS",
+    SHAPES: "SHAPES",
+    EXACT: "EXACT",
+    ATTRIBUTE: "ATTRIBUTE",
+}
 
 
 @dataclass(frozen=True)
@@ -163,29 +173,49 @@ class Chunk:
 
 
 def read_header(data: bytes, limits: Limits) -> Header:
-    require(len(data) > 0 and data[:8] == MAGIC[:len(data)], "Magic is not that of a file in this format",
-            "NOT_AN_ATH_FILE")
+    require(
+        len(data) > 0 and data[:8] == MAGIC[: len(data)],
+        "Magic is not that of a file in this format",
+        "NOT_AN_ATH_FILE",
+    )
     if len(data) >= 12:
         version = u16(data, 8), u16(data, 10)
         require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
     require(len(data) >= HEADER_BYTES, "ends inside its header", "TRUNCATED")
-    header = Header(u32(data, 12), u64(data, 16), u32(data, 24), u32(data, 28), u32(data, 32), u32(data, 36),
-                    u32(data, 40), data[44], data[45], data[46], bool(data[47] & 1), f64(data, 48))
-    for name, count, most in (("Vertex_Count", header.vertex_count, limits.vertices),
-                              ("Branch_Count", header.branch_count, limits.branches),
-                              ("Frame_Count", header.frame_count, limits.frames),
-                              ("Segment_Count", header.segment_count, limits.frames),
-                              ("Chunk_Count", header.chunk_count, limits.chunks)):
+    header = Header(
+        u32(data, 12),
+        u64(data, 16),
+        u32(data, 24),
+        u32(data, 28),
+        u32(data, 32),
+        u32(data, 36),
+        u32(data, 40),
+        data[44],
+        data[45],
+        data[46],
+        bool(data[47] & 1),
+        f64(data, 48),
+    )
+    for name, count, most in (
+        ("Vertex_Count", header.vertex_count, limits.vertices),
+        ("Branch_Count", header.branch_count, limits.branches),
+        ("Frame_Count", header.frame_count, limits.frames),
+        ("Segment_Count", header.segment_count, limits.frames),
+        ("Chunk_Count", header.chunk_count, limits.chunks),
+    ):
         require(count > 0, f"{name} is 0", "BAD_HEADER")
         require(count <= most, f"{name} is {count}, more than {most}", "LIMIT_EXCEEDED")
-    for name, valid in (("Branch_Count", header.branch_count <= header.vertex_count),
-                        ("Segment_Count", header.segment_count <= header.frame_count),
-                        ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
-                        ("Full_Level_Count", 2 <= header.full_level_count <= MOST_LEVELS),
-                        ("Level_Count", 1 <= header.level_count <= header.full_level_count),
-                        ("Clip_Count", header.clip_count > 0), ("Flags", data[47] < 2),
-                        ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
-                        ("Reserved", u64(data, 56) == 0)):
+    for name, valid in (
+        ("Branch_Count", header.branch_count <= header.vertex_count),
+        ("Segment_Count", header.segment_count <= header.frame_count),
+        ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
+        ("Full_Level_Count", 2 <= header.full_level_count <= MOST_LEVELS),
+        ("Level_Count", 1 <= header.level_count <= header.full_level_count),
+        ("Clip_Count", header.clip_count > 0),
+        ("Flags", data[47] < 2),
+        ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
+        ("Reserved", u64(data, 56) == 0),
+    ):
         require(valid, f"{name} is out of range", "BAD_HEADER")
     return header
 
@@ -193,28 +223,30 @@ def read_header(data: bytes, limits: Limits) -> Header:
 def check_tables(data: bytes, header: Header, limits: Limits) -> None:
     require(header.chunks_at - HEADER_BYTES <= limits.table_bytes, "tables are too long", "LIMIT_EXCEEDED")
     require(len(data) >= header.chunks_at, "ends inside its tables", "TRUNCATED")
-    front = data[:12] + bytes(4) + data[16:header.chunks_at]
+    front = data[:12] + bytes(4) + data[16 : header.chunks_at]
     require(crc32c(front) == header.checksum, "header and tables are damaged", "BAD_CHECKSUM")
     for at in range(header.error_table_at, header.chunks_at, 4):
-        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length",
-                "BAD_CHUNK_TABLE")
+        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length", "BAD_CHUNK_TABLE")
 
 
 def read_chunk_table(data: bytes, header: Header, limits: Limits) -> list[Chunk]:
     chunks, offset = [], header.chunks_at
     for at in range(HEADER_BYTES, header.error_table_at, ENTRY_BYTES):
-        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12),
-                      offset)
+        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12), offset)
         check_kind(chunk.kind)
         require(chunk.length <= limits.chunk_bytes, f"{chunk} is too long", "LIMIT_EXCEEDED")
         level_fits = chunk.level < header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
         segment_fits = chunk.segment < (header.segment_count if chunk.is_motion else 1)
-        require(data[at + 2] == 0 and level_fits and segment_fits, f"{chunk}: its place does not exist",
-                "BAD_CHUNK_TABLE")
+        require(
+            data[at + 2] == 0 and level_fits and segment_fits, f"{chunk}: its place does not exist", "BAD_CHUNK_TABLE"
+        )
         if chunks:
             before = chunks[-1]
-            require(before.key < chunk.key or (before.key == chunk.key and chunk.repeatable),
-                    f"{chunk} may not follow {before}", "BAD_CHUNK_TABLE")
+            require(
+                before.key < chunk.key or (before.key == chunk.key and chunk.repeatable),
+                f"{chunk} may not follow {before}",
+                "BAD_CHUNK_TABLE",
+            )
         chunks.append(chunk)
         offset += chunk.length
     require(offset == header.file_length, "File_Length is not the end of the last chunk", "BAD_CHUNK_TABLE")
@@ -261,10 +293,10 @@ def read_clips(chunk: bytes, header: Header) -> list[Clip]:
         clips.append(clip)
     require(at == len(chunk), "CLIPS has bytes behind its last clip")
     require(len({clip.name for clip in clips}) == len(clips), "two clips have the same Name")
-    require(sum(clip.frames for clip in clips) == header.frame_count,
-            "Clip_Frames do not add up to Frame_Count")
-    require(sum(clip.segments for clip in clips) == header.segment_count,
-            "Clip_Segments do not add up to Segment_Count")
+    require(sum(clip.frames for clip in clips) == header.frame_count, "Clip_Frames do not add up to Frame_Count")
+    require(
+        sum(clip.segments for clip in clips) == header.segment_count, "Clip_Segments do not add up to Segment_Count"
+    )
     return clips
 
 
@@ -272,8 +304,7 @@ def read_clip(chunk: bytes, at: int, header: Header) -> tuple[Clip, int]:
     """One entry, and where the next one begins."""
     require(at + CLIP_BYTES <= len(chunk), "CLIPS ends inside a clip")
     frames, segments, flags, length = u32(chunk, at), u32(chunk, at + 4), chunk[at + 8], chunk[at + 9]
-    require(1 <= segments <= frames <= SEGMENT_FRAMES * segments,
-            "Clip_Frames or Clip_Segments is out of range")
+    require(1 <= segments <= frames <= SEGMENT_FRAMES * segments, "Clip_Frames or Clip_Segments is out of range")
     require(flags < 2, "Clip_Flags has reserved bits")
     require(length > 0 or header.clip_count == 1, "Name_Length is 0 in a file of several clips")
     name_at, seams_at = at + CLIP_BYTES, at + CLIP_BYTES + length
@@ -321,7 +352,7 @@ class RangeDecoder:
 
     def word(self) -> int:
         """Four bytes, big-endian; those behind the end are 0."""
-        four = self.stream[self.at:self.at + 4]
+        four = self.stream[self.at : self.at + 4]
         self.at += 4
         return int.from_bytes(four, "big") << 8 * (4 - len(four))
 
@@ -355,8 +386,7 @@ class RangeDecoder:
     def finish(self) -> None:
         """Everything is decoded: nothing may be left over, nor a byte that could have been left out."""
         require(not self.stream or self.stream[-1] != 0, "a stream ends in a zero byte")
-        require(self.at >= len(self.stream) and self.code < self.range,
-                "a stream is not used up where it should be")
+        require(self.at >= len(self.stream) and self.code < self.range, "a stream is not used up where it should be")
 
 
 # ---- numbers -----------------------------------------------------------------------------------------------
@@ -515,8 +545,7 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         parent = branches[branch.parent]
         step = code_signed(coder, attaches, mean)
         place = parent.last_place + step
-        require(abs(step) <= 1 << 28 and 0 <= place < parent.count,
-                "an attach vertex is not on the parent's stem")
+        require(abs(step) <= 1 << 28 and 0 <= place < parent.count, "an attach vertex is not on the parent's stem")
         branch.attach = parent.first + place
         parent.last_place = place
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
@@ -583,6 +612,7 @@ def decode_rest(stream: bytes, branches: list[Branch], step: float) -> list[list
 
 def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
     """Where vertex i of a stem should be, from those before it."""
+
     def on_stem(j: int):  # -1: the attach vertex, None for a root
         if j >= 0:
             return rest[branch.first + j]
@@ -757,8 +787,9 @@ def at_frequency(axis: list[int], k: int) -> int:
     return clipped(axis[k]) if 0 <= k < len(axis) else 0
 
 
-def decode_row(coder: RangeDecoder, model: CoefficientModel, frames: int, rank: int, slot: int, above=None,
-               above_count: int = 0):
+def decode_row(
+    coder: RangeDecoder, model: CoefficientModel, frames: int, rank: int, slot: int, above=None, above_count: int = 0
+):
     """Three axes of `frames` integers over frequency, and how many frequencies were coded.
 
     What is near in frequency, on the other axes, in the row above and in rows of the same slot tells how
@@ -863,11 +894,17 @@ class Plan:
 
     def _add_node(self, branches: list[Branch], b: int) -> None:
         branch, last_branch = branches[b], branches[b + branches[b].subtree - 1]
-        self.nodes.append(Node(
-            len(self.nodes), len(self.pieces), branch.first,
-            last_branch.first + last_branch.count - branch.first,
-            level=branch.depth, last=self.height if branch.flags & WHOLE else branch.depth,
-            coded=branch.subtree > 1 or branch.count > PIECE_VERTICES))
+        self.nodes.append(
+            Node(
+                len(self.nodes),
+                len(self.pieces),
+                branch.first,
+                last_branch.first + last_branch.count - branch.first,
+                level=branch.depth,
+                last=self.height if branch.flags & WHOLE else branch.depth,
+                coded=branch.subtree > 1 or branch.count > PIECE_VERTICES,
+            )
+        )
 
     def _add_pieces(self, branch: Branch, node: Node | None, piece_of_vertex: list[int]) -> None:
         parts = (branch.count + PIECE_VERTICES - 1) // PIECE_VERTICES
@@ -875,9 +912,15 @@ class Plan:
             start, stop = branch.count * j // parts, branch.count * (j + 1) // parts
             first = branch.first + start
             attach = branch.attach if j == 0 else first - 1
-            piece = Piece(len(self.pieces), first, stop - start, attach,
-                          parent=piece_of_vertex[attach] if attach >= 0 else -1,
-                          flags=branch.flags if j == 0 else branch.flags & ~LOOSE, level=self.height + 1)
+            piece = Piece(
+                len(self.pieces),
+                first,
+                stop - start,
+                attach,
+                parent=piece_of_vertex[attach] if attach >= 0 else -1,
+                flags=branch.flags if j == 0 else branch.flags & ~LOOSE,
+                level=self.height + 1,
+            )
             if node is not None and not branch.flags & WHOLE:
                 piece.level = branch.depth + 1
             if node is not None and not node.coded:
@@ -1008,7 +1051,7 @@ def tridiagonalise(a: np.ndarray):
         p = p - half * v
         a[rest, rest] = a[rest, rest] - v[:, None] * p - p[:, None] * v
         a[k + 1, k] = a[k, k + 1] = alpha
-        a[k + 2:, k] = a[k, k + 2:] = 0.0
+        a[k + 2 :, k] = a[k, k + 2 :] = 0.0
         total = in_order(v[:, None] * q[rest]) * scale
         q[rest] = q[rest] - total * v[:, None]
     return q, a.diagonal().tolist(), a.diagonal(-1).tolist() + [0.0]
@@ -1091,9 +1134,12 @@ def cosine_waves(frames: int) -> np.ndarray:
     """(frames, frames): the orthonormal DCT-II, wave k at frame t."""
     first, other = math.sqrt(1.0 / frames), math.sqrt(2.0 / frames)
     cosines = [cos_of_fraction(j, frames) for j in range(4 * frames)]
-    return np.array([[(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)]
-                      for t in range(frames)]
-                     for k in range(frames)])
+    return np.array(
+        [
+            [(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)] for t in range(frames)]
+            for k in range(frames)
+        ]
+    )
 
 
 def cos_of_fraction(j: int, frames: int) -> float:
@@ -1168,9 +1214,9 @@ def decode_shapes(stream: bytes, plan: Plan, motion: Motion, level: int) -> None
         require(count <= most, "a piece has more shapes than modes and axes")
         above, above_count = None, 0
         for _ in range(count):
-            above, above_count = decode_row(coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own),
-                                            above,
-                                            above_count)
+            above, above_count = decode_row(
+                coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own), above, above_count
+            )
             numbers = np.array(above, float).T.ravel()  # axis a of mode m at 3 m + a
             length2 = in_order(numbers * numbers)
             require(length2 > 0.0, "a shape is all 0")
@@ -1184,12 +1230,14 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     require(len(chunk) >= 8, "STEMS is too short")
     step, rotation, bits, rank = f32(chunk, 0), chunk[4], chunk[5], u16(chunk, 6)
     require(finite(step) and step > 0.0 and rotation <= 4, "Step or Rotation of STEMS is out of range")
-    require(rank == 0 if bits == 0 else 8 <= bits <= 16 and 1 <= rank <= motion.frames,
-            "Basis_Bits or Basis_Rank is out of range")
+    require(
+        rank == 0 if bits == 0 else 8 <= bits <= 16 and 1 <= rank <= motion.frames,
+        "Basis_Bits or Basis_Rank is out of range",
+    )
     waves, body = motion.cosines, chunk[8:]
     if bits:
         require(len(body) >= 4 and u32(body, 0) <= len(body) - 4, "Basis_Length is more than the chunk holds")
-        stream, body = body[4:4 + u32(body, 0)], body[4 + u32(body, 0):]
+        stream, body = body[4 : 4 + u32(body, 0)], body[4 + u32(body, 0) :]
         waves = np.array(decode_temporal(stream, rank, motion.frames, bits), float) * 2.0 ** -(bits - 1)
     motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves)
     return body
@@ -1255,8 +1303,7 @@ class CorrectionModel:
     def __init__(self):
         self.vertex = [Context(4000 if i == 0 else 32768) for i in range(4)]
         self.block = [[Context(8000) for _ in range(4)] for _ in range(2)]
-        self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)]
-                      for i in range(3)]
+        self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)] for i in range(3)]
         self.zero = [[Context(32768) for _ in range(3)] for _ in range(2)]
         self.sign = [[Context(32768) for _ in range(3)] for _ in range(3)]
         self.size = NumberModel()
@@ -1283,8 +1330,7 @@ def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: 
     found_any = block_before = 0
     for start in range(0, frames, BLOCK_FRAMES):
         stop = min(start + BLOCK_FRAMES, frames)
-        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0):min(stop + BLOCK_FRAMES,
-            frames)])
+        around = any(some[start:stop]) + 2 * any(some[max(start - BLOCK_FRAMES, 0) : min(stop + BLOCK_FRAMES, frames)])
         last_chance = stop == frames and not found_any
         block = block_before = 1 if last_chance else coder.bit(model.block[block_before][around])
         if not block:
@@ -1292,7 +1338,7 @@ def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: 
         found_any, found = 1, 0
         for t in range(start, stop):
             earlier = 2 if t > 0 and any(row[t - 1]) else 1 if t > 1 and any(row[t - 2]) else 0
-            near = 2 if some[t] else 1 if any(some[max(t - 1, 0):t + 2]) else 0
+            near = 2 if some[t] else 1 if any(some[max(t - 1, 0) : t + 2]) else 0
             if (t == stop - 1 and not found) or coder.bit(model.frame[earlier][near][found]):
                 found = 1
                 row[t] = decode_correction(coder, model, row[t - 1] if earlier == 2 else above[t])
@@ -1342,9 +1388,17 @@ def rotation(x, y, z) -> np.ndarray:
     unit = 1.0 / (1.0 + n2)
     w = (1.0 - n2) * unit
     x, y, z = 2.0 * x * unit, 2.0 * y * unit, 2.0 * z * unit
-    return matrix(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-                  2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-                  2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    return matrix(
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )
 
 
 def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
@@ -1354,7 +1408,7 @@ def over_time(row, step: float, waves: np.ndarray) -> np.ndarray:
         return np.zeros((3, waves.shape[1]))
     tracks = []
     for axis in row:
-        numbers = np.array(axis[:len(waves)])
+        numbers = np.array(axis[: len(waves)])
         there = np.flatnonzero(numbers)
         tracks.append(in_order((numbers[there].astype(float) * step)[:, None] * waves[there]))
     return np.array(tracks)
@@ -1457,15 +1511,15 @@ class Pose:
         for m, mode in enumerate(self.plan.basis(piece)):
             row = self.mode_row(piece, m)
             if shapes and m < self.plan.shape_modes(piece):
-                for shape, track in zip(shapes[3 * m:3 * m + 3], row):
+                for shape, track in zip(shapes[3 * m : 3 * m + 3], row):
                     if np.any(track != 0.0):
                         yield self.shape_moves(piece, shape), track
             elif np.any(row != 0.0):
                 yield np.repeat(mode[:, None], 3, axis=1), row
 
     def shape_moves(self, piece: Piece, shape: np.ndarray) -> np.ndarray:
-        modes = self.plan.basis(piece)[:self.plan.shape_modes(piece)]
-        return in_order(modes[:, :, None] * shape[:len(modes), None, :])
+        modes = self.plan.basis(piece)[: self.plan.shape_modes(piece)]
+        return in_order(modes[:, :, None] * shape[: len(modes), None, :])
 
     def sheet_rotation(self, piece: Piece, c: np.ndarray, R: np.ndarray) -> np.ndarray:
         """How a sheet has turned as a whole: the rotation nearest to its placed vertices, in 4 steps."""
@@ -1505,8 +1559,14 @@ class Pose:
         if piece.has_shift:
             c = c + over_time(motion.node_shift.get(node.number), step, motion.cosines)
         rows = motion.node_rows[node.number]
-        return c, R, [(functional, over_time(row, step, motion.cosines))
-                      for functional, row in zip(self.plan.whitening(node), rows)]
+        return (
+            c,
+            R,
+            [
+                (functional, over_time(row, step, motion.cosines))
+                for functional, row in zip(self.plan.whitening(node), rows)
+            ],
+        )
 
     def stem_map(self, node: Node):
         """By the first modes or shapes of its only piece; functionals of shapes are (3, 3) with one track."""
@@ -1518,8 +1578,10 @@ class Pose:
             if not shapes:
                 parts.append((self.affine_part(node, plan.basis(piece)[m]), row))
             elif m < plan.shape_modes(piece):
-                parts += [(self.map_of_shape(node, piece, shape), track)
-                          for shape, track in zip(shapes[3 * m:3 * m + 3], row)]
+                parts += [
+                    (self.map_of_shape(node, piece, shape), track)
+                    for shape, track in zip(shapes[3 * m : 3 * m + 3], row)
+                ]
         return c, R, parts
 
     def affine_part(self, node: Node, mode: np.ndarray) -> np.ndarray:
@@ -1532,9 +1594,8 @@ class Pose:
         return g
 
     def map_of_shape(self, node: Node, piece: Piece, shape: np.ndarray) -> np.ndarray:
-        modes = self.plan.basis(piece)[:self.plan.shape_modes(piece)]
-        return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m,
-                                  mode in enumerate(modes)]))
+        modes = self.plan.basis(piece)[: self.plan.shape_modes(piece)]
+        return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m, mode in enumerate(modes)]))
 
 
 def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -1551,9 +1612,20 @@ def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndar
     x = np.where(follows, u[1] * v[2] - u[2] * v[1], 0.0)
     y = np.where(follows, u[2] * v[0] - u[0] * v[2], 0.0)
     z = np.where(follows, u[0] * v[1] - u[1] * v[0], 0.0)
-    return mat_mul(matrix(c + h * x * x, h * x * y - z, h * x * z + y,
-                          h * x * y + z, c + h * y * y, h * y * z - x,
-                          h * x * z - y, h * y * z + x, c + h * z * z), R)
+    return mat_mul(
+        matrix(
+            c + h * x * x,
+            h * x * y - z,
+            h * x * z + y,
+            h * x * y + z,
+            c + h * y * y,
+            h * y * z - x,
+            h * x * z - y,
+            h * y * z + x,
+            c + h * z * z,
+        ),
+        R,
+    )
 
 
 def turn_towards(H: np.ndarray, least: float, R: np.ndarray) -> np.ndarray:
@@ -1581,14 +1653,17 @@ def turn_towards(H: np.ndarray, least: float, R: np.ndarray) -> np.ndarray:
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 ZSTD_WINDOW = 8 << 20
 ELEMENT_BYTES, FIELD_BYTES = 1 << 20, 1 << 31
-PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)"
-                        r"|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
-                        re.ASCII)
+PLAIN_TYPE = re.compile(
+    r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)"
+    r"|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
+    re.ASCII,
+)
 DERIVED_TYPES = {"|i1", "|u1"} | {order + kind + size for order in "<>" for kind in "iu" for size in "248"}
 
 
 def parse_json(text: bytes, what: str) -> dict:
     """A JSON object as of FORMAT.md, "JSON"."""
+
     def unique(pairs: list) -> dict:
         require(len(dict(pairs)) == len(pairs), f"{what}: an object has a member twice")
         return dict(pairs)
@@ -1598,8 +1673,7 @@ def parse_json(text: bytes, what: str) -> dict:
         return float(literal)
 
     try:
-        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number,
-                           parse_constant=number)
+        value = json.loads(text.decode("utf-8"), object_pairs_hook=unique, parse_float=number, parse_constant=number)
         json.dumps(value, ensure_ascii=False).encode("utf-8")  # refuses halves of surrogate pairs
     except (ValueError, RecursionError):
         raise AthError("BAD_CHUNK", f"{what}: is not JSON") from None
@@ -1619,14 +1693,12 @@ def unzstd(data: bytes, size: int | None, what: str, limit: int) -> bytes:
     """One zstd frame that states its size, which must be `size` where that is known."""
     require(data[:4] == ZSTD_MAGIC, f"{what}: is no zstd frame")
     most = max(ZSTD_WINDOW, size or 0)
-    require(zstd_window(data) <= most, f"{what}: has a zstd window of more than {most} bytes",
-            "LIMIT_EXCEEDED")
+    require(zstd_window(data) <= most, f"{what}: has a zstd window of more than {most} bytes", "LIMIT_EXCEEDED")
     try:
         stated = zstandard.frame_content_size(data)
     except zstandard.ZstdError:
         raise AthError("BAD_CHUNK", f"{what}: has a bad zstd frame header") from None
-    require(stated > 0 and stated == (stated if size is None else size),
-            f"{what}: has a zstd frame of another size")
+    require(stated > 0 and stated == (stated if size is None else size), f"{what}: has a zstd frame of another size")
     require(stated <= limit, f"{what}: unpacks to too much", "LIMIT_EXCEEDED")
     try:
         unpacked = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
@@ -1642,8 +1714,7 @@ def unshuffle(data: bytes, size: int) -> bytes:
 
 
 def is_shape(shape: object, below: int = 1 << 40) -> bool:
-    return isinstance(shape,
-                      list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
+    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
 
 
 def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
@@ -1651,20 +1722,19 @@ def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
     if isinstance(description, str):
         require(PLAIN_TYPE.fullmatch(description) is not None, f"{what}: has an unknown type")
         return np.dtype(description)
-    require(isinstance(description, list) and len(description) > 0 and nesting > 0,
-            f"{what}: has an unknown type")
+    require(isinstance(description, list) and len(description) > 0 and nesting > 0, f"{what}: has an unknown type")
     names, formats, offsets, size = [], [], [], 0
     for entry in description:
-        require(isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str),
-                f"{what}: has a bad field")
+        require(
+            isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str), f"{what}: has a bad field"
+        )
         kind = field_type(parse_type(entry[1], what, nesting - 1), entry[2:], what)
         if entry[0]:
             names.append(entry[0])
             formats.append(kind)
             offsets.append(size)
         else:
-            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V",
-                    f"{what}: has a bad gap")
+            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V", f"{what}: has a bad gap")
         size += kind.itemsize
     require(len(set(names)) == len(names), f"{what}: has two fields of the same name")
     require(size < FIELD_BYTES, f"{what}: has a record that is too long")
@@ -1675,18 +1745,18 @@ def field_type(kind: np.dtype, shapes: list, what: str) -> np.dtype:
     """The Type of a field with its Shape, if it has one."""
     if not shapes:
         return kind
-    require(is_shape(shapes[0], FIELD_BYTES) and kind.itemsize * math.prod(shapes[0]) < FIELD_BYTES,
-            f"{what}: has a field with a bad shape")
-    require(kind.itemsize > 0 or kind.names is not None,
-            f"{what}: has a field of many texts without characters")
+    require(
+        is_shape(shapes[0], FIELD_BYTES) and kind.itemsize * math.prod(shapes[0]) < FIELD_BYTES,
+        f"{what}: has a field with a bad shape",
+    )
+    require(kind.itemsize > 0 or kind.names is not None, f"{what}: has a field of many texts without characters")
     return np.dtype((kind, tuple(shapes[0])))
 
 
 def parse_array(chunk: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
     """Head and array of a static array; None where there is none."""
-    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2,
-            f"{what}: Head_Length is more than the chunk holds")
-    head, body = parse_json(chunk[2:2 + u16(chunk, 0)], what), chunk[2 + u16(chunk, 0):]
+    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2, f"{what}: Head_Length is more than the chunk holds")
+    head, body = parse_json(chunk[2 : 2 + u16(chunk, 0)], what), chunk[2 + u16(chunk, 0) :]
     if "dtype" not in head:
         require(len(body) == 0, f"{what}: has data without a type")
         return head, None
@@ -1740,22 +1810,24 @@ class AthFile:
 
     def _check_length(self, strict: bool) -> None:
         behind = [c.offset for c in self.chunks if c.key[0] > 0]
-        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude",
-                "TRUNCATED")
+        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude", "TRUNCATED")
         if strict:
             require(len(self.data) >= self.header.file_length, "is shorter than File_Length", "TRUNCATED")
             require(len(self.data) <= self.header.file_length, "is longer than File_Length", "TRAILING_BYTES")
 
     def _check_memory(self, segment_frames: int) -> None:
-        require(self.header.vertex_count * (60 * segment_frames + 512) <= self.limits.memory_bytes,
-                "needs too much memory", "LIMIT_EXCEEDED")
+        require(
+            self.header.vertex_count * (60 * segment_frames + 512) <= self.limits.memory_bytes,
+            "needs too much memory",
+            "LIMIT_EXCEEDED",
+        )
 
     def is_available(self, chunk: Chunk) -> bool:
         return chunk.offset + chunk.length <= len(self.data)
 
     def bytes_of(self, chunk: Chunk) -> bytes:
         require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
-        content = self.data[chunk.offset:chunk.offset + chunk.length]
+        content = self.data[chunk.offset : chunk.offset + chunk.length]
         require(crc32c(content) == chunk.checksum, f"{chunk} is damaged", "BAD_CHECKSUM")
         return content
 
@@ -1779,13 +1851,16 @@ class AthFile:
         for name, at in (("Epsilon", 0), ("Xi", 4)):
             require(finite(f32(chunk, at)) and f32(chunk, at) >= 0.0, f"{name} is not finite and 0 or more")
         self.branches, self.branch_source, self.vertex_source = decode_hierarchy(
-            chunk[16:], self.header.branch_count, self.header.vertex_count)
+            chunk[16:], self.header.branch_count, self.header.vertex_count
+        )
         deepest = max(branch.depth for branch in self.branches)
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
         self.plan = Plan(self.branches)
-        require(self.header.full_level_count - self.plan.height in (2, 3),
-                "Full_Level_Count is not that of the hierarchy",
-                "BAD_HEADER")
+        require(
+            self.header.full_level_count - self.plan.height in (2, 3),
+            "Full_Level_Count is not that of the hierarchy",
+            "BAD_HEADER",
+        )
 
     def _check_motion_chunks(self) -> None:
         """FORMAT.md, "Levels and chunks"."""
@@ -1798,18 +1873,18 @@ class AthFile:
                 allowed |= {(CORRECTIONS, level, s)} if level == plan.height + 1 else set()
             allowed |= {(SHAPES, level, 0)} if plan.has_stems(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
-        require(wanted <= there <= wanted | allowed,
-                "motion chunks are not those that the hierarchy asks for",
-                "BAD_CHUNK_TABLE")
+        require(
+            wanted <= there <= wanted | allowed,
+            "motion chunks are not those that the hierarchy asks for",
+            "BAD_CHUNK_TABLE",
+        )
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 36, "REST is too short")
-        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0,
-                "Method, Rest_Type or Reserved is out of range")
+        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0, "Method, Rest_Type or Reserved is out of range")
         self.origin = np.array([f64(chunk, 4 + 8 * k) for k in range(3)])
         step = f64(chunk, 28)
-        require(np.isfinite(self.origin).all() and finite(step) and step > 0.0,
-                "Origin or Rest_Step is out of range")
+        require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
         self.rest_type = np.dtype("<f8" if chunk[1] else "<f4")
         if chunk[0] == 0:
             rest = np.array(decode_rest(chunk[36:], self.branches, step))
@@ -1852,8 +1927,7 @@ class AthFile:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
         with np.errstate(all="ignore"):
             segments = [self._segment(s, level) for s in range(self.header.segment_count)]
-        return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0,
-            1))
+        return np.ascontiguousarray(self._in_source_order(np.concatenate(segments, axis=2)).transpose(2, 0, 1))
 
     def _segment(self, s: int, level: int) -> np.ndarray:
         """(vertices, 3, frames) in file order."""
@@ -1865,8 +1939,7 @@ class AthFile:
         last = self.plan.height + 1
         if level >= last and self.find(CORRECTIONS, last, s):
             chunk = self.content(CORRECTIONS, last, s)
-            require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0,
-                    "Correction_Step is not above 0")
+            require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Correction_Step is not above 0")
             q = decode_corrections(chunk[4:], self.header.vertex_count, motion.frames)
             corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
             positions = np.where(q != 0, corrected, positions)
@@ -1919,17 +1992,16 @@ class AthFile:
         return array
 
     def _check_indices(self, array: np.ndarray | None, what: str) -> None:
-        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu",
-                f"{what} has no rows of integers")
-        require(array.size == 0 or (0 <= array.min() and array.max() < self.header.vertex_count),
-                f"{what} names a vertex that is not there")
+        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu", f"{what} has no rows of integers")
+        require(
+            array.size == 0 or (0 <= array.min() and array.max() < self.header.vertex_count),
+            f"{what} names a vertex that is not there",
+        )
 
     def _derived_edges(self, type_name: object) -> np.ndarray:
         """An edge from each vertex to the one before it on its stem, or to the attach vertex."""
-        require(isinstance(type_name, str) and type_name in DERIVED_TYPES,
-                "EDGES has neither array nor derived edges")
-        require(np.iinfo(type_name).max >= self.header.vertex_count - 1,
-                "the type of derived edges is too small")
+        require(isinstance(type_name, str) and type_name in DERIVED_TYPES, "EDGES has neither array nor derived edges")
+        require(np.iinfo(type_name).max >= self.header.vertex_count - 1, "the type of derived edges is too small")
         pairs = []
         for branch in self.branches:
             for v in range(branch.first, branch.first + branch.count):
@@ -1948,11 +2020,12 @@ class AthFile:
             require(len(arrays) < self.limits.attributes, "there are too many attributes", "LIMIT_EXCEEDED")
             head, array = parse_array(self.bytes_of(chunk), "ATTRIBUTE", self.limits)
             name = head.get("name")
-            require(isinstance(name, str) and name != "" and array is not None,
-                    "an attribute has no name or no array")
-            require(len(name.encode("utf-8")) <= self.limits.string_bytes,
-                    "the name of an attribute is too long",
-                    "LIMIT_EXCEEDED")
+            require(isinstance(name, str) and name != "" and array is not None, "an attribute has no name or no array")
+            require(
+                len(name.encode("utf-8")) <= self.limits.string_bytes,
+                "the name of an attribute is too long",
+                "LIMIT_EXCEEDED",
+            )
             require(name not in arrays, "two attributes have the same name")
             arrays[name] = array
             total = sum(array.nbytes for array in arrays.values())
@@ -1990,8 +2063,7 @@ def show(options: argparse.Namespace, data: bytes) -> None:
     level = file.deepest if options.depth is None else options.depth
     positions = file.positions(level)
     frames, vertices, _ = positions.shape
-    print(f"{frames} frames of {vertices} vertices, {positions.dtype}, "
-          f"level {level} of {file.header.level_count - 1}")
+    print(f"{frames} frames of {vertices} vertices, {positions.dtype}, level {level} of {file.header.level_count - 1}")
     for clip in file.clips if file.find(CLIPS) else ():
         print(f"{clip.name!r}: {clip.frames} frames" + (", a loop" if clip.seams is not None else ""))
     if options.checksum:
@@ -2007,8 +2079,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--depth", type=int, help="level; by default the deepest complete one")
     parser.add_argument("--strict", action="store_true", help="the file has to be as long as it says")
     parser.add_argument("--out", help="write the positions, (frames, vertices, 3), to this .npy file")
-    parser.add_argument("--checksum", action="store_true",
-                        help="print their CRC-32C, little-endian, source order")
+    parser.add_argument("--checksum", action="store_true", help="print their CRC-32C, little-endian, source order")
     parser.add_argument("--raw", action="store_true", help="answer as spec/conformance.py asks: FILE WHAT")
     options = parser.parse_args(words)
     try:

@@ -37,18 +37,35 @@ def run_class(name: str, seconds: float) -> dict:
     start = time.perf_counter()
     rows = [asdict(row) for row in module.run(seconds)]
     figures = module.figures() if hasattr(module, "figures") else {}
-    return {"about": " ".join((module.__doc__ or "").split("\n\n")[0].split()), "rows": rows, "figures": figures,
-            "seconds": round(time.perf_counter() - start, 1), "budget": seconds, "version": athcodec.__version__,
-            "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"}
+    return {
+        "about": " ".join((module.__doc__ or "").split("\n\n")[0].split()),
+        "rows": rows,
+        "figures": figures,
+        "seconds": round(time.perf_counter() - start, 1),
+        "budget": seconds,
+        "version": athcodec.__version__,
+        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+    }
 
 
 def as_markdown(results: dict[str, dict]) -> str:
-    lines = ["# Robustness", "",
-             "Written by `python -m spec.robustness`. *over limit*: took more memory or work than its limits allow; "
-             "*wrong*: neither refused nor", "decoded as it should be.", ""]
+    lines = [
+        "# Robustness",
+        "",
+        "Written by `python -m spec.robustness`. *over limit*: took more memory or work than its limits allow; "
+        "*wrong*: neither refused nor",
+        "decoded as it should be.",
+        "",
+    ]
     for name, result in sorted(results.items()):
-        lines += [f"## {name}", "", result["about"], "",
-                  "| class | tried | crashes | hangs | over limit | wrong | |", "|---|---|---|---|---|---|---|"]
+        lines += [
+            f"## {name}",
+            "",
+            result["about"],
+            "",
+            "| class | tried | crashes | hangs | over limit | wrong | |",
+            "|---|---|---|---|---|---|---|",
+        ]
         for row in result["rows"]:
             counts = " | ".join(f"{row[count]:,}" for count in COUNTS)
             lines.append(f"| {row['name']} | {counts} | {row['note']} |")

@@ -89,6 +89,7 @@ def scripted_unsigned(original: Callable):
     def code(coder, model, expected):
         coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), rd.LONGEST))
         return original(coder, model, expected)
+
     return code
 
 
@@ -100,6 +101,7 @@ def scripted_signed(original_unsigned: Callable):
             coder.decisions.append(value < 0)
             coder.raw_bit()
         return value
+
     return code
 
 
@@ -108,6 +110,7 @@ def scripted_count(original: Callable):
         count = coder.script.answer("count", rank)
         coder.decisions.extend([0] + magnitude_bits(count, 10)[1:] if count else [1])
         return original(coder, model, history, above, rank)
+
     return code
 
 
@@ -122,6 +125,7 @@ def scripted_exact(original: Callable):
             value = abs(difference), difference < 0
         coder.decisions.extend(magnitude_bits(value[0], n) + ([value[1]] if value[0] else []))
         return original(coder, model, n, expected, before)
+
     return code
 
 
@@ -134,10 +138,13 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
         made.append(ScriptedCoder(script))
         return made[-1]
 
-    replaced = {"RangeDecoder": coder, "code_unsigned": scripted_unsigned(rd.code_unsigned),
-                "code_signed": scripted_signed(rd.code_unsigned),
-                "decode_count": scripted_count(rd.decode_count),
-                "code_exact": scripted_exact(rd.code_exact)}
+    replaced = {
+        "RangeDecoder": coder,
+        "code_unsigned": scripted_unsigned(rd.code_unsigned),
+        "code_signed": scripted_signed(rd.code_unsigned),
+        "decode_count": scripted_count(rd.decode_count),
+        "code_exact": scripted_exact(rd.code_exact),
+    }
     kept = {name: getattr(rd, name) for name in replaced}
     try:
         for name, function in replaced.items():
@@ -162,8 +169,10 @@ def write(function: Callable, script: Script | list, *arguments) -> bytes:
 # ---- files in pieces ---------------------------------------------------------------------------------------
 
 HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
-HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-                 "segment_count level_count full_level_count clip_count flags max_error reserved").split()
+HEADER_FIELDS = (
+    "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
+    "segment_count level_count full_level_count clip_count flags max_error reserved"
+).split()
 ENTRY = struct.Struct("<HBBIII")
 
 
@@ -198,10 +207,21 @@ class Draft:
     errors: bytes | None = None  # the error table
 
     def file(self) -> bytes:
-        fields = dict(magic=rd.MAGIC, major=rd.VERSION[0], minor=rd.VERSION[1], checksum=None,
-                      file_length=None,
-                      chunk_count=len(self.entries), clip_count=1, flags=0, max_error=1.0,
-                      reserved=0) | self.header
+        fields = (
+            dict(
+                magic=rd.MAGIC,
+                major=rd.VERSION[0],
+                minor=rd.VERSION[1],
+                checksum=None,
+                file_length=None,
+                chunk_count=len(self.entries),
+                clip_count=1,
+                flags=0,
+                max_error=1.0,
+                reserved=0,
+            )
+            | self.header
+        )
         table = b"".join(entry.packed() for entry in self.entries)
         errors = self.errors
         if errors is None:
@@ -218,8 +238,7 @@ class Draft:
         return replace(self, header=self.header | fields)
 
     def index(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> int:
-        return next(i for i,
-                    e in enumerate(self.entries) if (e.kind, e.level, e.segment) == (kind, level, segment))
+        return next(i for i, e in enumerate(self.entries) if (e.kind, e.level, e.segment) == (kind, level, segment))
 
     def content(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> bytes:
         return self.entries[self.index(kind, level, segment)].content
@@ -227,12 +246,11 @@ class Draft:
     def change(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0, **fields) -> Draft:
         """The file with another content, or another entry in the table, for one chunk."""
         i = self.index(kind, level, segment)
-        return replace(self,
-                       entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1:]))
+        return replace(self, entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1 :]))
 
     def without(self, kind: int, level: int = rd.NO_LEVEL, segment: int = 0) -> Draft:
         i = self.index(kind, level, segment)
-        return replace(self, entries=self.entries[:i] + self.entries[i + 1:])
+        return replace(self, entries=self.entries[:i] + self.entries[i + 1 :])
 
     def add(self, *entries: Entry, sort: bool = True) -> Draft:
         together = [*self.entries, *entries]
@@ -241,8 +259,7 @@ class Draft:
     def upto(self, level: int) -> Draft:
         """The file without the levels after one."""
         header = self.header | {"level_count": level + 1}
-        return replace(self, header=header, entries=tuple(
-            e for e in self.entries if e.key[0] != 1 or e.level <= level))
+        return replace(self, header=header, entries=tuple(e for e in self.entries if e.key[0] != 1 or e.level <= level))
 
 
 # ---- plants ------------------------------------------------------------------------------------------------
@@ -259,8 +276,7 @@ class Stem:
     lag: int = 1
 
 
-def hierarchy_script(stems: list[Stem], branch_source: list | None = None,
-                     vertex_source: list | None = None) -> list:
+def hierarchy_script(stems: list[Stem], branch_source: list | None = None, vertex_source: list | None = None) -> list:
     script, lag = [], 0
     for b, stem in enumerate(stems):
         up, ancestor = 0, b - 1
@@ -274,9 +290,11 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None,
         if stem.parent >= 0:
             script.append(stem.place - last_place[stem.parent])
             last_place[stem.parent] = stem.place
-    return script + permutation_script(branch_source, stems, False) + permutation_script(vertex_source, stems,
-        True,
-                                                                                        branch_source)
+    return (
+        script
+        + permutation_script(branch_source, stems, False)
+        + permutation_script(vertex_source, stems, True, branch_source)
+    )
 
 
 def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
@@ -321,18 +339,25 @@ def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
     return points
 
 
-def hierarchy_chunk(stream: bytes, epsilon: float = 0.5, xi: float = 0.25, eta: int = 3,
-                    lam: int = 1) -> bytes:
+def hierarchy_chunk(stream: bytes, epsilon: float = 0.5, xi: float = 0.25, eta: int = 3, lam: int = 1) -> bytes:
     return struct.pack("<ffII", epsilon, xi, eta, lam) + stream
 
 
-def rest_chunk(stream: bytes, *, exact: int = 0, rest_type: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25,
-               reserved: int = 0) -> bytes:
+def rest_chunk(
+    stream: bytes, *, exact: int = 0, rest_type: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25, reserved: int = 0
+) -> bytes:
     return struct.pack("<BBH3dd", exact, rest_type, reserved, *origin, step) + stream
 
 
-def clip_entry(frames: int, segments: int = 1, name: bytes | str = b"", seams: Sequence[float] | None = None, *,
-               flags: int | None = None, length: int | None = None) -> bytes:
+def clip_entry(
+    frames: int,
+    segments: int = 1,
+    name: bytes | str = b"",
+    seams: Sequence[float] | None = None,
+    *,
+    flags: int | None = None,
+    length: int | None = None,
+) -> bytes:
     """A clip in CLIPS, a loop where it has seams."""
     name = name.encode() if isinstance(name, str) else name
     flags = int(seams is not None) if flags is None else flags
@@ -353,8 +378,7 @@ def uneven_time(*times: float | tuple) -> bytes:
     return b"\2" + write(rd.decode_times, list(times), len(times))
 
 
-def stems_head(step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0,
-               basis: bytes = b"") -> bytes:
+def stems_head(step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0, basis: bytes = b"") -> bytes:
     head = struct.pack("<fBBH", step, rotation, bits, rank)
     return head + struct.pack("<I", len(basis)) + basis if bits else head
 
@@ -392,19 +416,28 @@ class Plant:
 
     def draft(self) -> Draft:
         vertices = sum(stem.count for stem in self.stems)
-        stream = write(rd.decode_hierarchy,
-                       hierarchy_script(self.stems, self.branch_source, self.vertex_source),
-                       len(self.stems), vertices)
+        stream = write(
+            rd.decode_hierarchy,
+            hierarchy_script(self.stems, self.branch_source, self.vertex_source),
+            len(self.stems),
+            vertices,
+        )
         branches, *_ = rd.decode_hierarchy(stream, len(self.stems), vertices)
         self.plan = rd.Plan(branches)
         rest = self._rest(branches)
         self._set_rest(branches, rest)
         clips = self.clips or (rd.Clip(self.frames, self.segments),)
-        entries = [Entry(rd.HIERARCHY, hierarchy_chunk(stream)), Entry(rd.REST, rest),
-                   Entry(rd.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips)))]
+        entries = [
+            Entry(rd.HIERARCHY, hierarchy_chunk(stream)),
+            Entry(rd.REST, rest),
+            Entry(rd.TIME, self.time or steady_times(*[(0.0, 0.25)] * len(clips))),
+        ]
         if self.clips:
-            entries.append(Entry(rd.CLIPS, b"".join(
-                clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)))
+            entries.append(
+                Entry(
+                    rd.CLIPS, b"".join(clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)
+                )
+            )
         self.shapes: dict = {}
         for level in range(self.plan.height + 2):
             if (rd.SHAPES, level, 0) in self.scripts:
@@ -414,9 +447,19 @@ class Plant:
             entries += self._segment(s, frames)
         entries.sort(key=lambda entry: entry.key)
         levels = self.plan.height + 2
-        return Draft(dict(vertex_count=vertices, branch_count=len(self.stems), frame_count=sum(lengths),
-                          segment_count=len(lengths), level_count=levels, full_level_count=levels,
-                          clip_count=len(clips), flags=int(self.is_float64)), tuple(entries))
+        return Draft(
+            dict(
+                vertex_count=vertices,
+                branch_count=len(self.stems),
+                frame_count=sum(lengths),
+                segment_count=len(lengths),
+                level_count=levels,
+                full_level_count=levels,
+                clip_count=len(clips),
+                flags=int(self.is_float64),
+            ),
+            tuple(entries),
+        )
 
     def file(self) -> bytes:
         return self.draft().file()
@@ -426,8 +469,12 @@ class Plant:
             return self.rest
         points = grown(self.stems) if self.points is None else self.points
         script = rest_script(branches, points)
-        return rest_chunk(write(rd.decode_rest, script, branches, 1.0), origin=self.origin, step=self.step,
-                          rest_type=int(self.is_float64))
+        return rest_chunk(
+            write(rd.decode_rest, script, branches, 1.0),
+            origin=self.origin,
+            step=self.step,
+            rest_type=int(self.is_float64),
+        )
 
     def _set_rest(self, branches: list, chunk: bytes) -> None:
         origin = np.array(struct.unpack_from("<3d", chunk, 4))

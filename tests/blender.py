@@ -57,8 +57,9 @@ class Blender:
         name.write_text(HEADER + script)
         args = {"extension": self.has_extension, **args}
         env = {**os.environ, "BLENDER_USER_RESOURCES": str(self.folder / "user")}
-        done = subprocess.run([self.python, str(name), json.dumps(args, default=str), str(out)], env=env, text=True,
-                              capture_output=True)
+        done = subprocess.run(
+            [self.python, str(name), json.dumps(args, default=str), str(out)], env=env, text=True, capture_output=True
+        )
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
         if not out.exists():
             return {}

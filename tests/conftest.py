@@ -113,14 +113,22 @@ def medley_clips():
     clip = awkward(seed=7, branches=9, longest=8, frames=90, roots=1, shape="stem", motion="sway")
 
     def part(start, stop, time):
-        return MotionClip(clip.block(start, stop), time, clip.vertex_branch, clip.branch_parent,
-                          stem_index=clip.stem_index, rest=clip.source_rest,
-                          metadata={"unit": "m", "from": start})
+        return MotionClip(
+            clip.block(start, stop),
+            time,
+            clip.vertex_branch,
+            clip.branch_parent,
+            stem_index=clip.stem_index,
+            rest=clip.source_rest,
+            metadata={"unit": "m", "from": start},
+        )
 
-    return {"calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
-            "Böe": part(20, 57, np.sort(np.random.default_rng(2).random(37)) + np.arange(37) / 24),
-            "still": part(57, 58, np.array([2.5])),
-            "round": athcodec.looped(part(50, 90, np.arange(40) / 30), blend=8)}
+    return {
+        "calm": athcodec.looped(part(0, 20, np.arange(20) / 30)),
+        "Böe": part(20, 57, np.sort(np.random.default_rng(2).random(37)) + np.arange(37) / 24),
+        "still": part(57, 58, np.array([2.5])),
+        "round": athcodec.looped(part(50, 90, np.arange(40) / 30), blend=8),
+    }
 
 
 @pytest.fixture(scope="session")

@@ -20,8 +20,10 @@ from athcodec.encoding import streams
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.segmentation import balanced_segments
 
-HEADER_FIELDS = ("magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-                 "segment_count level_count full_level_count clip_count flags max_error reserved").split()
+HEADER_FIELDS = (
+    "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
+    "segment_count level_count full_level_count clip_count flags max_error reserved"
+).split()
 CHECKSUM_AT = 12
 
 
@@ -45,8 +47,11 @@ class Parts:
         return front + b"".join(data for _, data in self.chunks)
 
     def index(self, kind: int, level: int | None = None, segment: int = 0) -> int:
-        return next(i for i, (c, _) in enumerate(self.chunks)
-                    if c.kind == kind and (level is None or (c.level, c.segment) == (level, segment)))
+        return next(
+            i
+            for i, (c, _) in enumerate(self.chunks)
+            if c.kind == kind and (level is None or (c.level, c.segment) == (level, segment))
+        )
 
     def payload(self, kind: int, level: int | None = None) -> bytes:
         return self.chunks[self.index(kind, level)][1]
@@ -73,13 +78,13 @@ def header_fields(data: bytes) -> dict:
 def with_header(data: bytes, **fields) -> bytes:
     """The file with other values in its header and a checksum that fits."""
     tables_end = Parts.of(data).chunks[0][0].offset
-    front = ct._HEADER.pack(*(header_fields(data) | fields).values()) + data[ct._HEADER.size: tables_end]
+    front = ct._HEADER.pack(*(header_fields(data) | fields).values()) + data[ct._HEADER.size : tables_end]
     return with_checksum(front) + data[tables_end:]
 
 
 def with_checksum(front: bytes) -> bytes:
     """Header and tables with a checksum that fits."""
-    head, tail = front[:CHECKSUM_AT], front[CHECKSUM_AT + 4:]
+    head, tail = front[:CHECKSUM_AT], front[CHECKSUM_AT + 4 :]
     return head + struct.pack("<I", crc32c(head + bytes(4) + tail)) + tail
 
 
@@ -98,8 +103,15 @@ def roots(*counts: int) -> np.ndarray:
     return branches
 
 
-def still_file(frames: int = 1, branches: np.ndarray | None = None, *, hierarchy: bytes | None = None,
-               rest: bytes | None = None, time: bytes | None = None, stems: bytes | None = None) -> bytes:
+def still_file(
+    frames: int = 1,
+    branches: np.ndarray | None = None,
+    *,
+    hierarchy: bytes | None = None,
+    rest: bytes | None = None,
+    time: bytes | None = None,
+    stems: bytes | None = None,
+) -> bytes:
     """One vertex, or `branches`, at the origin, one frame a second; or other payloads, `stems` at level 0."""
     branches = roots(1) if branches is None else branches
     plan = Plan(branches, int(branches["count"].sum()))

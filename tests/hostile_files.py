@@ -126,7 +126,8 @@ def noise(frames: int) -> bytes:
 SLOW = {
     "stems whose gaps collide in the table of bases": lambda scale: stems_with_gaps(colliding_gaps(15_000 * scale)),
     "stems of 64 vertices, no two alike": lambda scale: stems_with_gaps(
-        random_gaps(np.random.default_rng(1), 250 * scale, 64)),
+        random_gaps(np.random.default_rng(1), 250 * scale, 64)
+    ),
     "segments of one frame": lambda scale: segments_of_one_frame(2000 * scale),
     "a chain of branches": lambda scale: a_chain(2000 * scale),
     "branches on one vertex": lambda scale: still_file(branches=on_one_vertex(20_000 * scale, 1)),

@@ -24,27 +24,59 @@ def swaying(rest: np.ndarray, frames: int, dtype: object = np.float32) -> np.nda
 def mixed_clip(frames: int = 6, dtype: object = np.float32, fps: float = 24.0, start: int = 1) -> MotionClip:
     """A pyramid of a square and triangles, with texture coordinates per corner, and a line of three vertices."""
     counts, corners = [4, 3, 3, 3, 3], [0, 1, 2, 3, 0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]
-    attributes = {"face_vertex_counts": np.array(counts, np.int32), "face_vertex_indices": np.array(corners, np.int32),
-                  "part_vertex_counts": np.array([5, 3], np.int32),
-                  "uv": np.random.default_rng(1).random((len(corners), 2)).astype(np.float32)}
-    domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "uv": "corner",
-               "part_vertex_counts": "constant"}
-    metadata = {"fps": fps, "start_frame": start, "part_names": ["leaf", "twig"], "part_kinds": ["mesh", "curves"],
-                "domains": domains}
-    return MotionClip(swaying(POINTS, frames, dtype), np.arange(frames) / fps, edges=np.array([[5, 6], [6, 7]]),
-                      attributes=attributes, metadata=metadata)
+    attributes = {
+        "face_vertex_counts": np.array(counts, np.int32),
+        "face_vertex_indices": np.array(corners, np.int32),
+        "part_vertex_counts": np.array([5, 3], np.int32),
+        "uv": np.random.default_rng(1).random((len(corners), 2)).astype(np.float32),
+    }
+    domains = {
+        "face_vertex_counts": "face",
+        "face_vertex_indices": "corner",
+        "uv": "corner",
+        "part_vertex_counts": "constant",
+    }
+    metadata = {
+        "fps": fps,
+        "start_frame": start,
+        "part_names": ["leaf", "twig"],
+        "part_kinds": ["mesh", "curves"],
+        "domains": domains,
+    }
+    return MotionClip(
+        swaying(POINTS, frames, dtype),
+        np.arange(frames) / fps,
+        edges=np.array([[5, 6], [6, 7]]),
+        attributes=attributes,
+        metadata=metadata,
+    )
 
 
 def quad_clip(frames: int = 6, dtype: object = np.float32, rings: int = 6) -> MotionClip:
     """A tube of quads, one object."""
     angle = np.linspace(0, 2 * np.pi, 5)[:-1]
     rest = np.array([[np.cos(a), 0.7 * ring, np.sin(a)] for ring in range(rings) for a in angle])
-    faces = np.array([[4 * r + i, 4 * r + (i + 1) % 4, 4 * r + 4 + (i + 1) % 4, 4 * r + 4 + i]
-                      for r in range(rings - 1) for i in range(4)], np.int32)
-    return MotionClip(swaying(rest, frames, dtype), np.arange(frames) / 24, faces=faces,
-                      attributes={"part_vertex_counts": np.array([len(rest)], np.int32)},
-                      metadata={"fps": 24.0, "start_frame": 1, "part_names": ["tube"], "part_kinds": ["mesh"],
-                                "domains": {"part_vertex_counts": "constant"}})
+    faces = np.array(
+        [
+            [4 * r + i, 4 * r + (i + 1) % 4, 4 * r + 4 + (i + 1) % 4, 4 * r + 4 + i]
+            for r in range(rings - 1)
+            for i in range(4)
+        ],
+        np.int32,
+    )
+    return MotionClip(
+        swaying(rest, frames, dtype),
+        np.arange(frames) / 24,
+        faces=faces,
+        attributes={"part_vertex_counts": np.array([len(rest)], np.int32)},
+        metadata={
+            "fps": 24.0,
+            "start_frame": 1,
+            "part_names": ["tube"],
+            "part_kinds": ["mesh"],
+            "domains": {"part_vertex_counts": "constant"},
+        },
+    )
 
 
 def assert_same_motion(got: MotionClip, wanted: MotionClip, tolerance: float = 0.0) -> None:

@@ -19,8 +19,7 @@ def random_hierarchy(rng: np.random.Generator, branches: int, longest: int, root
 
 def chain(branches: int, longest: int):
     """Every branch hangs on the one before."""
-    return (np.repeat(np.arange(branches, dtype=np.int32), longest),
-            np.arange(-1, branches - 1, dtype=np.int32))
+    return (np.repeat(np.arange(branches, dtype=np.int32), longest), np.arange(-1, branches - 1, dtype=np.int32))
 
 
 def grow(rng: np.random.Generator, vertex_branch: np.ndarray, branch_parent: np.ndarray, wild: float = 0.3):
@@ -48,8 +47,17 @@ def sway(rng: np.random.Generator, rest: np.ndarray, frames: int, amount: float 
     return rest + motion + rough * rng.normal(size=(frames, len(rest), 3))
 
 
-def plant(seed: int = 0, branches: int = 12, longest: int = 9, frames: int = 30, roots: int = 1, dtype=np.float32,
-          scale: float = 1.0, offset: float = 0.0, **motion) -> MotionClip:
+def plant(
+    seed: int = 0,
+    branches: int = 12,
+    longest: int = 9,
+    frames: int = 30,
+    roots: int = 1,
+    dtype=np.float32,
+    scale: float = 1.0,
+    offset: float = 0.0,
+    **motion,
+) -> MotionClip:
     """A random plant that sways."""
     rng = np.random.default_rng(seed)
     vertex_branch, branch_parent = random_hierarchy(rng, branches, longest, roots)
@@ -60,9 +68,14 @@ def plant(seed: int = 0, branches: int = 12, longest: int = 9, frames: int = 30,
 
 def clip_of(positions, rest, vertex_branch, branch_parent, dtype=np.float32, **more) -> MotionClip:
     """Plain arrays as a clip at 30 frames a second."""
-    return MotionClip(positions=np.asarray(positions, dtype), rest=np.asarray(rest, float),
-                      time=np.arange(len(positions)) / 30, vertex_branch=vertex_branch, branch_parent=branch_parent,
-                      **more)
+    return MotionClip(
+        positions=np.asarray(positions, dtype),
+        rest=np.asarray(rest, float),
+        time=np.arange(len(positions)) / 30,
+        vertex_branch=vertex_branch,
+        branch_parent=branch_parent,
+        **more,
+    )
 
 
 def tube(rings: int, around: int, frames: int, seed: int = 0) -> MotionClip:
@@ -89,9 +102,21 @@ STEADY = settings(derandomize=True, deadline=None, database=None)
 """Hypothesis with the same examples in every run."""
 
 
-def awkward(seed: int, branches: int = 6, longest: int = 7, frames: int = 20, roots: int = 1, shape: str | None = None,
-            motion: str | None = None, on_first_vertex: bool = False, shuffled: bool = False, scale: float = 1.0,
-            offset: float = 0.0, dtype=np.float32, **more) -> MotionClip:
+def awkward(
+    seed: int,
+    branches: int = 6,
+    longest: int = 7,
+    frames: int = 20,
+    roots: int = 1,
+    shape: str | None = None,
+    motion: str | None = None,
+    on_first_vertex: bool = False,
+    shuffled: bool = False,
+    scale: float = 1.0,
+    offset: float = 0.0,
+    dtype=np.float32,
+    **more,
+) -> MotionClip:
     """A plant of degenerate stems in degenerate motion; a `shape` or `motion` of None is drawn anew for each branch or
     clip. offset: distance from the origin in plant sizes. shuffled: vertices and branches numbered at random, with a
     stem index that gives their order.
@@ -166,8 +191,15 @@ def _renumbered(rng, positions, rest, vertex_branch, branch_parent, dtype, more)
     places = source_stem_index(vertex_branch)
     new_branch = np.argsort(branch)
     parent = branch_parent[branch]
-    return clip_of(positions[:, vertex], rest[vertex], new_branch[vertex_branch[vertex]],
-                   np.where(parent < 0, -1, new_branch[parent]), dtype, stem_index=places[vertex], **more)
+    return clip_of(
+        positions[:, vertex],
+        rest[vertex],
+        new_branch[vertex_branch[vertex]],
+        np.where(parent < 0, -1, new_branch[parent]),
+        dtype,
+        stem_index=places[vertex],
+        **more,
+    )
 
 
 def chain_plant(branches: int, longest: int, frames: int = 12, seed: int = 0) -> MotionClip:
@@ -193,10 +225,17 @@ def awkward_plants(draw, **fixed):
     """`awkward` with everything drawn but what is `fixed`."""
     branches = draw(st.integers(1, 10))
     drawn = dict(
-        seed=draw(st.integers(0, 10**6)), branches=branches, roots=draw(st.integers(1, min(3, branches))),
-        longest=draw(st.sampled_from([1, 2, 3, 7, 70])), frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 33])),
-        shape=draw(st.sampled_from([None, *SHAPES])), motion=draw(st.sampled_from(MOTIONS)),
-        on_first_vertex=draw(st.booleans()), shuffled=draw(st.booleans()),
-        scale=draw(st.sampled_from([1e-6, 1.0, 1e6])), offset=draw(st.sampled_from([0.0, 1e3])),
-        dtype=draw(st.sampled_from([np.float32, np.float64])))
+        seed=draw(st.integers(0, 10**6)),
+        branches=branches,
+        roots=draw(st.integers(1, min(3, branches))),
+        longest=draw(st.sampled_from([1, 2, 3, 7, 70])),
+        frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 33])),
+        shape=draw(st.sampled_from([None, *SHAPES])),
+        motion=draw(st.sampled_from(MOTIONS)),
+        on_first_vertex=draw(st.booleans()),
+        shuffled=draw(st.booleans()),
+        scale=draw(st.sampled_from([1e-6, 1.0, 1e6])),
+        offset=draw(st.sampled_from([0.0, 1e3])),
+        dtype=draw(st.sampled_from([np.float32, np.float64])),
+    )
     return awkward(**drawn | fixed)

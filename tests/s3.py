@@ -21,13 +21,18 @@ class S3Server:
 
     def __enter__(self) -> S3Server:
         with self.log.open("wb") as out:
-            self._process = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"],
-                                             stdout=out, stderr=out)
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"], stdout=out, stderr=out
+            )
         while (found := re.search(r"http://127\.0\.0\.1:\d+", self.log.read_text())) is None:
             assert self._process.poll() is None, self.log.read_text()
             time.sleep(0.02)
-        self.environment = {"AWS_ENDPOINT_URL": found[0], "AWS_ACCESS_KEY_ID": "me", "AWS_SECRET_ACCESS_KEY": "hush",
-                            "AWS_DEFAULT_REGION": "us-east-1"}
+        self.environment = {
+            "AWS_ENDPOINT_URL": found[0],
+            "AWS_ACCESS_KEY_ID": "me",
+            "AWS_SECRET_ACCESS_KEY": "hush",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }
         return self
 
     def __exit__(self, *_) -> None:

@@ -237,7 +237,7 @@ def test_what_blender_writes_is_read_as_blender_shows_it(blender, tmp_path, suff
         assert sorted(clip.metadata["part_names"]) == ["Ball", "Grid", "Hair"]
         positions, first = clip.block(0, clip.frame_count), 0
         for name, count in zip(clip.metadata["part_names"], clip.attributes["part_vertex_counts"]):
-            own = positions[:, first: first + count]
+            own = positions[:, first : first + count]
             assert np.allclose(own, shown[name] @ turn, rtol=0, atol=3e-6), name
             if name == "Grid":
                 faces = clip.polygons[1][np.isin(clip.polygons[1], np.arange(first, first + count))] - first

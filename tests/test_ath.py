@@ -29,7 +29,10 @@ def make_clip(
     rest: np.ndarray, positions: np.ndarray, vertex_branch: np.ndarray, branch_parent: list[int]
 ) -> MotionClip:
     return MotionClip(
-        positions=positions, time=np.arange(len(positions)) / 30, rest=rest, vertex_branch=vertex_branch,
+        positions=positions,
+        time=np.arange(len(positions)) / 30,
+        rest=rest,
+        vertex_branch=vertex_branch,
         branch_parent=np.array(branch_parent),
     )
 
@@ -96,9 +99,7 @@ def test_rigid_motion_far_from_the_origin_is_one_node():
     rest = bushy_clip(0.0).rest + 1000.0
     moved = rest @ np.swapaxes(rotations(FRAMES), 1, 2) + np.linspace(0, 50, FRAMES)[:, None, None]
     ath = build_ath(make_clip(rest, moved, *BUSHY), max_error=1e-9)
-    assert ath.table1() == {
-        "depth": 1, "nodes": 1, "leaves": 1, "epsilon": 1e-9, "eta": 0, "xi": 1e-9, "lam": 0,
-    }
+    assert ath.table1() == {"depth": 1, "nodes": 1, "leaves": 1, "epsilon": 1e-9, "eta": 0, "xi": 1e-9, "lam": 0}
     assert ath.whole.tolist() == [True]
 
 
@@ -272,8 +273,13 @@ def test_max_error_is_epsilon_and_xi(sample_clip):
 @pytest.mark.parametrize(
     "arguments",
     [
-        {}, {"epsilon": 1.0}, {"epsilon": 1.0, "max_error": 1.0}, {"max_error": -1.0}, {"max_error": np.nan},
-        {"max_error": 1.0, "eta": -1}, {"max_error": 1.0, "max_depth": -1},
+        {},
+        {"epsilon": 1.0},
+        {"epsilon": 1.0, "max_error": 1.0},
+        {"max_error": -1.0},
+        {"max_error": np.nan},
+        {"max_error": 1.0, "eta": -1},
+        {"max_error": 1.0, "max_depth": -1},
     ],
 )
 def test_unusable_thresholds_are_refused(arguments):
@@ -342,8 +348,11 @@ def test_of_a_chain_of_two_thousand_branches_only_the_subtrees_above_the_depth_l
     positions = rest + np.cumsum(0.001 * rng.normal(size=(20, 4000, 3)), axis=1)
     clip = make_clip(rest, positions, np.repeat(np.arange(2000), 2), list(range(-1, 1999)))
     fitted, fit = [], ath_module._Pieces.fit
-    monkeypatch.setattr(ath_module._Pieces, "fit", lambda pieces, frames: (
-        fitted.append(pieces.counts.sum() * frames.shape[1]), fit(pieces, frames))[1])
+    monkeypatch.setattr(
+        ath_module._Pieces,
+        "fit",
+        lambda pieces, frames: (fitted.append(pieces.counts.sum() * frames.shape[1]), fit(pieces, frames))[1],
+    )
     ath = build_ath(clip, max_error=1e-6)
     assert sum(fitted) < 29 * clip.vertex_count * clip.frame_count
     assert ath.height == 29 and ath.node_count == 30 and ath.whole[-1]
@@ -402,7 +411,9 @@ def test_a_survey_accepts_what_tam_accepts_by_its_definition(xi, lam, monkeypatc
 
 def test_one_reading_serves_any_number_of_bounds(sample_clip):
     clip = make_clip(
-        sample_clip.rest, sample_clip.block(0, sample_clip.frame_count), sample_clip.vertex_branch,
+        sample_clip.rest,
+        sample_clip.block(0, sample_clip.frame_count),
+        sample_clip.vertex_branch,
         sample_clip.branch_parent,
     )
     clip.positions = CountedFrames(clip.positions)
@@ -438,8 +449,10 @@ def test_thresholds_that_were_not_surveyed_are_refused():
     clip = bushy_clip(noise=0.1)
     plain, wide = survey(clip), survey(clip, lam=2, xi=0.2, eta=3)
     for surveyed, thresholds in (
-        (plain, Thresholds(0.1, 1, 0.1, 0)), (plain, Thresholds(0.1, 0, 0.1, 1)),
-        (wide, Thresholds(0.1, 4, 0.2, 2)), (wide, Thresholds(0.1, 3, 0.3, 2)),
+        (plain, Thresholds(0.1, 1, 0.1, 0)),
+        (plain, Thresholds(0.1, 0, 0.1, 1)),
+        (wide, Thresholds(0.1, 4, 0.2, 2)),
+        (wide, Thresholds(0.1, 3, 0.3, 2)),
     ):
         with pytest.raises(ValueError, match="got .* expected"):
             surveyed.ath(thresholds)
@@ -449,10 +462,7 @@ def test_thresholds_that_were_not_surveyed_are_refused():
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        {"lam": 1}, {"lam": -1}, {"eta": -1}, {"max_depth": -1}, {"lam": 1, "xi": -1.0},
-        {"lam": 1, "xi": np.nan},
-    ],
+    [{"lam": 1}, {"lam": -1}, {"eta": -1}, {"max_depth": -1}, {"lam": 1, "xi": -1.0}, {"lam": 1, "xi": np.nan}],
 )
 def test_surveys_of_unusable_thresholds_are_refused_before_anything_is_read(arguments):
     clip = bushy_clip(noise=0.0)

@@ -89,8 +89,11 @@ def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(cli
     assert done_once(out) == {"a.ath", "b.ath", "long.ath", "sub/c.ath"}
 
 
-@pytest.mark.parametrize("settings", [{"lossless": True}, {"target_size": "9kB"}, {"weights": "radius"},
-                                      {"max_error": "1mm", "tam": "1mm,2,1cm,3"}], ids=str)
+@pytest.mark.parametrize(
+    "settings",
+    [{"lossless": True}, {"target_size": "9kB"}, {"weights": "radius"}, {"max_error": "1mm", "tam": "1mm,2,1cm,3"}],
+    ids=str,
+)
 def test_a_long_clip_is_the_same_under_settings_of_all_kinds(settings, tmp_path, cluster, sample_file):
     items = batch.find([sample_file], tmp_path / "out", settings=settings | FAST)
     [record] = batch.run(items, tmp_path / "out", scheduler=cluster, split=2).done
@@ -158,8 +161,12 @@ def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, clu
     (out / "long.ath").unlink()
     os.utime(clips / "b.h5", ns=(0, 0))
     items = batch.find([clips], out, settings=FAST, patterns={"sub/*": {"rel_error": 1e-3}})
-    assert reasons(items, out) == {"a.h5": "output was changed", "long.h5": "output is missing",
-                                   "b.h5": "other input", "sub/c.h5": "other settings"}
+    assert reasons(items, out) == {
+        "a.h5": "output was changed",
+        "long.h5": "output is missing",
+        "b.h5": "other input",
+        "sub/c.h5": "other settings",
+    }
     assert len(batch.run(items, out, scheduler=cluster).done) == 4
     assert set(reasons(items, out).values()) == {""} and len(lines(out)) == 8
     assert (out / "sub/c.ath").read_bytes() == alone(clips / "sub/c.h5", tmp_path, rel_error=1e-3, **FAST)
@@ -195,8 +202,16 @@ def test_zeros_and_half_lines_at_the_end_of_a_manifest_are_removed(rest, tmp_pat
     assert path.read_bytes() == b'{"output": "a", "status": "done"}\n'
 
 
-@pytest.mark.parametrize("content", [b"[1, 2]", b'{"name": "package"}', b"text\nmore\n", b'{"output": 3}\n{}\n', b"{"
-                                     b'"output": "a"}\nnotes\n{"output": "b"}\n'])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"[1, 2]",
+        b'{"name": "package"}',
+        b"text\nmore\n",
+        b'{"output": 3}\n{}\n',
+        b'{"output": "a"}\nnotes\n{"output": "b"}\n',
+    ],
+)
 def test_a_file_that_is_no_manifest_is_refused_and_left_alone(content, tmp_path):
     path = tmp_path / "notes.txt"
     path.write_bytes(content)
@@ -276,15 +291,20 @@ def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, tmp_path
 
 def test_inputs_that_name_nothing_or_one_output_twice_are_refused(clips, tmp_path):
     (clips / "a.npz").touch()
-    for wrong, message in (([clips / "none.h5"], "none.h5"), ([clips / "*.abc"], "got no clips"),
-                           ([clips], "expected a name of its own")):
+    for wrong, message in (
+        ([clips / "none.h5"], "none.h5"),
+        ([clips / "*.abc"], "got no clips"),
+        ([clips], "expected a name of its own"),
+    ):
         with pytest.raises((ClipError, FileNotFoundError), match=message):
             batch.find(wrong, tmp_path / "out")
 
 
 def test_later_patterns_win_and_their_bound_takes_the_place_of_another(tmp_path):
-    (tmp_path / "s.toml").write_text('["*"]\nrel_error = 1e-3\neffort = "fast"\n["sub/*"]\nmax_error = "1 mm"\n'
-                                     '["*.npz"]\nmesh = "m.obj"\nfps = "24000/1001"\n')
+    (tmp_path / "s.toml").write_text(
+        '["*"]\nrel_error = 1e-3\neffort = "fast"\n["sub/*"]\nmax_error = "1 mm"\n'
+        '["*.npz"]\nmesh = "m.obj"\nfps = "24000/1001"\n'
+    )
     patterns = batch.load_settings(tmp_path / "s.toml")
     of = functools.partial(batch.settings.settings_of, default={"lossless": True, "effort": "best"}, patterns=patterns)
     assert of(("a.h5",)) == {"lossless": True, "rel_error": 1e-3, "effort": "fast"}
@@ -292,15 +312,25 @@ def test_later_patterns_win_and_their_bound_takes_the_place_of_another(tmp_path)
     assert of(("c.npz",))["mesh"] == str(tmp_path / "m.obj") and of(("c.npz",))["fps"] == 24000 / 1001
 
 
-@pytest.mark.parametrize("text, message", [
-    ("rel_error = 1e-4", "expected a table of settings under a pattern"),
-    ('["*"]\nquality = 3', "unknown setting 'quality', expected one of max_error"),
-    ('["*"]\nrel_error = 2', "rel_error: got 2"), ('["*"]\nmax_error = "1 mile"', "max_error: got '1 mile'"),
-    ('["*"]\neffort = "much"', "expected one of fast"), ('["*"]\nlossless = 1', "expected true or false"),
-    ('["*"]\nsegment_frames = 8', "expected a whole number, 16 to"), ('["*"]\ntam = [1, 2]', "expected four values"),
-    ('["*"]\nsource_format = "zip"', "source_format: got 'zip'"), ('["*"', "got no TOML"),
-    ('["*"]\nrel_error = 1e-3\nmax_error = 1', "expected one of them"), ('["*"]\nloop = "yes"', "expected true or"),
-    ('["*"]\nloop_blend = -1', "expected a whole number, 0 to"), ('["*"]\ntakes = [1]', "expected a pattern or a")])
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("rel_error = 1e-4", "expected a table of settings under a pattern"),
+        ('["*"]\nquality = 3', "unknown setting 'quality', expected one of max_error"),
+        ('["*"]\nrel_error = 2', "rel_error: got 2"),
+        ('["*"]\nmax_error = "1 mile"', "max_error: got '1 mile'"),
+        ('["*"]\neffort = "much"', "expected one of fast"),
+        ('["*"]\nlossless = 1', "expected true or false"),
+        ('["*"]\nsegment_frames = 8', "expected a whole number, 16 to"),
+        ('["*"]\ntam = [1, 2]', "expected four values"),
+        ('["*"]\nsource_format = "zip"', "source_format: got 'zip'"),
+        ('["*"', "got no TOML"),
+        ('["*"]\nrel_error = 1e-3\nmax_error = 1', "expected one of them"),
+        ('["*"]\nloop = "yes"', "expected true or"),
+        ('["*"]\nloop_blend = -1', "expected a whole number, 0 to"),
+        ('["*"]\ntakes = [1]', "expected a pattern or a"),
+    ],
+)
 def test_settings_that_do_not_exist_or_make_no_sense_are_refused_by_name(text, message, tmp_path, capsys, clips):
     (tmp_path / "s.toml").write_text(text)
     words = ["batch", str(clips), "--out", str(tmp_path / "out"), "--settings", str(tmp_path / "s.toml")]
@@ -349,8 +379,7 @@ def test_an_input_without_a_modification_time_is_known_by_its_content(clips, ser
     out = tmp_path / "out"
     items = batch.find([f"{served}/a.h5"], out, settings=FAST)
     [record] = batch.run(items, out, scheduler=cluster).done
-    assert record["source"] == {"size": (clips / "a.h5").stat().st_size,
-                                "sha256": batch.inputs.sha256(clips / "a.h5")}
+    assert record["source"] == {"size": (clips / "a.h5").stat().st_size, "sha256": batch.inputs.sha256(clips / "a.h5")}
     outcome = batch.run(items, out, scheduler=cluster)
     assert outcome.kept == items and not outcome.done and len(lines(out)) == 1
     with open(clips / "a.h5", "r+b") as file:  # of the same size
@@ -368,8 +397,9 @@ def test_clips_in_an_object_store_become_files_there_and_a_second_run_does_what_
 
     def run() -> tuple[int, int]:
         words = [f"{url}/in/**/*.h5", "--out", f"{url}/out", "--manifest", str(notes), "--split", "3", "--verify"]
-        done = subprocess.run([*BATCH, *words, *WORDS, "--workers", "2", "--json"], capture_output=True, text=True,
-                              timeout=120)
+        done = subprocess.run(
+            [*BATCH, *words, *WORDS, "--workers", "2", "--json"], capture_output=True, text=True, timeout=120
+        )
         assert done.returncode == 0, done.stderr
         result = json.loads(done.stdout)
         return result["done"], result["kept"]
@@ -409,10 +439,13 @@ def test_memory_serves_workers_in_this_process_and_is_no_place_for_others(clips,
     assert "workers need a file system that all share" in outcome.failed[0]["reason"]
 
 
-@pytest.mark.parametrize("out, message", [
-    ("memory://out", "memory://out: got no manifest, expected a file of this machine where outputs go to a URL"),
-    ("https://me:hush@example.org/out?key=hush", "https://example.org/out: got a chain of file systems or a query"),
-])
+@pytest.mark.parametrize(
+    "out, message",
+    [
+        ("memory://out", "memory://out: got no manifest, expected a file of this machine where outputs go to a URL"),
+        ("https://me:hush@example.org/out?key=hush", "https://example.org/out: got a chain of file systems or a query"),
+    ],
+)
 def test_an_unusable_output_url_is_an_error_of_one_line(out, message, clips, capsys):
     assert cli.main(["batch", str(clips / "a.h5"), "--out", out]) == 1
     err = capsys.readouterr().err
@@ -632,11 +665,17 @@ def test_a_full_tmpfs_is_reported_and_a_second_run_does_what_is_missing(many, tm
     """A tmpfs in a mount namespace of its own, which the system has to allow."""
     out, kept = tmp_path / "out", tmp_path / "kept"
     out.mkdir()
-    script = ('mount -t tmpfs -o size=40k none "$1"; out="$1"; kept="$2"; shift 2; "$@"; code=$?; '
-              'cp -a "$out" "$kept"; exit $code')
+    script = (
+        'mount -t tmpfs -o size=40k none "$1"; out="$1"; kept="$2"; shift 2; "$@"; code=$?; '
+        'cp -a "$out" "$kept"; exit $code'
+    )
     command = [*BATCH, str(many), "--out", str(out), *WORDS, "--workers", "2"]
-    done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(out), str(kept), *command],
-                          capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", script, "sh", str(out), str(kept), *command],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 1 and "No space left" in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert not leftovers(kept) and done_once(kept) < ALL
     code, err = finished(start(many, kept))
@@ -645,8 +684,20 @@ def test_a_full_tmpfs_is_reported_and_a_second_run_does_what_is_missing(many, tm
 
 @pytest.mark.slow
 def test_the_benchmark_compares_numbers_of_workers_and_every_file(tmp_path):
-    command = [sys.executable, "-m", "bench", "batch", "--clips", "4", "--frames", "20", "--effort", "fast", "--json",
-               str(tmp_path / "b.json")]
+    command = [
+        sys.executable,
+        "-m",
+        "bench",
+        "batch",
+        "--clips",
+        "4",
+        "--frames",
+        "20",
+        "--effort",
+        "fast",
+        "--json",
+        str(tmp_path / "b.json"),
+    ]
     subprocess.run(command, cwd=Path(__file__).resolve().parent.parent, check=True, capture_output=True, timeout=120)
     result = json.loads((tmp_path / "b.json").read_text())
     runs_of, ratios = (each["rows"] for each in result["tables"])

@@ -33,8 +33,14 @@ def run_bench(tmp_path, *words, code=0, **environment):
     """(printed text, contents of the JSON file) of one run, on the sample where no clip is named."""
     file = tmp_path / "result.json"
     path = {"PYTHONPATH": str(ROOT / "tests")}
-    done = subprocess.run([sys.executable, "-m", "bench", *words, "--json", str(file)], cwd=ROOT, text=True,
-                          capture_output=True, timeout=300, env=os.environ | path | environment)
+    done = subprocess.run(
+        [sys.executable, "-m", "bench", *words, "--json", str(file)],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        timeout=300,
+        env=os.environ | path | environment,
+    )
     assert done.returncode == code, done.stderr
     return done.stdout, read(file)
 
@@ -45,7 +51,7 @@ def tables_of(result):
 
 def cells_of(text, title):
     """Cells by column of the first row of a printed table."""
-    lines = text[text.index(f"### {title}"):].splitlines()
+    lines = text[text.index(f"### {title}") :].splitlines()
     header, row = ([cell.strip() for cell in lines[i].strip("|").split("|")] for i in (2, 4))
     return dict(zip(header, row, strict=True))
 
@@ -95,7 +101,9 @@ def test_figures_come_with_command_versions_and_machine(sizes):
 def test_the_picture_has_a_panel_for_every_level(tmp_path):
     drawing = tmp_path / "levels.svg"
     run_bench(tmp_path, "picture", "--out", str(drawing), "--frame", "0")
-    captions = ["".join(text.itertext()) for text in ElementTree.parse(drawing).iter("{http://www.w3.org/2000/svg}text")]
+    captions = [
+        "".join(text.itertext()) for text in ElementTree.parse(drawing).iter("{http://www.w3.org/2000/svg}text")
+    ]
     with athcodec.read_hdf5(athcodec.sample_path()) as clip:
         levels = athcodec.build_ath(clip, max_error=1e-4 * 10.657).height + 2
     assert [caption.split()[1] for caption in captions[::2]] == [str(level) for level in range(levels)]
@@ -160,16 +168,29 @@ def test_the_size_at_an_error_is_interpolated_between_points_that_nothing_beats(
 
 
 def point(codec, kind, bound, size, kg, status="ok"):
-    return {"clip": "tree", "codec": codec, "kind": kind, "bound": bound, "status": status, "bytes": size,
-            "max": bound, "rms": bound / 2, "kg": kg}
+    return {
+        "clip": "tree",
+        "codec": codec,
+        "kind": kind,
+        "bound": bound,
+        "status": status,
+        "bytes": size,
+        "max": bound,
+        "rms": bound / 2,
+        "kg": kg,
+    }
 
 
 def test_ratios_take_the_best_of_each_kind_and_the_best_pca_at_equal_rms():
-    points = [point("athcodec", "athcodec", 1e-3, 100, 0.2), point("athcodec", "athcodec", 1e-4, 400, 0.05),
-              point("Global PCA", "baseline", 1e-3, 300, 0.4),
-              point("Global PCA", "baseline", 1e-4, 1200, 0.025),
-              point("plain", "baseline", 1e-3, 150, 0.1), point("zip", "program", 1e-3, 700, 0.1),
-              point("zop", "program", 1e-3, 10, 0.1, status="bound broken")]
+    points = [
+        point("athcodec", "athcodec", 1e-3, 100, 0.2),
+        point("athcodec", "athcodec", 1e-4, 400, 0.05),
+        point("Global PCA", "baseline", 1e-3, 300, 0.4),
+        point("Global PCA", "baseline", 1e-4, 1200, 0.025),
+        point("plain", "baseline", 1e-3, 150, 0.1),
+        point("zip", "program", 1e-3, 700, 0.1),
+        point("zop", "program", 1e-3, 10, 0.1, status="bound broken"),
+    ]
     rows = {(row["against"], row["at"]): row for row in compare.ratios(points, "athcodec")}
     assert rows["program", "max 0.001"]["ratio"] == 7 and rows["program", "max 0.001"]["met"]
     assert rows["baseline", "max 0.001"]["best of them"] == "plain"
@@ -182,16 +203,23 @@ def test_ratios_take_the_best_of_each_kind_and_the_best_pca_at_equal_rms():
 
 def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
     names = ("Rounded", "TooCoarse", "Aborting", "Raising", "Remembering", "Absent")
-    text, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3",
-                             "--codecs", *(f"bench_codecs:{name}" for name in names))
+    text, result = run_bench(
+        tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", *(f"bench_codecs:{name}" for name in names)
+    )
     points = {point["codec"]: point for point in result["points"]}
     assert {name: point["status"] for name, point in points.items()} == {
-        "rounded": "ok", "too coarse": "bound broken", "aborting": "failed", "raising": "failed",
-        "remembering": "failed", "absent": "missing"}
+        "rounded": "ok",
+        "too coarse": "bound broken",
+        "aborting": "failed",
+        "raising": "failed",
+        "remembering": "failed",
+        "absent": "missing",
+    }
     assert 0 < points["rounded"]["max"] <= 1e-3 < points["too coarse"]["max"]
     assert "sizes: got 3, expected 4" in points["raising"]["why"]
-    assert all(f"{point['status'].upper()}: {point['why']}" in text for name, point in points.items()
-               if name != "rounded")
+    assert all(
+        f"{point['status'].upper()}: {point['why']}" in text for name, point in points.items() if name != "rounded"
+    )
     assert "\nBROKEN" not in text  # of programs; a baseline that breaks its bound is our own mistake
 
 
@@ -202,16 +230,18 @@ def test_a_baseline_that_breaks_its_bound_fails_the_run(tmp_path, bushy_file):
 
 
 def test_a_codec_that_takes_too_long_is_stopped(tmp_path, bushy_file):
-    _, result = run_bench(tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", "bench_codecs:Sleeping",
-                          "--timeout", "2")
+    _, result = run_bench(
+        tmp_path, "rd", bushy_file, "--bounds", "1e-3", "--codecs", "bench_codecs:Sleeping", "--timeout", "2"
+    )
     [point] = result["points"]
     assert (point["status"], point["why"]) == ("too slow", "encode: longer than 2 s")
 
 
 def test_a_run_measures_only_missing_results(tmp_path, bushy_file):
     def run(*bounds):
-        return run_bench(tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", *bounds,
-                         COUNT=str(count))[1]["points"]
+        return run_bench(
+            tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", *bounds, COUNT=str(count)
+        )[1]["points"]
 
     count = tmp_path / "count"
     first = run("1e-3")
@@ -244,8 +274,11 @@ def test_results_read_back_as_they_were_saved_one_row_each(tmp_path):
     file = tmp_path / "results.json"
     store = Store(file, {"command": "rd"}, {"points": ("clip", "bound")})
     depends = {"zip": "1.0"}
-    points = [store.add("points", {"clip": clip, "bound": bound, "settings": "coarse " * 9, "depends": depends} | more)
-              for clip in ("tree", "bush") for bound, more in ((0.5, {"bytes": 3, "max": 0.1}), (1, {"why": "1"}))]
+    points = [
+        store.add("points", {"clip": clip, "bound": bound, "settings": "coarse " * 9, "depends": depends} | more)
+        for clip in ("tree", "bush")
+        for bound, more in ((0.5, {"bytes": 3, "max": 0.1}), (1, {"why": "1"}))
+    ]
     assert read(file) == {"command": "rd", "points": points}
     text = file.read_text()
     assert text.count("coarse " * 9) == text.count('"zip"') == 1 and text.count("[0,0.5,") == 1
@@ -279,12 +312,34 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
 
 
 def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path, bushy_file):
-    _, result = run_bench(tmp_path, "forest", "--of", bushy_file, "--instances", "1", "900", "--clips", "1", "3",
-                          "--phases", "2", "0", "--frames", "600", "--rounds", "1")
+    _, result = run_bench(
+        tmp_path,
+        "forest",
+        "--of",
+        bushy_file,
+        "--instances",
+        "1",
+        "900",
+        "--clips",
+        "1",
+        "3",
+        "--phases",
+        "2",
+        "0",
+        "--frames",
+        "600",
+        "--rounds",
+        "1",
+    )
     forests, parts, units = tables_of(result)
     assert result["broken"] == []
     assert [(row["instances"], row["clips"], row["phases"]) for row in forests] == [
-        (1, 1, 2), (900, 1, 2), (900, 1, "own"), (900, 3, 2), (900, 3, "own")]
+        (1, 1, 2),
+        (900, 1, 2),
+        (900, 1, "own"),
+        (900, 3, 2),
+        (900, 3, "own"),
+    ]
     assert all(sum(row["levels"]) == row["instances"] for row in forests)
     for row in forests:
         assert row["kB/s"] == pytest.approx(row["predicted kB/s"], rel=0.1) and 0 < row["ms"]
@@ -298,15 +353,44 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path,
 
 @pytest.mark.slow
 def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
-    _, result = run_bench(tmp_path, "forest", "--of", bushy_file, "--instances", "20", "--clips", "2", "--phases", "3",
-                          "--frames", "300", "--rounds", "1")
+    _, result = run_bench(
+        tmp_path,
+        "forest",
+        "--of",
+        bushy_file,
+        "--instances",
+        "20",
+        "--clips",
+        "2",
+        "--phases",
+        "3",
+        "--frames",
+        "300",
+        "--rounds",
+        "1",
+    )
     [row] = tables_of(result)[0]
     assert row["kB/s"] == row["predicted kB/s"] == 0 and result["broken"] == []
 
 
 def test_requests_and_bytes_of_a_frame_behind_a_url_are_counted_and_limited(tmp_path, bushy_file):
-    _, result = run_bench(tmp_path, "remote", "--of", bushy_file, "--plants", "1", "20", "--frames", "300", "--frame",
-                          "250", "--rounds", "1", "--latency", "0.01")
+    _, result = run_bench(
+        tmp_path,
+        "remote",
+        "--of",
+        bushy_file,
+        "--plants",
+        "1",
+        "20",
+        "--frames",
+        "300",
+        "--frame",
+        "250",
+        "--rounds",
+        "1",
+        "--latency",
+        "0.01",
+    )
     [rows] = tables_of(result)
     assert result["broken"] == []
     for row in rows:
@@ -344,8 +428,19 @@ def test_the_papers_number_of_nodes_is_met_by_its_parameters(sample_clip):
 
 def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
     folder = tmp_path / "out"
-    _, result = run_bench(tmp_path, "quick", bushy_file, "--codecs", "athcodec", "bench_codecs:Rounded",
-                          "--bounds", "1e-2", "1e-3", "--out", str(folder))
+    _, result = run_bench(
+        tmp_path,
+        "quick",
+        bushy_file,
+        "--codecs",
+        "athcodec",
+        "bench_codecs:Rounded",
+        "--bounds",
+        "1e-2",
+        "1e-3",
+        "--out",
+        str(folder),
+    )
     steps = [row["step"] for row in result["tables"][0]["rows"]]
     assert steps == ["rd", "decode", "paper", "scale", "forest", "remote", "report", "all"]
     text = (folder / "report.md").read_text()
@@ -365,10 +460,11 @@ def test_a_quick_run_leaves_results_a_report_and_pictures(tmp_path, bushy_file):
 
 def test_without_matplotlib_the_report_says_what_to_install(tmp_path, bushy_file):
     run_bench(tmp_path, "rd", bushy_file, "--codecs", "bench_codecs:Rounded", "--bounds", "1e-3")
-    program = ("import sys; sys.modules['matplotlib'] = None; from bench.__main__ import main; "
-               f"sys.exit(main(['report', '--results', {str(tmp_path)!r}]))")
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, text=True, capture_output=True,
-                          timeout=60)
+    program = (
+        "import sys; sys.modules['matplotlib'] = None; from bench.__main__ import main; "
+        f"sys.exit(main(['report', '--results', {str(tmp_path)!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, text=True, capture_output=True, timeout=60)
     assert done.returncode == 0 and plots.MISSING in done.stdout
     assert plots.MISSING in (tmp_path / "report.md").read_text()
     assert 'pip install "athcodec[bench]"' in plots.MISSING

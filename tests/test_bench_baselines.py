@@ -38,12 +38,7 @@ def piece():
     with read_hdf5(sample_path()) as clip:
         return Source(
             MotionClip(
-                clip.block(40, 56),
-                clip.time[40:56],
-                clip.vertex_branch,
-                clip.branch_parent,
-                clip.rest,
-                clip.edges,
+                clip.block(40, 56), clip.time[40:56], clip.vertex_branch, clip.branch_parent, clip.rest, clip.edges
             )
         )
 
@@ -93,9 +88,7 @@ def test_clips_longer_than_a_segment_are_coded_in_parts(piece):
         piece.positions[start + 1] - piece.positions[start]
     )
     clip = piece.clip
-    longer = MotionClip(
-        frames.astype(np.float32), np.arange(270.0), clip.vertex_branch, clip.branch_parent, clip.rest
-    )
+    longer = MotionClip(frames.astype(np.float32), np.arange(270.0), clip.vertex_branch, clip.branch_parent, clip.rest)
     source = Source(longer)
     codec = BASELINES[0]
     settings = {name: axis.values[axis.start] for name, axis in codec.grid(source, 1.0).items()}
@@ -114,9 +107,7 @@ def test_athcodec_is_compared_as_a_codec_like_others(piece, single_depth):
 
 @pytest.mark.parametrize("codec", BASELINES[::2], ids=lambda codec: codec.name)
 def test_truncated_encodings_are_refused(codec, piece, encodings):
-    data = (
-        encodings[codec.name][0] if codec.name in encodings else codec.encode(piece, BOUND * piece.diagonal)
-    )
+    data = encodings[codec.name][0] if codec.name in encodings else codec.encode(piece, BOUND * piece.diagonal)
     with pytest.raises(DamagedStream):
         codec.decode(data[: len(data) // 2])
 
@@ -208,9 +199,7 @@ def test_rigid_parts_are_placed_by_their_tracks():
     random = np.random.default_rng(1)
     pose = random.normal(size=(20, 3))
     turns = np.cumsum(random.normal(size=(1, 9, 3)) * 0.5, axis=1)
-    np.testing.assert_allclose(
-        _rotations(_rotation_vectors(_rotations(turns))), _rotations(turns), atol=1e-12
-    )
+    np.testing.assert_allclose(_rotations(_rotation_vectors(_rotations(turns))), _rotations(turns), atol=1e-12)
     positions = np.moveaxis(pose @ np.swapaxes(_rotations(turns)[0], 1, 2), 0, 2)
     parts = Parts(np.zeros(20, int), pose)
     np.testing.assert_allclose(parts.place_rigid(parts.fit_rigid(positions)), positions, atol=0.02)

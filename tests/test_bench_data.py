@@ -65,7 +65,7 @@ def test_a_plant_has_the_nodes_and_orders_asked_for_and_thins_towards_its_tips(n
     assert order[0] == 0 and sizes[0] == nodes
     for node in order[:20]:
         begin = int(np.flatnonzero(order == node)[0])
-        carried = order[begin:begin + sizes[node]]
+        carried = order[begin : begin + sizes[node]]
         assert set(plant.parent[carried[1:]]) <= set(carried)
 
 
@@ -154,9 +154,9 @@ def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip
     assert (fine.vertex_count, fine.frame_count) == (stems + 160, 12)
     assert np.allclose(fine.positions[:, :stems:3], sample_clip.block(0, 12), atol=1e-6)
     ratio = lengths(fine.positions, fine.edges) / lengths(fine.rest, fine.edges)
-    assert np.abs(ratio[:, stems - 1:] - 1).max() < 1e-3, "twigs are torn off"
+    assert np.abs(ratio[:, stems - 1 :] - 1).max() < 1e-3, "twigs are torn off"
     assert np.abs(ratio - 1).max() < 0.3, "stems are torn apart"
-    twig_tips = fine.positions[:, stems + 3::4] - fine.positions[:, stems::4]
+    twig_tips = fine.positions[:, stems + 3 :: 4] - fine.positions[:, stems::4]
     assert np.ptp(twig_tips, axis=0).max() > 0.01
     assert len(fine.edges) == fine.vertex_count - 1
 
@@ -212,8 +212,10 @@ def test_clips_are_found_by_name_and_by_path(monkeypatch, recipes, tmp_path):
     monkeypatch.setenv(data.FOLDER_VARIABLE, str(tmp_path))
     recipes["still"] = Still(2)
     monkeypatch.setitem(data.SUITES, "quick", ("sample", "still"))
-    assert [(name, path) for name, path, _ in data.clips("quick")] == [("sample", sample),
-                                                                       ("still", tmp_path / "still.h5")]
+    assert [(name, path) for name, path, _ in data.clips("quick")] == [
+        ("sample", sample),
+        ("still", tmp_path / "still.h5"),
+    ]
 
 
 def test_the_verb_prints_a_table_of_the_clips(tmp_path):

@@ -36,8 +36,13 @@ def interleaved(clip, seed):
     order = np.empty(len(branch), int)
     order[np.argsort(labels, kind="stable")] = np.argsort(branch, kind="stable")
     positions = clip.block(FRAMES.start, FRAMES.stop)[:, kept][:, order]
-    return MotionClip(positions=positions, time=clip.time[FRAMES], vertex_branch=labels,
-                      branch_parent=clip.branch_parent[:BRANCHES], rest=clip.rest[kept][order])
+    return MotionClip(
+        positions=positions,
+        time=clip.time[FRAMES],
+        vertex_branch=labels,
+        branch_parent=clip.branch_parent[:BRANCHES],
+        rest=clip.rest[kept][order],
+    )
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +53,13 @@ def piece():
 
 def each_of(codecs):
     """One test for each; those that the tests' own extra does not install need the extra `bench`."""
-    return pytest.mark.parametrize("codec", [
-        pytest.param(codec, id=codec.name, marks=() if codec.package in INSTALLED else pytest.mark.programs)
-        for codec in codecs])
+    return pytest.mark.parametrize(
+        "codec",
+        [
+            pytest.param(codec, id=codec.name, marks=() if codec.package in INSTALLED else pytest.mark.programs)
+            for codec in codecs
+        ],
+    )
 
 
 @each_of(PROGRAMS)
@@ -74,8 +83,9 @@ def test_lossless_programs_give_every_bit_back(codec, piece):
 def test_programs_take_clips_of_one_frame_or_one_vertex(codec, frames, vertices):
     rng = np.random.default_rng(frames + vertices)
     positions = rng.normal(size=(frames, vertices, 3)).astype(np.float32)
-    clip = MotionClip(positions=positions, time=np.arange(frames),
-                      vertex_branch=np.zeros(vertices, int), branch_parent=np.array([-1]))
+    clip = MotionClip(
+        positions=positions, time=np.arange(frames), vertex_branch=np.zeros(vertices, int), branch_parent=np.array([-1])
+    )
     _, decoded = check(codec, Source(clip), 1e-3)
     assert decoded.shape == positions.shape
 
@@ -127,6 +137,7 @@ def test_a_bound_below_what_float32_resolves_is_refused(piece):
 
 def test_a_program_that_breaks_the_bound_is_caught(piece, monkeypatch):
     [codec] = [codec for codec in PROGRAMS if codec.package == "zstandard"]
+
     def wrong(grid, integers):
         return (integers * grid.step * 0.9).astype(np.float32)
 

@@ -100,8 +100,11 @@ def test_objects_play_clips_of_one_file_by_name_and_loops_go_on(extended_blender
     with athcodec.open(medley_ath) as decoder:
         calm, gust, loop = decoder.play("calm"), decoder.play("Böe"), decoder.play("round")
         seam = (calm.positions(19) + calm.positions(0)) / 2
-        for (one, other), frame, expected in zip(found["shown"], frames, [
-                calm.positions(0), calm.positions(5), calm.positions(19), seam, calm.positions(0), calm.positions(5)]):
+        for (one, other), frame, expected in zip(
+            found["shown"],
+            frames,
+            [calm.positions(0), calm.positions(5), calm.positions(19), seam, calm.positions(0), calm.positions(5)],
+        ):
             assert np.allclose(one, expected, atol=1e-5)
             place = np.interp((frame - 1) / 30, gust.time - gust.time[0], np.arange(37))
             low, high = gust.positions(int(place)), gust.positions(min(int(place) + 1, 36))
@@ -118,23 +121,30 @@ def test_a_saved_blend_file_plays_after_it_was_moved(extended_blender, sample_at
     for folder in (here, there):
         folder.mkdir()
         (folder / "tree.ath").write_bytes(Path(sample_ath).read_bytes())
-    extended_blender.run("""
+    extended_blender.run(
+        """
 fresh()
 bpy.ops.import_scene.ath(filepath=args["here"] + "/tree.ath", level=3)
 bpy.ops.wm.save_as_mainfile(filepath=args["here"] + "/scene.blend")
 assert bpy.context.active_object.ath.filepath == "//tree.ath", bpy.context.active_object.ath.filepath
 bpy.ops.wm.save_as_mainfile(filepath=args["there"] + "/scene.blend")
 assert bpy.context.active_object.ath.filepath.startswith("//../here/"), bpy.context.active_object.ath.filepath
-""", here=here, there=there)
+""",
+        here=here,
+        there=there,
+    )
     (there / "scene.blend").write_bytes((here / "scene.blend").read_bytes())
     (here / "tree.ath").unlink()
-    shown = extended_blender.run("""
+    shown = extended_blender.run(
+        """
 fresh()
 bpy.ops.wm.open_mainfile(filepath=args["blend"])
 obj = next(found for found in bpy.data.objects if found.ath.filepath)
 bpy.context.scene.frame_set(33)
 save(shown=world(obj.name), level=obj.ath.level, start=obj.ath.frame_offset)
-""", blend=there / "scene.blend")
+""",
+        blend=there / "scene.blend",
+    )
     assert shown["level"] == 3
     with athcodec.open(sample_ath) as decoder:
         positions = decoder.positions(33 - int(shown["start"]), 3)
@@ -144,7 +154,8 @@ save(shown=world(obj.name), level=obj.ath.level, start=obj.ath.frame_offset)
 @pytest.mark.programs
 def test_a_render_of_many_frames_sees_each(extended_blender, tmp_path):
     extended_blender.run(EXPORT, ath=tmp_path / "a.ath", options={})
-    found = extended_blender.run("""
+    found = extended_blender.run(
+        """
 fresh()
 bpy.ops.import_scene.ath(filepath=args["ath"])
 obj, scene = bpy.context.active_object, bpy.context.scene
@@ -173,7 +184,10 @@ for frame in (12, 20, 28):
     bpy.ops.render.render(write_still=True)
     still.append(pixels(scene.render.filepath))
 save(played=np.array(played), still=np.array(still))
-""", ath=tmp_path / "a.ath", out=str(tmp_path / "frame"))
+""",
+        ath=tmp_path / "a.ath",
+        out=str(tmp_path / "frame"),
+    )
     played = found["played"]
     assert all((image > 0).sum() > 20 for image in played)
     assert np.abs(np.diff(played, axis=0)).max() > 0.5
@@ -183,7 +197,8 @@ save(played=np.array(played), still=np.array(still))
 @pytest.mark.programs
 def test_files_that_cannot_be_played_are_reported_and_stop_nothing(extended_blender, sample_ath, bushy_ath, tmp_path):
     (tmp_path / "bad.ath").write_bytes(b"no such thing")
-    found = extended_blender.run("""
+    found = extended_blender.run(
+        """
 fresh()
 try:
     bpy.ops.import_scene.ath(filepath=args["bad"])
@@ -199,7 +214,11 @@ bpy.context.scene.frame_set(20)
 gone = player.problem_of(obj)
 obj.ath.filepath = args["ath"]
 save(said=said, other=other, gone=gone, again=player.problem_of(obj), objects=len(bpy.data.objects))
-""", bad=tmp_path / "bad.ath", ath=sample_ath, other=bushy_ath)
+""",
+        bad=tmp_path / "bad.ath",
+        ath=sample_ath,
+        other=bushy_ath,
+    )
     assert "bad.ath" in str(found["said"]) and "vertices" in str(found["other"])
     assert "none" in str(found["gone"]) and str(found["again"]) == "" and found["objects"] == 1
 
@@ -234,8 +253,11 @@ save(shown=np.array(shown), faces=[list(polygon.vertices) for polygon in obj.dat
 
 
 @pytest.mark.programs
-@pytest.mark.parametrize("options", [{}, {"bound": "LENGTH", "max_error": 0.01, "effort": "fast"}, {"space": "LOCAL"},
-                                     {"bound": "LOSSLESS"}], ids=["default", "length", "local", "lossless"])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"bound": "LENGTH", "max_error": 0.01, "effort": "fast"}, {"space": "LOCAL"}, {"bound": "LOSSLESS"}],
+    ids=["default", "length", "local", "lossless"],
+)
 def test_what_blender_shows_is_written_within_the_bound(extended_blender, tmp_path, options):
     found = extended_blender.run(EXPORT, ath=tmp_path / "a.ath", options=options)
     with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
@@ -252,7 +274,9 @@ def test_what_blender_shows_is_written_within_the_bound(extended_blender, tmp_pa
 
 @pytest.mark.programs
 def test_an_exported_mesh_is_imported_at_the_same_place(extended_blender, tmp_path):
-    found = extended_blender.run(EXPORT + """
+    found = extended_blender.run(
+        EXPORT
+        + """
 bpy.ops.import_scene.ath(filepath=args["ath"])
 other, again = bpy.context.active_object, []
 for frame in range(11, 31):
@@ -260,7 +284,10 @@ for frame in range(11, 31):
     again.append(world(other.name))
 save(shown=np.array(shown), again=np.array(again), faces=[list(polygon.vertices) for polygon in other.data.polygons],
      range=[scene.frame_start, scene.frame_end])
-""", ath=tmp_path / "a.ath", options={})
+""",
+        ath=tmp_path / "a.ath",
+        options={},
+    )
     assert np.abs(found["again"] - found["shown"]).max() < 2e-3 and found["range"].tolist() == [11, 30]
 
 
@@ -273,17 +300,25 @@ def test_blender_accepts_the_package(extended_blender, tmp_path):
         for name in archive.namelist():
             if name.startswith("wheels/"):
                 assert f'"./{name}"' in manifest
-    extended_blender.run("""
+    extended_blender.run(
+        """
 import subprocess
 from pathlib import Path
 tool = next(Path(bpy.utils.resource_path("LOCAL")).rglob("blender_ext.py"))
 subprocess.run([sys.executable, str(tool), "validate", args["zip"], "--valid-tags="], check=True)
-""", zip=folder / "athcodec-blender.zip")
+""",
+        zip=folder / "athcodec-blender.zip",
+    )
 
 
-@pytest.mark.parametrize("name, expected", [
-    ("athcodec-1-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.whl", "linux-x64"),
-    ("athcodec-1-py3-none-win_amd64.whl", "windows-x64"), ("athcodec-1-py3-none-macosx_11_0_arm64.whl", "macos-arm64")])
+@pytest.mark.parametrize(
+    "name, expected",
+    [
+        ("athcodec-1-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.whl", "linux-x64"),
+        ("athcodec-1-py3-none-win_amd64.whl", "windows-x64"),
+        ("athcodec-1-py3-none-macosx_11_0_arm64.whl", "macos-arm64"),
+    ],
+)
 def test_wheels_are_for_blenders_platforms(name, expected):
     assert build.platform(Path(name)) == expected
 

@@ -27,7 +27,9 @@ def points(thing, frame):
     return found.reshape(-1, 3)
 """
 
-MOVED_BY_CACHE = START + """
+MOVED_BY_CACHE = (
+    START
+    + """
 folder, kind, how = sys.argv[1:]
 bpy.ops.wm.obj_import(filepath=folder + "/tree.obj", forward_axis="Y", up_axis="Z")
 tube, = bpy.data.objects
@@ -42,8 +44,11 @@ for frame in range(1, 7):
 np.save(folder + "/moved.npy", np.array(motion))
 np.save(folder + "/faces.npy", np.array([list(face.vertices) for face in tube.data.polygons]))
 """
+)
 
-MADE_BY_BLENDER = START + """
+MADE_BY_BLENDER = (
+    START
+    + """
 folder, = sys.argv[1:]
 bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=5)
 ball = bpy.context.object
@@ -61,6 +66,7 @@ for frame in range(1, 7):
 np.save(folder + "/moved.npy", np.array([points(ball, frame) for frame in range(1, 7)]))
 np.save(folder + "/corners.npy", np.array([v for face in ball.data.polygons for v in face.vertices]))
 """
+)
 
 
 @pytest.mark.parametrize("kind, how", [("PC2", "frame"), ("MDD", "frame"), ("MDD", "seconds")])

@@ -76,8 +76,9 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
         return shown
 
     monkeypatch.setattr(athcodec.Decoder, "positions", moved)
-    assert any(re.match(r"frame 7, vertex 1: [12]\.\d+ bounds off", found)
-               for found in broken_promises(attack, scratch))
+    assert any(
+        re.match(r"frame 7, vertex 1: [12]\.\d+ bounds off", found) for found in broken_promises(attack, scratch)
+    )
     monkeypatch.undo()
     monkeypatch.setattr(athcodec.container, "_round_up", lambda values: 0.5 * np.asarray(values))
     assert re.match(r"level 0, segment 0: stated", broken_promises(attack, scratch)[0])
@@ -86,8 +87,9 @@ def test_a_broken_promise_would_be_seen(scratch, monkeypatch):
 # ---- what cannot be kept is refused ----
 
 
-@pytest.mark.parametrize("scale, is_float64", [(1e-300, True), (1e-160, True), (1e-100, True), (1e-40, True),
-                                         (1e-40, False), (1e-36, False)])
+@pytest.mark.parametrize(
+    "scale, is_float64", [(1e-300, True), (1e-160, True), (1e-100, True), (1e-40, True), (1e-40, False), (1e-36, False)]
+)
 def test_plants_too_small_for_the_steps_of_a_file_are_refused(scale, is_float64, scratch):
     """float64 clips of 1e-200 came back hundreds of bounds off, as squares of their errors are 0; of 1e-40,
     encoding never ended, as no step of a file is that small."""
@@ -110,8 +112,13 @@ def test_a_clip_without_any_extent_has_a_bound_that_a_file_can_hold(scratch):
 
 
 @settings(STEADY, max_examples=40)
-@given(st.integers(0, 19), st.integers(0, 9), st.integers(0, 2),
-       st.sampled_from([np.nan, np.inf, -np.inf, 1e19, -3e38]), st.sampled_from([np.float32, np.float64]))
+@given(
+    st.integers(0, 19),
+    st.integers(0, 9),
+    st.integers(0, 2),
+    st.sampled_from([np.nan, np.inf, -np.inf, 1e19, -3e38]),
+    st.sampled_from([np.float32, np.float64]),
+)
 def test_one_number_that_is_not_finite_is_refused_wherever_it_is(scratch, frame, vertex, axis, value, dtype):
     clip = plant(seed=2, branches=5, longest=4, frames=20, dtype=dtype)
     vertex %= clip.vertex_count

@@ -118,8 +118,10 @@ def test_a_file_is_not_larger_than_its_target_size(tmp_path, capsys):
 
 
 def test_without_attributes_only_the_unit_is_kept(tmp_path):
-    assert run("encode", SAMPLE, tmp_path / "a.ath", "--attributes", "none", "--effort", "fast",
-               "--rel-error", "1e-2") == 0
+    assert (
+        run("encode", SAMPLE, tmp_path / "a.ath", "--attributes", "none", "--effort", "fast", "--rel-error", "1e-2")
+        == 0
+    )
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert decoder.metadata == {"unit": "m", "up_axis": "y"}
         assert decoder.edges is None and decoder.attributes == {}

@@ -75,11 +75,7 @@ def test_blocks_cannot_be_used_to_change_the_clip(forked_clip):
         forked_clip.block(0, 1)[0, 0, 0] = 1
 
 
-@given(
-    frames=st.integers(1, 90),
-    max_frames=st.none() | st.integers(1, 100),
-    chunk=st.none() | st.integers(1, 40),
-)
+@given(frames=st.integers(1, 90), max_frames=st.none() | st.integers(1, 100), chunk=st.none() | st.integers(1, 40))
 def test_blocks_cover_every_frame_once_within_the_limits(frames, max_frames, chunk):
     positions = CountingPositions(frames, 7, chunk)
     budget = clip_module.BLOCK_BYTES

@@ -43,23 +43,40 @@ GUARD = 0xA5
 
 
 class Info(ctypes.Structure):
-    _fields_ = [("file_length", c_uint64), ("prelude_length", c_uint64), ("max_error", c_double),
-                ("origin", c_double * 3)]
-    _fields_ += [(name, c_int32) for name in ("vertex_count branch_count frame_count segment_count clip_count "
-                                              "level_count full_level_count node_count chunk_count is_float64").split()]
-    _fields_ += [("epsilon", c_float), ("xi", c_float), ("eta", c_uint32), ("lambda_", c_uint32),
-                 ("rest_is_float64", c_int32)]
+    _fields_ = [
+        ("file_length", c_uint64),
+        ("prelude_length", c_uint64),
+        ("max_error", c_double),
+        ("origin", c_double * 3),
+    ]
+    _fields_ += [
+        (name, c_int32)
+        for name in (
+            "vertex_count branch_count frame_count segment_count clip_count "
+            "level_count full_level_count node_count chunk_count is_float64"
+        ).split()
+    ]
+    _fields_ += [
+        ("epsilon", c_float),
+        ("xi", c_float),
+        ("eta", c_uint32),
+        ("lambda_", c_uint32),
+        ("rest_is_float64", c_int32),
+    ]
 
 
 class Clip(ctypes.Structure):
     _fields_ = [("name", c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
-                                              "reserved").split()]
+    _fields_ += [
+        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
+    ]
 
 
 class Limits(ctypes.Structure):
-    _fields_ = [(name, c_uint32) for name in ("chunks table_bytes vertices branches frames hierarchy_depth "
-                                              "chunk_bytes reserved").split()] + [("memory_bytes", c_uint64)]
+    _fields_ = [
+        (name, c_uint32)
+        for name in ("chunks table_bytes vertices branches frames hierarchy_depth chunk_bytes reserved").split()
+    ] + [("memory_bytes", c_uint64)]
 
 
 class Range(ctypes.Structure):
@@ -71,14 +88,32 @@ class Part(ctypes.Structure):
 
 
 class Chunk(ctypes.Structure):
-    _fields_ = [("bytes", c_void_p), ("offset", c_uint64), ("length", c_uint32), ("checksum", c_uint32),
-                ("segment", c_uint32), ("kind", c_uint16), ("level", c_uint8), ("reserved", c_uint8)]
+    _fields_ = [
+        ("bytes", c_void_p),
+        ("offset", c_uint64),
+        ("length", c_uint32),
+        ("checksum", c_uint32),
+        ("segment", c_uint32),
+        ("kind", c_uint16),
+        ("level", c_uint8),
+        ("reserved", c_uint8),
+    ]
 
 
 class Fault(ctypes.Structure):
-    _fields_ = [("code", c_int32), ("field", c_int32), ("chunk", c_int32), ("kind", c_uint16), ("level", c_uint8),
-                ("reserved", c_uint8), ("segment", c_uint32), ("offset", c_uint64), ("found", c_double),
-                ("least", c_double), ("most", c_double)]
+    _fields_ = [
+        ("code", c_int32),
+        ("field", c_int32),
+        ("chunk", c_int32),
+        ("kind", c_uint16),
+        ("level", c_uint8),
+        ("reserved", c_uint8),
+        ("segment", c_uint32),
+        ("offset", c_uint64),
+        ("found", c_double),
+        ("least", c_double),
+        ("most", c_double),
+    ]
 
 
 class Blend(ctypes.Structure):
@@ -152,7 +187,7 @@ class Memory:
 
     @property
     def bytes(self) -> np.ndarray:
-        return self._block[self._start: self._start + self.size]
+        return self._block[self._start : self._start + self.size]
 
     @property
     def address(self) -> int:
@@ -160,14 +195,15 @@ class Memory:
 
     def check(self) -> None:
         assert (self._block[: self._start] == GUARD).all(), "written in front of the memory"
-        assert (self._block[self._start + self.size:] == GUARD).all(), "written behind the memory"
+        assert (self._block[self._start + self.size :] == GUARD).all(), "written behind the memory"
 
 
 def front(data: bytes, limits: Limits | None = None, fault: Fault | None = None) -> tuple[int, int, int]:
     """Result, bytes that are needed, memory that ath_open needs."""
     needed, memory = c_size_t(), c_size_t()
-    result = core.ath_front(data, len(data), limits and byref(limits), byref(needed), byref(memory),
-                            fault and byref(fault))
+    result = core.ath_front(
+        data, len(data), limits and byref(limits), byref(needed), byref(memory), fault and byref(fault)
+    )
     return result, needed.value, memory.value
 
 
@@ -235,7 +271,7 @@ class Player:
 
     def times_of(self, clip: Clip) -> np.ndarray:
         times = np.ctypeslib.as_array(core.ath_times(self.address), (self.info.frame_count,))
-        return times[clip.first_frame: clip.first_frame + clip.frame_count]
+        return times[clip.first_frame : clip.first_frame + clip.frame_count]
 
     def after(self, frame: int) -> int:
         """The frame that it blends into: behind the last one of a clip that is the clip's first."""
@@ -291,7 +327,7 @@ class Player:
         return [(r.offset, r.size) for r in buffer[:count]]
 
     def feed(self, offset: int, size: int) -> None:
-        piece = bytes(bytearray(self.data[offset: offset + size]))
+        piece = bytes(bytearray(self.data[offset : offset + size]))
         self.kept.append(piece)
         core.ath_feed(self.address, piece, offset, size)
 
@@ -326,22 +362,28 @@ def test_results_have_the_names_and_numbers_of_the_format():
     names = [core.ath_result_name(code).decode() for code in range(64, 70)]
     assert names == ["MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"]
     assert core.ath_result_name(0) == b"OK"
-    assert {core.ath_result_name(code) for code in (-1, 12, 63, 70, 2**31 - 1, -2**31)} == {b"UNKNOWN"}
+    assert {core.ath_result_name(code) for code in (-1, 12, 63, 70, 2**31 - 1, -(2**31))} == {b"UNKNOWN"}
 
 
 def too_little(size: int) -> list[tuple[int, int]]:
     """Addresses and sizes that are not `size` bytes aligned to 16."""
     too_little.kept = [Memory(size, off) for off in (0, 1, 4, 8)]
-    return [(0, size), (too_little.kept[0].address, size - 1), (too_little.kept[0].address, 0),
-            *((memory.address, size) for memory in too_little.kept[1:])]
+    return [
+        (0, size),
+        (too_little.kept[0].address, size - 1),
+        (too_little.kept[0].address, 0),
+        *((memory.address, size) for memory in too_little.kept[1:]),
+    ]
 
 
 def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data):
     player = Player(data, build=False)
     deepest = player.levels[-1]
     sizes = {
-        "open": front(data)[2], "build": core.ath_build_size(player.address),
-        "work": core.ath_work_size(player.address), "segment": core.ath_segment_size(player.address, deepest),
+        "open": front(data)[2],
+        "build": core.ath_build_size(player.address),
+        "work": core.ath_work_size(player.address),
+        "segment": core.ath_segment_size(player.address, deepest),
     }
     built, work, segment = Memory(sizes["build"]), Memory(sizes["work"]), Memory(sizes["segment"])
     for address, size in too_little(sizes["open"]):
@@ -363,8 +405,15 @@ def test_memory_that_is_too_small_or_not_aligned_is_refused_and_not_touched(data
 
 def test_levels_and_segments_that_a_file_does_not_have_are_bad_arguments(player):
     work, segment = player.work(), Memory(max(player.room(level).size for level in player.levels))
-    for index, level in ((-1, 0), (player.info.segment_count, 0), (2**31 - 1, 0), (0, -1),
-                         (0, player.info.level_count), (0, 255), (-2**31, -2**31)):
+    for index, level in (
+        (-1, 0),
+        (player.info.segment_count, 0),
+        (2**31 - 1, 0),
+        (0, -1),
+        (0, player.info.level_count),
+        (0, 255),
+        (-(2**31), -(2**31)),
+    ):
         assert player.start(index, level, work, segment) == BAD_ARGUMENT
 
 
@@ -380,21 +429,24 @@ def parts(full_ath) -> Parts:
     return Parts.of(full_ath.read_bytes())
 
 
-@pytest.mark.parametrize("fields, sentence", [
-    ({"vertex_count": 0}, "BAD_HEADER header: got Vertex_Count 0; expected 1 to 67108864"),
-    ({"frame_count": 2**32 - 1}, "LIMIT_EXCEEDED header: got Frame_Count 4294967295; the limit is 1048576"),
-    ({"branch_count": 9, "vertex_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
-    ({"frame_count": 600, "segment_count": 2}, "BAD_HEADER header: got Segment_Count 2; expected 3 to 600"),
-    ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 2 to 32"),
-    ({"full_level_count": 3, "level_count": 4}, "BAD_HEADER header: got Level_Count 4; expected 1 to 3"),
-    ({"clip_count": 0}, "BAD_HEADER header: got Clip_Count 0; expected 1 to 255"),
-    ({"flags": 2}, "BAD_HEADER header: got Flags 2; expected 0 to 1"),
-    ({"reserved": 2**52}, "BAD_HEADER header: got Reserved 4503599627370496; expected 0"),
-    ({"max_error": float("nan")}, "BAD_HEADER header: got Max_Error nan; expected a finite length"),
-    ({"max_error": -1.25e-7}, "BAD_HEADER header: got Max_Error -1.25000e-7; expected a finite length"),
-    ({"max_error": float("-inf")}, "BAD_HEADER header: got Max_Error -inf; expected a finite length"),
-    ({"clip_count": 2}, "BAD_CHUNK_TABLE chunk table: got no CLIPS; expected one"),
-])
+@pytest.mark.parametrize(
+    "fields, sentence",
+    [
+        ({"vertex_count": 0}, "BAD_HEADER header: got Vertex_Count 0; expected 1 to 67108864"),
+        ({"frame_count": 2**32 - 1}, "LIMIT_EXCEEDED header: got Frame_Count 4294967295; the limit is 1048576"),
+        ({"branch_count": 9, "vertex_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
+        ({"frame_count": 600, "segment_count": 2}, "BAD_HEADER header: got Segment_Count 2; expected 3 to 600"),
+        ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 2 to 32"),
+        ({"full_level_count": 3, "level_count": 4}, "BAD_HEADER header: got Level_Count 4; expected 1 to 3"),
+        ({"clip_count": 0}, "BAD_HEADER header: got Clip_Count 0; expected 1 to 255"),
+        ({"flags": 2}, "BAD_HEADER header: got Flags 2; expected 0 to 1"),
+        ({"reserved": 2**52}, "BAD_HEADER header: got Reserved 4503599627370496; expected 0"),
+        ({"max_error": float("nan")}, "BAD_HEADER header: got Max_Error nan; expected a finite length"),
+        ({"max_error": -1.25e-7}, "BAD_HEADER header: got Max_Error -1.25000e-7; expected a finite length"),
+        ({"max_error": float("-inf")}, "BAD_HEADER header: got Max_Error -inf; expected a finite length"),
+        ({"clip_count": 2}, "BAD_CHUNK_TABLE chunk table: got no CLIPS; expected one"),
+    ],
+)
 def test_a_refused_header_is_described_by_the_field_and_the_values_found_and_allowed(fields, sentence, parts):
     assert refusal(with_header(parts.file(), **fields)) == sentence
 
@@ -404,17 +456,22 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     length, tables_end = len(data), parts.chunks[0][0].offset
     assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
     assert refusal(data[:8] + b"\1\0\5\0" + data[12:]) == (
-        "UNSUPPORTED_VERSION file: got format version 1.5; expected 0.4")
+        "UNSUPPORTED_VERSION file: got format version 1.5; expected 0.4"
+    )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 64"
     assert refusal(data[:100]) == f"MISSING chunk table: got 36 bytes; expected {tables_end - 64}"
     assert refusal(data[:tables_end]).startswith(f"MISSING prelude: got {tables_end} bytes; expected ")
-    assert re.fullmatch("BAD_CHECKSUM header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}",
-                        refusal(data[:64] + b"\7" + data[65:]))
+    assert re.fullmatch(
+        "BAD_CHECKSUM header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}",
+        refusal(data[:64] + b"\7" + data[65:]),
+    )
     assert refusal(with_header(data, file_length=length + 1)) == (
-        f"BAD_CHUNK_TABLE chunk table: got chunks that end at byte {length}; expected {length + 1}")
+        f"BAD_CHUNK_TABLE chunk table: got chunks that end at byte {length}; expected {length + 1}"
+    )
     assert refusal(data, limits_with(memory_bytes=1000)).startswith("LIMIT_EXCEEDED header: got a need of ")
     assert refusal(data, limits_with(table_bytes=99)) == (
-        f"LIMIT_EXCEEDED chunk table: got {tables_end - 64} bytes; the limit is 99")
+        f"LIMIT_EXCEEDED chunk table: got {tables_end - 64} bytes; the limit is 99"
+    )
     assert refusal(data, limits_with(hierarchy_depth=1)).startswith("LIMIT_EXCEEDED chunk HIERARCHY at byte ")
 
 
@@ -430,25 +487,36 @@ def test_a_refused_chunk_is_described_by_its_place_and_the_values_found_and_allo
     levels, segments, place = parts.header.level_count, parts.header.segment_count, f"at byte {chunk.offset}"
     where = f"chunk AFFINES of level 1, segment 1 {place}"
     assert refusal(with_last(level=9)) == (
-        f"BAD_CHUNK_TABLE chunk AFFINES of level 9, segment 1 {place}: got level 9; expected 0 to {levels - 1}")
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 9, segment 1 {place}: got level 9; expected 0 to {levels - 1}"
+    )
     assert refusal(with_last(segment=99)) == (
-        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 99 {place}: got segment 99; expected 0 to {segments - 1}")
-    assert refusal(with_last(kind=30)) == (f"UNKNOWN_CHUNK chunk kind 0x001e of level 1, segment 1 {place}: "
-                                           "got a required kind; expected one that this decoder knows")
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 99 {place}: got segment 99; expected 0 to {segments - 1}"
+    )
+    assert refusal(with_last(kind=30)) == (
+        f"UNKNOWN_CHUNK chunk kind 0x001e of level 1, segment 1 {place}: "
+        "got a required kind; expected one that this decoder knows"
+    )
     assert refusal(with_last(segment=0)).startswith(
-        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 0 {place}: got entry ")
+        f"BAD_CHUNK_TABLE chunk AFFINES of level 1, segment 0 {place}: got entry "
+    )
     assert refusal(parts.file(), limits_with(chunk_bytes=1)).startswith("LIMIT_EXCEEDED chunk ")
     assert refusal(parts.with_chunks([entry for entry in parts.chunks if entry[0] != chunk])) == (
-        "BAD_CHUNK_TABLE chunk table: got no AFFINES of level 1, segment 1; expected one")
+        "BAD_CHUNK_TABLE chunk table: got no AFFINES of level 1, segment 1; expected one"
+    )
     assert refusal(with_last(kind=ct.EXACT)) == (
         f"BAD_CHUNK_TABLE {where.replace('AFFINES', 'EXACT')}: got a chunk that the hierarchy does not ask for; "
-        "expected none")
+        "expected none"
+    )
     broken, rest = bytearray(parts.file()), parts.chunks[parts.index(ct.REST)][0]
     broken[rest.offset + 40] ^= 1
-    assert re.fullmatch(f"BAD_CHECKSUM chunk REST at byte {rest.offset}: got checksum 0x[0-9a-f]{{8}}; "
-                        f"expected {rest.checksum:#010x}", refusal(bytes(broken)))
-    assert re.fullmatch(r"BAD_CHUNK chunk REST at byte \d+: got content that does not decode; expected a valid stream",
-                        refusal(parts.with_payload(ct.REST, bytes(40))))
+    assert re.fullmatch(
+        f"BAD_CHECKSUM chunk REST at byte {rest.offset}: got checksum 0x[0-9a-f]{{8}}; expected {rest.checksum:#010x}",
+        refusal(bytes(broken)),
+    )
+    assert re.fullmatch(
+        r"BAD_CHUNK chunk REST at byte \d+: got content that does not decode; expected a valid stream",
+        refusal(parts.with_payload(ct.REST, bytes(40))),
+    )
 
 
 def test_a_sentence_longer_than_the_room_for_it_is_cut_and_its_length_returned(data):
@@ -507,8 +575,9 @@ def test_one_segment_plays_without_the_bytes_of_the_others(data, player):
         stream.feed(*piece)
     assert [core.ath_ready_level(stream.address, s) for s in stream.segments] == [-1] * segment + [level]
     frame = player.start_of(segment)
-    assert np.array_equal(stream.frame([stream.prepare(segment, level)], frame),
-                          player.frame([player.prepare(segment, level)], frame))
+    assert np.array_equal(
+        stream.frame([stream.prepare(segment, level)], frame), player.frame([player.prepare(segment, level)], frame)
+    )
 
 
 def test_a_growing_prefix_makes_ready_one_level_after_the_other(data, player):
@@ -558,7 +627,7 @@ def test_ranges_beyond_the_capacity_are_counted_and_not_written(data):
 def test_a_damaged_chunk_is_named_and_its_segment_is_not_prepared(data, player):
     level = player.levels[-1]
     offset, size = player.ranges(level, 0, 0, fed_too=True)[-1]
-    broken = Player(data[: offset + size - 1] + bytes([data[offset + size - 1] ^ 1]) + data[offset + size:])
+    broken = Player(data[: offset + size - 1] + bytes([data[offset + size - 1] ^ 1]) + data[offset + size :])
     work, segment = broken.work(), broken.room(level)
     assert broken.try_to_prepare(0, level, work, segment) == BAD_CHECKSUM
     fault = Fault()
@@ -611,7 +680,7 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
         for job in order:
             results[job] = player.prepare(*job, work)
 
-    threads = [threading.Thread(target=prepare, args=(together[i], jobs[::1 - 2 * i])) for i in range(2)]
+    threads = [threading.Thread(target=prepare, args=(together[i], jobs[:: 1 - 2 * i])) for i in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -673,7 +742,7 @@ def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
             for p in parts:
                 own = slice(p.first, p.first + p.count)
                 if p.branch < 0:
-                    shaded[own] = points.bytes.view(np.float32).reshape(-1, 3)[p.index: p.index + p.count]
+                    shaded[own] = points.bytes.view(np.float32).reshape(-1, 3)[p.index : p.index + p.count]
                 else:
                     m = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index]
                     shaded[own] = rest[own] @ m[:, :3].T + m[:, 3]
@@ -717,8 +786,11 @@ def test_between_segments_the_nearer_frame_that_is_there_is_held(player):
     for weight in (0.25, 0.75):
         result, blended = player.show([None, after, before], last + weight)
         assert result == OK and not any(np.array_equal(blended, xyz) for xyz in at.values())
-        for prepared, shown in (([before], at[last]), ([None, after], at[first]),
-                                ([before, other], at[last] if weight < 0.5 else coarse_first)):
+        for prepared, shown in (
+            ([before], at[last]),
+            ([None, after], at[first]),
+            ([before, other], at[last] if weight < 0.5 else coarse_first),
+        ):
             result, xyz = player.show(prepared, last + weight)
             assert result == HELD and np.array_equal(xyz, shown)
         result, xyz = player.show([other, before, after], last + weight)

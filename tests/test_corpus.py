@@ -42,8 +42,10 @@ def test_stems_whose_gaps_collide_are_opened_with_hardly_more_work_than_others(w
     """Stems with gaps of one hash were each compared with all before them: 40,000 took 7 s, and twice as many four
     times as long."""
     others = random_gaps(np.random.default_rng(0), 4_000, 10)
-    first, second = (work_of(lambda data=stems_with_gaps(gaps): athcodec.open(BytesIO(data)))
-                     for gaps in (colliding_gaps(4_000), others))
+    first, second = (
+        work_of(lambda data=stems_with_gaps(gaps): athcodec.open(BytesIO(data)))
+        for gaps in (colliding_gaps(4_000), others)
+    )
     assert first < 1.5 * second
 
 

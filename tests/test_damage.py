@@ -51,6 +51,7 @@ from spec import reference_decoder as rd  # noqa: E402
 
 REFUSED = (FormatError, LevelUnavailable)
 
+
 @pytest.fixture(scope="module")
 def data(full_ath) -> bytes:
     return full_ath.read_bytes()
@@ -87,8 +88,15 @@ def check(data: bytes, **options) -> None:
 
 def use(data: bytes, **options) -> bool:
     """Asks for everything that a file may hold. Whether it answered; raises what is neither answer nor refusal."""
-    asks = [lambda d: d.file.check(), lambda d: d.affines(0), lambda d: d.residual(0, 0), lambda d: d.file.info(),
-            lambda d: d.rest, lambda d: d.vertex_branch, lambda d: d.stem_index]
+    asks = [
+        lambda d: d.file.check(),
+        lambda d: d.affines(0),
+        lambda d: d.residual(0, 0),
+        lambda d: d.file.info(),
+        lambda d: d.rest,
+        lambda d: d.vertex_branch,
+        lambda d: d.stem_index,
+    ]
     asks += [lambda d, level=level: d.positions(level=level) for level in range(3)]
     asks += [lambda d: [d.play(clip.name).positions() for clip in d.clips[1:]]]
     asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
@@ -120,7 +128,7 @@ def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, 
 
 
 def flipped(data: bytes, place: int, bit: int = 1) -> bytes:
-    return data[:place] + bytes([data[place] ^ bit]) + data[place + 1:]
+    return data[:place] + bytes([data[place] ^ bit]) + data[place + 1 :]
 
 
 def test_a_flipped_bit_anywhere_is_found(data):
@@ -202,33 +210,71 @@ def test_bytes_behind_the_end_are_refused_in_strict_mode_alone(data, played):
 # ---- hostile headers and tables ----
 
 
-@pytest.mark.parametrize("field, value, error", [
-    ("major", 1, UnsupportedVersion), ("major", 65535, UnsupportedVersion), ("minor", 1, UnsupportedVersion),
-    ("minor", 65535, UnsupportedVersion),
-    ("file_length", 0, BadChunkTable), ("file_length", 1, BadChunkTable), ("file_length", 2**64 - 1, BadChunkTable),
-    ("chunk_count", 0, BadHeader), ("chunk_count", 1, FormatError), ("chunk_count", 2**32 - 1, LimitExceeded),
-    ("vertex_count", 0, BadHeader), ("vertex_count", 1, BadHeader), ("vertex_count", 2**32 - 1, LimitExceeded),
-    ("branch_count", 0, BadHeader), ("branch_count", 1, FormatError), ("branch_count", 2**32 - 1, LimitExceeded),
-    ("frame_count", 0, BadHeader), ("frame_count", 1, BadHeader), ("frame_count", 2**32 - 1, LimitExceeded),
-    ("segment_count", 0, BadHeader), ("segment_count", 1, FormatError), ("segment_count", 2**32 - 1, LimitExceeded),
-    ("level_count", 0, BadHeader), ("level_count", 1, FormatError), ("level_count", 255, BadHeader),
-    ("full_level_count", 0, BadHeader), ("full_level_count", 1, BadHeader), ("full_level_count", 255, BadHeader),
-    ("full_level_count", 32, BadHeader),
-    ("clip_count", 0, BadHeader), ("clip_count", 2, BadChunkTable), ("clip_count", 255, BadChunkTable),
-    ("flags", 2, BadHeader), ("flags", 255, BadHeader),
-    ("max_error", float("nan"), BadHeader), ("max_error", float("inf"), BadHeader), ("max_error", -1.0, BadHeader),
-    ("reserved", 1, BadHeader), ("reserved", 2**64 - 1, BadHeader),
-    ("magic", b"\x89ATH\n\x1a\n\n", NotAnAthFile), ("magic", bytes(8), NotAnAthFile),
-])
+@pytest.mark.parametrize(
+    "field, value, error",
+    [
+        ("major", 1, UnsupportedVersion),
+        ("major", 65535, UnsupportedVersion),
+        ("minor", 1, UnsupportedVersion),
+        ("minor", 65535, UnsupportedVersion),
+        ("file_length", 0, BadChunkTable),
+        ("file_length", 1, BadChunkTable),
+        ("file_length", 2**64 - 1, BadChunkTable),
+        ("chunk_count", 0, BadHeader),
+        ("chunk_count", 1, FormatError),
+        ("chunk_count", 2**32 - 1, LimitExceeded),
+        ("vertex_count", 0, BadHeader),
+        ("vertex_count", 1, BadHeader),
+        ("vertex_count", 2**32 - 1, LimitExceeded),
+        ("branch_count", 0, BadHeader),
+        ("branch_count", 1, FormatError),
+        ("branch_count", 2**32 - 1, LimitExceeded),
+        ("frame_count", 0, BadHeader),
+        ("frame_count", 1, BadHeader),
+        ("frame_count", 2**32 - 1, LimitExceeded),
+        ("segment_count", 0, BadHeader),
+        ("segment_count", 1, FormatError),
+        ("segment_count", 2**32 - 1, LimitExceeded),
+        ("level_count", 0, BadHeader),
+        ("level_count", 1, FormatError),
+        ("level_count", 255, BadHeader),
+        ("full_level_count", 0, BadHeader),
+        ("full_level_count", 1, BadHeader),
+        ("full_level_count", 255, BadHeader),
+        ("full_level_count", 32, BadHeader),
+        ("clip_count", 0, BadHeader),
+        ("clip_count", 2, BadChunkTable),
+        ("clip_count", 255, BadChunkTable),
+        ("flags", 2, BadHeader),
+        ("flags", 255, BadHeader),
+        ("max_error", float("nan"), BadHeader),
+        ("max_error", float("inf"), BadHeader),
+        ("max_error", -1.0, BadHeader),
+        ("reserved", 1, BadHeader),
+        ("reserved", 2**64 - 1, BadHeader),
+        ("magic", b"\x89ATH\n\x1a\n\n", NotAnAthFile),
+        ("magic", bytes(8), NotAnAthFile),
+    ],
+)
 def test_a_header_field_out_of_range_is_refused(field, value, error, data):
     with pytest.raises(error) as caught:
         check(with_header(data, **{field: value}))
     assert "\n" not in str(caught.value) and ("expected" in str(caught.value) or "limit" in str(caught.value))
 
 
-@pytest.mark.parametrize("field, playing", [
-    ("vertex_count", []), ("branch_count", []), ("frame_count", []), ("segment_count", []), ("level_count", []),
-    ("full_level_count", [4]), ("chunk_count", []), ("flags", [1])])
+@pytest.mark.parametrize(
+    "field, playing",
+    [
+        ("vertex_count", []),
+        ("branch_count", []),
+        ("frame_count", []),
+        ("segment_count", []),
+        ("level_count", []),
+        ("full_level_count", [4]),
+        ("chunk_count", []),
+        ("flags", [1]),
+    ],
+)
 def test_header_counts_that_are_off_by_a_little_are_refused_where_they_contradict_the_rest(field, playing, data):
     """A lossless file without its last level has one level fewer than it once had, and a flag makes positions wide."""
     value = header_fields(data)[field]
@@ -239,8 +285,12 @@ def test_header_counts_that_are_off_by_a_little_are_refused_where_they_contradic
 def test_counts_that_need_too_much_memory_are_refused_before_anything_is_allocated(data):
     tracemalloc.start()
     try:
-        for fields in ({"vertex_count": 1 << 26}, {"vertex_count": 1 << 26, "branch_count": 1 << 20},
-                       {"frame_count": 1 << 20, "segment_count": 1 << 20}, {"chunk_count": 1 << 20}):
+        for fields in (
+            {"vertex_count": 1 << 26},
+            {"vertex_count": 1 << 26, "branch_count": 1 << 20},
+            {"frame_count": 1 << 20, "segment_count": 1 << 20},
+            {"chunk_count": 1 << 20},
+        ):
             with pytest.raises(FormatError):
                 check(with_header(data, **fields))
         assert tracemalloc.get_traced_memory()[1] < 40 << 20
@@ -264,7 +314,8 @@ def test_an_unknown_optional_chunk_is_skipped(kind, at, parts, played):
 def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp_path):
     place = parts.index(ct.AFFINES)
     (tmp_path / "new.ath").write_bytes(
-        parts.with_chunks(parts.chunks[:place] + [unknown(0x8009)] + parts.chunks[place:] + [unknown(0x8064)]))
+        parts.with_chunks(parts.chunks[:place] + [unknown(0x8009)] + parts.chunks[place:] + [unknown(0x8064)])
+    )
     athcodec.truncate(tmp_path / "new.ath", tmp_path / "cut.ath", 1)
     with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
         decoder.file.check()
@@ -310,7 +361,7 @@ def test_a_static_chunk_with_a_level_is_refused(parts):
 def test_a_chunk_that_must_be_there_is_missed_by_name(parts, played):
     without_shapes = []
     for i, (chunk, _) in enumerate(parts.chunks):
-        shorter = parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])
+        shorter = parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1 :])
         if chunk.kind == ct.SHAPES:  # nothing says that it was there: the stems mean something else, or nothing
             without_shapes.append(use(shorter))
         elif chunk.kind & ct.OPTIONAL or chunk.kind == ct.CORRECTIONS:
@@ -324,9 +375,9 @@ def test_a_chunk_that_must_be_there_is_missed_by_name(parts, played):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
 def test_announced_errors_must_be_lengths(value, parts, data):
     errors_at = parts.chunks[0][0].offset - 8
-    broken = data[:errors_at] + struct.pack("<f", value) + data[errors_at + 4:]
+    broken = data[:errors_at] + struct.pack("<f", value) + data[errors_at + 4 :]
     with pytest.raises(BadChunkTable, match="error table"):
-        opened(with_checksum(broken[: errors_at + 8]) + broken[errors_at + 8:])
+        opened(with_checksum(broken[: errors_at + 8]) + broken[errors_at + 8 :])
 
 
 # ---- fronts, read twice ----
@@ -357,8 +408,8 @@ def corrupted_front(rng: np.random.Generator, data: bytes) -> bytes:
     """The file with fields and entries of its front changed, mostly so that sums and counts still fit."""
     tables_end = Parts.of(data).chunks[0][0].offset
     header, count = bytearray(data[:64]), header_fields(data)["chunk_count"]
-    entries = [bytearray(data[at: at + 16]) for at in range(64, 64 + 16 * count, 16)]
-    announced = bytearray(data[64 + 16 * count: tables_end])
+    entries = [bytearray(data[at : at + 16]) for at in range(64, 64 + 16 * count, 16)]
+    announced = bytearray(data[64 + 16 * count : tables_end])
     for _ in range(rng.integers(1, 4)):
         way, i, j = rng.integers(6), *rng.integers(len(entries), size=2)
         if way == 0:
@@ -367,9 +418,9 @@ def corrupted_front(rng: np.random.Generator, data: bytes) -> bytes:
             change_a_field(rng, entries[i], ct._CHUNK)
         elif way == 2:
             at = 8 * int(rng.integers(len(announced) // 8))
-            entry = announced[at: at + 8]
+            entry = announced[at : at + 8]
             change_a_field(rng, entry, ct._ERRORS)
-            announced[at: at + 8] = entry
+            announced[at : at + 8] = entry
         elif way == 3:
             entries[i], entries[j] = entries[j], entries[i]
         elif way == 4:
@@ -411,7 +462,8 @@ def both_readings(data: bytes, limits: Limits) -> str:
     for name in (field.name for field in fields(ct.Header)):
         assert getattr(file.header, name) == getattr(header, name)
     assert [astuple(chunk)[:6] for chunk in file.chunks] == [
-        astuple(chunk) for chunk in chunks if chunk.kind in ct.KIND_NAMES]
+        astuple(chunk) for chunk in chunks if chunk.kind in ct.KIND_NAMES
+    ]
     return "opened"
 
 
@@ -435,9 +487,18 @@ def read_corrupted_fronts(data: bytes, count: int, seed: int) -> set[str]:
     return seen
 
 
-ALL_READINGS = {"opened", "refused for what is behind the front", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION",
-                "TRUNCATED", "BAD_CHECKSUM", "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK",
-                "LIMIT_EXCEEDED"}
+ALL_READINGS = {
+    "opened",
+    "refused for what is behind the front",
+    "NOT_AN_ATH_FILE",
+    "UNSUPPORTED_VERSION",
+    "TRUNCATED",
+    "BAD_CHECKSUM",
+    "BAD_HEADER",
+    "BAD_CHUNK_TABLE",
+    "UNKNOWN_CHUNK",
+    "LIMIT_EXCEEDED",
+}
 
 
 def test_the_core_reads_a_front_as_the_reference_decoder_does(data, parts):
@@ -575,105 +636,113 @@ def attribute(body: bytes = b"", name: object = "a", **head: object) -> bytes:
 NESTED = "[" * 900 + "]" * 900
 
 
-@pytest.mark.parametrize("kind, corrupt, error", [
-    (ct.HIERARCHY, lambda p: floats(np.nan) + p[4:], BadChunk),
-    (ct.HIERARCHY, lambda p: p[:4] + floats(-1) + p[8:], BadChunk),
-    (ct.HIERARCHY, lambda p: p[:15], BadChunk),
-    (ct.HIERARCHY, lambda p: p[:16], BadChunk),
-    (ct.HIERARCHY, lambda p: p + b"\x01" * 12, BadChunk),
-    (ct.HIERARCHY, lambda p: p + b"\x00", BadChunk),
-    (ct.REST, lambda p: b"\x02" + p[1:], BadChunk),
-    (ct.REST, lambda p: p[:1] + b"\x02" + p[2:], BadChunk),
-    (ct.REST, lambda p: p[:2] + b"\x01" + p[3:], BadChunk),
-    (ct.REST, lambda p: p[:4] + doubles(np.nan) + p[12:], BadChunk),
-    (ct.REST, lambda p: p[:28] + doubles(0.0) + p[36:], BadChunk),
-    (ct.REST, lambda p: p[:28] + doubles(-1.0) + p[36:], BadChunk),
-    (ct.REST, lambda p: p[:28] + doubles(1e308) + p[36:], BadChunk),
-    (ct.REST, lambda p: b"\x01\x00" + p[2:36] + INFINITE_FLOAT, BadChunk),
-    (ct.REST, lambda p: b"\x01\x01" + p[2:36] + INFINITE_DOUBLE, BadChunk),
-    (ct.REST, lambda p: b"\x01\x01" + p[2:4] + doubles(1e308) + p[12:36] + HUGE_DOUBLE, BadChunk),
-    (ct.REST, lambda p: p[:30], BadChunk),
-    (ct.REST, lambda p: p + b"\x07" * 12, BadChunk),
-    (ct.TIME, lambda p: b"", BadChunk),
-    (ct.TIME, lambda p: b"\x03" + p[1:], BadChunk),
-    (ct.TIME, lambda p: b"\x00" + doubles(0, 0), BadChunk),
-    (ct.TIME, lambda p: b"\x00" + doubles(0, np.nan), BadChunk),
-    (ct.TIME, lambda p: b"\x00" + doubles(1e30, 1.0), BadChunk),
-    (ct.TIME, lambda p: b"\x01" + doubles(0, 1e-320), BadChunk),
-    (ct.TIME, lambda p: b"\x00" + doubles(0, 1) + b"\x00", BadChunk),
-    (ct.TIME, lambda p: b"\x02" + INFINITE_DOUBLE, BadChunk),
-    (ct.TIME, lambda p: times(*range(18), 30, 30), BadChunk),
-    (ct.TIME, lambda p: times(*range(18), 30, 29), BadChunk),
-    (ct.TIME, lambda p: times(*np.random.default_rng(1).random(200).cumsum()), BadChunk),
-    (ct.TIME, lambda p: p + b"\x00", BadChunk),
-    (ct.TIME, lambda p: p + b"\x01" * 12, BadChunk),
-    (ct.STEMS, lambda p: floats(0.0) + p[4:], BadChunk),
-    (ct.STEMS, lambda p: floats(np.inf) + p[4:], BadChunk),
-    (ct.STEMS, lambda p: p[:4] + b"\x05" + p[5:], BadChunk),
-    (ct.STEMS, lambda p: p[:5] + b"\x07\x01\x00" + p[8:], BadChunk),
-    (ct.STEMS, lambda p: p[:5] + b"\x0e\x00\x00" + p[8:], BadChunk),
-    (ct.STEMS, lambda p: p[:5] + b"\x0e\x0b\x00" + p[8:], BadChunk),
-    (ct.STEMS, lambda p: p[:5] + b"\x0e\x01\x00\xff\xff\xff\xff" + p[8:], BadChunk),
-    (ct.STEMS, lambda p: p[:5] + b"\x00\x01\x00" + p[8:], BadChunk),
-    (ct.STEMS, lambda p: p[:7], BadChunk),
-    (ct.STEMS, lambda p: p + b"\x01" * 12, BadChunk),
-    (ct.AFFINES, lambda p: p + b"\x01" * 12, BadChunk),
-    (ct.AFFINES, lambda p: b"\xff" * 50, BadChunk),
-    (ct.CORRECTIONS, lambda p: floats(np.nan) + p[4:], BadChunk),
-    (ct.CORRECTIONS, lambda p: p[:3], BadChunk),
-    (ct.CORRECTIONS, lambda p: p + b"\x01" * 12, BadChunk),
-    (ct.METADATA, lambda p: b"", BadChunk),
-    (ct.METADATA, lambda p: b"\x02{}", BadChunk),
-    (ct.METADATA, lambda p: b"\x00[1]", BadChunk),
-    (ct.METADATA, lambda p: b"\x00{", BadChunk),
-    (ct.METADATA, lambda p: b'\x00{"a": "\xff"}', BadChunk),
-    (ct.METADATA, lambda p: b'\x00{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}", BadChunk),
-    (ct.METADATA, lambda p: b'\x00{"a":' + b"9" * 5000 + b"}", BadChunk),
-    (ct.METADATA, lambda p: b"\x00{" + b" " * (1 << 20) + b"}", LimitExceeded),
-    (ct.METADATA, lambda p: b"\x01" + zstd(b"{" + b" " * (1 << 20) + b"}"), LimitExceeded),
-    (ct.METADATA, lambda p: b"\x01no zstd frame", FormatError),
-    (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 3]}, zstd(bytes(11) + b"\x7f")), BadChunk),
-    (ct.FACES, lambda p: array_chunk({"dtype": "<f4", "shape": [1, 3]}, zstd(bytes(12))), BadChunk),
-    (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [3]}, zstd(bytes(12))), BadChunk),
-    (ct.EDGES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 2]}, zstd(b"\xff" * 8)), BadChunk),
-    (ct.EDGES, lambda p: array_chunk({"derived": "<f8"}), BadChunk),
-    (ct.EDGES, lambda p: array_chunk({"derived": ["<i4"]}), BadChunk),
-    (ct.EDGES, lambda p: array_chunk({}), BadChunk),
-    (ct.ATTRIBUTE, lambda p: b"\x00", BadChunk),
-    (ct.ATTRIBUTE, lambda p: array_chunk(b"[]"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: struct.pack("<H", 60000) + p[2:], BadChunk),
-    (ct.ATTRIBUTE, lambda p: array_chunk({"name": "a"}), BadChunk),
-    (ct.ATTRIBUTE, lambda p: array_chunk({"dtype": "<f4", "shape": [4]}, zstd(bytes(16))), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=5), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=""), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="species"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="n" * 5000), LimitExceeded),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(32)), dtype="|O"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype="no type"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype="(2,3"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=None), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=7), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype={"a": "b"}), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a"]]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [1 << 40, 1 << 40]]]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [-1]]]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4"], ["a", "<f4"]]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: array_chunk(b'{"name":"a","shape":[1],"dtype":' + NESTED.encode() + b"}"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: array_chunk(
-        b'{"name":"a","shape":[1],"dtype":' + b'[["a",' * 450 + b'"<f4"' + b"]]" * 450 + b"}"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype="|V0"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(dtype="|V2000000"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=4), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=[-4]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=[2.0]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=[1] * 33), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=[1 << 39, 1 << 39]), LimitExceeded),
-    (ct.ATTRIBUTE, lambda p: attribute(shape=[0, 1 << 39, 1 << 39]), LimitExceeded),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)) + b"\0"), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(8)) + zstd(bytes(8))), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16))[:-1]), BadChunk),
-    (ct.ATTRIBUTE, lambda p: attribute(), BadChunk),
-])
+@pytest.mark.parametrize(
+    "kind, corrupt, error",
+    [
+        (ct.HIERARCHY, lambda p: floats(np.nan) + p[4:], BadChunk),
+        (ct.HIERARCHY, lambda p: p[:4] + floats(-1) + p[8:], BadChunk),
+        (ct.HIERARCHY, lambda p: p[:15], BadChunk),
+        (ct.HIERARCHY, lambda p: p[:16], BadChunk),
+        (ct.HIERARCHY, lambda p: p + b"\x01" * 12, BadChunk),
+        (ct.HIERARCHY, lambda p: p + b"\x00", BadChunk),
+        (ct.REST, lambda p: b"\x02" + p[1:], BadChunk),
+        (ct.REST, lambda p: p[:1] + b"\x02" + p[2:], BadChunk),
+        (ct.REST, lambda p: p[:2] + b"\x01" + p[3:], BadChunk),
+        (ct.REST, lambda p: p[:4] + doubles(np.nan) + p[12:], BadChunk),
+        (ct.REST, lambda p: p[:28] + doubles(0.0) + p[36:], BadChunk),
+        (ct.REST, lambda p: p[:28] + doubles(-1.0) + p[36:], BadChunk),
+        (ct.REST, lambda p: p[:28] + doubles(1e308) + p[36:], BadChunk),
+        (ct.REST, lambda p: b"\x01\x00" + p[2:36] + INFINITE_FLOAT, BadChunk),
+        (ct.REST, lambda p: b"\x01\x01" + p[2:36] + INFINITE_DOUBLE, BadChunk),
+        (ct.REST, lambda p: b"\x01\x01" + p[2:4] + doubles(1e308) + p[12:36] + HUGE_DOUBLE, BadChunk),
+        (ct.REST, lambda p: p[:30], BadChunk),
+        (ct.REST, lambda p: p + b"\x07" * 12, BadChunk),
+        (ct.TIME, lambda p: b"", BadChunk),
+        (ct.TIME, lambda p: b"\x03" + p[1:], BadChunk),
+        (ct.TIME, lambda p: b"\x00" + doubles(0, 0), BadChunk),
+        (ct.TIME, lambda p: b"\x00" + doubles(0, np.nan), BadChunk),
+        (ct.TIME, lambda p: b"\x00" + doubles(1e30, 1.0), BadChunk),
+        (ct.TIME, lambda p: b"\x01" + doubles(0, 1e-320), BadChunk),
+        (ct.TIME, lambda p: b"\x00" + doubles(0, 1) + b"\x00", BadChunk),
+        (ct.TIME, lambda p: b"\x02" + INFINITE_DOUBLE, BadChunk),
+        (ct.TIME, lambda p: times(*range(18), 30, 30), BadChunk),
+        (ct.TIME, lambda p: times(*range(18), 30, 29), BadChunk),
+        (ct.TIME, lambda p: times(*np.random.default_rng(1).random(200).cumsum()), BadChunk),
+        (ct.TIME, lambda p: p + b"\x00", BadChunk),
+        (ct.TIME, lambda p: p + b"\x01" * 12, BadChunk),
+        (ct.STEMS, lambda p: floats(0.0) + p[4:], BadChunk),
+        (ct.STEMS, lambda p: floats(np.inf) + p[4:], BadChunk),
+        (ct.STEMS, lambda p: p[:4] + b"\x05" + p[5:], BadChunk),
+        (ct.STEMS, lambda p: p[:5] + b"\x07\x01\x00" + p[8:], BadChunk),
+        (ct.STEMS, lambda p: p[:5] + b"\x0e\x00\x00" + p[8:], BadChunk),
+        (ct.STEMS, lambda p: p[:5] + b"\x0e\x0b\x00" + p[8:], BadChunk),
+        (ct.STEMS, lambda p: p[:5] + b"\x0e\x01\x00\xff\xff\xff\xff" + p[8:], BadChunk),
+        (ct.STEMS, lambda p: p[:5] + b"\x00\x01\x00" + p[8:], BadChunk),
+        (ct.STEMS, lambda p: p[:7], BadChunk),
+        (ct.STEMS, lambda p: p + b"\x01" * 12, BadChunk),
+        (ct.AFFINES, lambda p: p + b"\x01" * 12, BadChunk),
+        (ct.AFFINES, lambda p: b"\xff" * 50, BadChunk),
+        (ct.CORRECTIONS, lambda p: floats(np.nan) + p[4:], BadChunk),
+        (ct.CORRECTIONS, lambda p: p[:3], BadChunk),
+        (ct.CORRECTIONS, lambda p: p + b"\x01" * 12, BadChunk),
+        (ct.METADATA, lambda p: b"", BadChunk),
+        (ct.METADATA, lambda p: b"\x02{}", BadChunk),
+        (ct.METADATA, lambda p: b"\x00[1]", BadChunk),
+        (ct.METADATA, lambda p: b"\x00{", BadChunk),
+        (ct.METADATA, lambda p: b'\x00{"a": "\xff"}', BadChunk),
+        (ct.METADATA, lambda p: b'\x00{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}", BadChunk),
+        (ct.METADATA, lambda p: b'\x00{"a":' + b"9" * 5000 + b"}", BadChunk),
+        (ct.METADATA, lambda p: b"\x00{" + b" " * (1 << 20) + b"}", LimitExceeded),
+        (ct.METADATA, lambda p: b"\x01" + zstd(b"{" + b" " * (1 << 20) + b"}"), LimitExceeded),
+        (ct.METADATA, lambda p: b"\x01no zstd frame", FormatError),
+        (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 3]}, zstd(bytes(11) + b"\x7f")), BadChunk),
+        (ct.FACES, lambda p: array_chunk({"dtype": "<f4", "shape": [1, 3]}, zstd(bytes(12))), BadChunk),
+        (ct.FACES, lambda p: array_chunk({"dtype": "<i4", "shape": [3]}, zstd(bytes(12))), BadChunk),
+        (ct.EDGES, lambda p: array_chunk({"dtype": "<i4", "shape": [1, 2]}, zstd(b"\xff" * 8)), BadChunk),
+        (ct.EDGES, lambda p: array_chunk({"derived": "<f8"}), BadChunk),
+        (ct.EDGES, lambda p: array_chunk({"derived": ["<i4"]}), BadChunk),
+        (ct.EDGES, lambda p: array_chunk({}), BadChunk),
+        (ct.ATTRIBUTE, lambda p: b"\x00", BadChunk),
+        (ct.ATTRIBUTE, lambda p: array_chunk(b"[]"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: struct.pack("<H", 60000) + p[2:], BadChunk),
+        (ct.ATTRIBUTE, lambda p: array_chunk({"name": "a"}), BadChunk),
+        (ct.ATTRIBUTE, lambda p: array_chunk({"dtype": "<f4", "shape": [4]}, zstd(bytes(16))), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=5), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name=""), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="species"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)), name="n" * 5000), LimitExceeded),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(32)), dtype="|O"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype="no type"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype="(2,3"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=None), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=7), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype={"a": "b"}), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a"]]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [1 << 40, 1 << 40]]]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4", [-1]]]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype=[["a", "<f4"], ["a", "<f4"]]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: array_chunk(b'{"name":"a","shape":[1],"dtype":' + NESTED.encode() + b"}"), BadChunk),
+        (
+            ct.ATTRIBUTE,
+            lambda p: array_chunk(
+                b'{"name":"a","shape":[1],"dtype":' + b'[["a",' * 450 + b'"<f4"' + b"]]" * 450 + b"}"
+            ),
+            BadChunk,
+        ),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype="|V0"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(dtype="|V2000000"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=4), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=[-4]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=[2.0]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=[1] * 33), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=[1 << 39, 1 << 39]), LimitExceeded),
+        (ct.ATTRIBUTE, lambda p: attribute(shape=[0, 1 << 39, 1 << 39]), LimitExceeded),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16)) + b"\0"), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(8)) + zstd(bytes(8))), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(zstd(bytes(16))[:-1]), BadChunk),
+        (ct.ATTRIBUTE, lambda p: attribute(), BadChunk),
+    ],
+)
 def test_content_that_breaks_a_rule_is_refused(kind, corrupt, error, parts):
     level = {ct.STEMS: 2, ct.AFFINES: 1, ct.CORRECTIONS: 2}.get(kind)
     with np.errstate(all="ignore"), pytest.raises(error) as caught:
@@ -706,15 +775,18 @@ def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts
 
 def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
     uneven = np.random.default_rng(6).random(20).cumsum()
-    assert_whole_or_not_it(streams.encode_times(uneven), uneven,
-                           lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time)
+    assert_whole_or_not_it(
+        streams.encode_times(uneven),
+        uneven,
+        lambda stream: opened(parts.with_payload(ct.TIME, ct.pack_time(stream))).time,
+    )
 
 
 def with_step(parts: Parts, kind: int, step: float) -> bytes:
     """The file with another quantisation step in one chunk."""
     level, at, packed = (None, 28, doubles(step)) if kind == ct.REST else (2, 0, floats(step))
     payload = parts.payload(kind, level)
-    return parts.with_payload(kind, payload[:at] + packed + payload[at + len(packed):], level)
+    return parts.with_payload(kind, payload[:at] + packed + payload[at + len(packed) :], level)
 
 
 @pytest.mark.parametrize("kind", [ct.STEMS, ct.CORRECTIONS, ct.REST])
@@ -746,11 +818,21 @@ def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matri
             decoder.residual(0, 0)
 
 
-@pytest.mark.parametrize("name, head, level", [
-    ("HIERARCHY", 16, None), ("REST", 36, None), ("TIME", 1, None), ("STEMS", 8, 2), ("AFFINES", 0, 1),
-    ("CORRECTIONS", 4, 2), ("SHAPES", 0, 1)])
-def test_streams_of_one_byte_over_and_over_end_soon_and_are_refused_where_they_are_long(name, head, level, parts,
-                                                                                        work_of):
+@pytest.mark.parametrize(
+    "name, head, level",
+    [
+        ("HIERARCHY", 16, None),
+        ("REST", 36, None),
+        ("TIME", 1, None),
+        ("STEMS", 8, 2),
+        ("AFFINES", 0, 1),
+        ("CORRECTIONS", 4, 2),
+        ("SHAPES", 0, 1),
+    ],
+)
+def test_streams_of_one_byte_over_and_over_end_soon_and_are_refused_where_they_are_long(
+    name, head, level, parts, work_of
+):
     most, outcomes = 2 * work_of(lambda: use(parts.file())), {}
     for byte, size in product((b"\x00", b"\xff", b"\x55"), (0, 1, 64, 4096)):
         data = parts.with_payload(KINDS[name], parts.payload(KINDS[name], level)[:head] + byte * size, level)
@@ -770,12 +852,35 @@ def test_a_frame_of_the_expected_size_is_decompressed():
     assert exact(zstd(b"plant" * 100), 500) == b"plant" * 100
 
 
-@pytest.mark.parametrize("data, expected", [
-    (zstd(bytes(100)), 99), (zstd(bytes(100)), 101), (zstd(bytes(100)), 0), (zstd(b""), 0), (b"", 100),
-    (zstd(bytes(100)) + b"\0", 100), (zstd(bytes(100)) + zstd(bytes(100)), 100), (zstd(bytes(100))[:-1], 100),
-    (zstd(bytes(100), write_content_size=False), 100), (b"\x28\xb5\x2f\xfd", 100), (b"no frame", 100),
-], ids=["shorter", "longer", "nothing expected", "empty frame", "no bytes", "a byte behind", "two frames", "cut off",
-        "size not given", "magic alone", "no frame"])
+@pytest.mark.parametrize(
+    "data, expected",
+    [
+        (zstd(bytes(100)), 99),
+        (zstd(bytes(100)), 101),
+        (zstd(bytes(100)), 0),
+        (zstd(b""), 0),
+        (b"", 100),
+        (zstd(bytes(100)) + b"\0", 100),
+        (zstd(bytes(100)) + zstd(bytes(100)), 100),
+        (zstd(bytes(100))[:-1], 100),
+        (zstd(bytes(100), write_content_size=False), 100),
+        (b"\x28\xb5\x2f\xfd", 100),
+        (b"no frame", 100),
+    ],
+    ids=[
+        "shorter",
+        "longer",
+        "nothing expected",
+        "empty frame",
+        "no bytes",
+        "a byte behind",
+        "two frames",
+        "cut off",
+        "size not given",
+        "magic alone",
+        "no frame",
+    ],
+)
 def test_any_other_zstd_frame_is_refused(data, expected):
     with pytest.raises(BadChunk):
         exact(data, expected)
@@ -806,7 +911,7 @@ def test_the_frame_that_zstd_answers_with_a_memory_error_is_refused():
 def test_a_frame_that_lies_about_its_size_is_refused():
     honest = zstd(bytes(100_000))
     size_at = honest.index(struct.pack("<I", 100_000))
-    liar = honest[:size_at] + struct.pack("<I", 90_000) + honest[size_at + 4:]
+    liar = honest[:size_at] + struct.pack("<I", 90_000) + honest[size_at + 4 :]
     assert zstandard.frame_content_size(liar) == 90_000
     with pytest.raises(BadChunk):
         exact(liar, 90_000)
@@ -815,11 +920,24 @@ def test_a_frame_that_lies_about_its_size_is_refused():
 # ---- limits ----
 
 
-@pytest.mark.parametrize("limits", [
-    {"chunks": 5}, {"table_bytes": 100}, {"vertices": 11}, {"branches": 4}, {"frames": 19}, {"chunk_bytes": 30},
-    {"memory_bytes": 10_000}, {"metadata_bytes": 50}, {"attributes": 1}, {"string_bytes": 5},
-    {"decoded_chunk_bytes": 20}, {"hierarchy_depth": 2},
-], ids=lambda limits: next(iter(limits)))
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"chunks": 5},
+        {"table_bytes": 100},
+        {"vertices": 11},
+        {"branches": 4},
+        {"frames": 19},
+        {"chunk_bytes": 30},
+        {"memory_bytes": 10_000},
+        {"metadata_bytes": 50},
+        {"attributes": 1},
+        {"string_bytes": 5},
+        {"decoded_chunk_bytes": 20},
+        {"hierarchy_depth": 2},
+    ],
+    ids=lambda limits: next(iter(limits)),
+)
 def test_a_file_beyond_a_limit_is_refused_by_that_limit(limits, data):
     (number,) = limits.values()
     with pytest.raises(LimitExceeded, match=rf"(limit is|more than) {number}\b") as caught:
@@ -829,8 +947,19 @@ def test_a_file_beyond_a_limit_is_refused_by_that_limit(limits, data):
 
 def test_limits_that_just_hold_the_file_accept_it(data, parts):
     longest = max(len(payload) for _, payload in parts.chunks)
-    check(data, limits=Limits(chunks=len(parts.chunks), vertices=12, branches=5, frames=20, attributes=2,
-                              string_bytes=7, chunk_bytes=longest, decoded_chunk_bytes=94))
+    check(
+        data,
+        limits=Limits(
+            chunks=len(parts.chunks),
+            vertices=12,
+            branches=5,
+            frames=20,
+            attributes=2,
+            string_bytes=7,
+            chunk_bytes=longest,
+            decoded_chunk_bytes=94,
+        ),
+    )
 
 
 def test_limits_that_no_file_reaches_accept_it(data):
@@ -875,25 +1004,32 @@ def test_many_attributes_together_keep_to_the_memory_limit(parts):
 # ---- errors ----
 
 
-@pytest.mark.parametrize("error, make", [
-    (NotAnAthFile, lambda d, p: b"PK\x03\x04 something else entirely" * 4),
-    (UnsupportedVersion, lambda d, p: with_header(d, major=9)),
-    (Truncated, lambda d, p: d[:-1]),
-    (BadChecksum, lambda d, p: flipped(d, len(d) - 1)),
-    (BadHeader, lambda d, p: with_header(d, clip_count=0)),
-    (BadChunkTable, lambda d, p: p.with_chunks(p.chunks[1:])),
-    (UnknownChunk, lambda d, p: p.with_chunks([*p.chunks, unknown(99)])),
-    (BadChunk, lambda d, p: p.with_payload(ct.TIME, b"\x09")),
-    (LimitExceeded, lambda d, p: with_header(d, frame_count=2**31)),
-    (TrailingBytes, lambda d, p: d + b"more"),
-], ids=lambda value: getattr(value, "name", ""))
+@pytest.mark.parametrize(
+    "error, make",
+    [
+        (NotAnAthFile, lambda d, p: b"PK\x03\x04 something else entirely" * 4),
+        (UnsupportedVersion, lambda d, p: with_header(d, major=9)),
+        (Truncated, lambda d, p: d[:-1]),
+        (BadChecksum, lambda d, p: flipped(d, len(d) - 1)),
+        (BadHeader, lambda d, p: with_header(d, clip_count=0)),
+        (BadChunkTable, lambda d, p: p.with_chunks(p.chunks[1:])),
+        (UnknownChunk, lambda d, p: p.with_chunks([*p.chunks, unknown(99)])),
+        (BadChunk, lambda d, p: p.with_payload(ct.TIME, b"\x09")),
+        (LimitExceeded, lambda d, p: with_header(d, frame_count=2**31)),
+        (TrailingBytes, lambda d, p: d + b"more"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
 def test_every_error_of_the_format_can_happen_and_says_it_in_one_line(error, make, data, parts):
     with pytest.raises(FormatError) as caught:
         check(make(data, parts), strict=True)
     assert caught.type is error
     message = str(caught.value)
-    assert "\n" not in message and 20 < len(message) < 300 and ("expected" in message or "limit" in message
-                                                               or "does not know" in message)
+    assert (
+        "\n" not in message
+        and 20 < len(message) < 300
+        and ("expected" in message or "limit" in message or "does not know" in message)
+    )
 
 
 def test_the_codes_of_the_errors_are_those_of_the_format():

@@ -248,8 +248,11 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         before = decoder.file.bytes_read
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
-        allowed = {c for c in decoder.file.chunks
-                       if c.is_motion and c.level <= level and (c.segment == 1 or c.kind == ct.SHAPES)}
+        allowed = {
+            c
+            for c in decoder.file.chunks
+            if c.is_motion and c.level <= level and (c.segment == 1 or c.kind == ct.SHAPES)
+        }
         read = chunks_read(file, decoder)
         needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}
         assert needed and needed <= read <= allowed
@@ -261,10 +264,10 @@ def chunks_read(file: Recorder, decoder) -> set:
     times = np.zeros(decoder.file.file_length, int)
     for start, stop in file.ranges:
         times[start:stop] += 1
-    read = {c for c in decoder.file.chunks if c.length and times[c.offset: c.offset + c.length].any()}
+    read = {c for c in decoder.file.chunks if c.length and times[c.offset : c.offset + c.length].any()}
     expected = np.zeros(decoder.file.file_length, int)
     for chunk in read:
-        expected[chunk.offset: chunk.offset + chunk.length] = 1
+        expected[chunk.offset : chunk.offset + chunk.length] = 1
     assert np.array_equal(times, expected)
     return read
 
@@ -283,8 +286,14 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     decoder, _ = played
     prepared = []
     prepare = core_file.File.prepare
-    monkeypatch.setattr(core_file.File, "prepare", lambda file, work, segment, level, into: (
-        prepared.append((segment, level)), prepare(file, work, segment, level, into)))
+    monkeypatch.setattr(
+        core_file.File,
+        "prepare",
+        lambda file, work, segment, level, into: (
+            prepared.append((segment, level)),
+            prepare(file, work, segment, level, into),
+        ),
+    )
     (first, stop), last = decoder.segments[1], decoder.level_count - 1
     decoder.positions(first, last)
     before = decoder.file.bytes_read
@@ -342,7 +351,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
         for _ in range(10):
             decoder.file.check()
             for name in ("attributes", "metadata", "faces", "edges"):
-                vars(decoder.file).pop(name)   # remembered otherwise
+                vars(decoder.file).pop(name)  # remembered otherwise
             assert np.array_equal(decoder.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata == full_clip.metadata
 
@@ -371,11 +380,27 @@ def test_attributes_are_read_when_asked_for(full_ath):
         assert decoder.file.bytes_read > before
 
 
-@pytest.mark.parametrize("ask", [
-    lambda d: d.positions(50), lambda d: d.positions(-51), lambda d: d.positions(slice(0, 9, 2)),
-    lambda d: d.positions(0, 6), lambda d: d.positions(0, -1), lambda d: d.affines(50), lambda d: d.affines(0, 6),
-], ids=["frame beyond", "frame before", "every other frame", "level beyond", "level before", "maps of a frame beyond",
-        "maps of a level beyond"])
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda d: d.positions(50),
+        lambda d: d.positions(-51),
+        lambda d: d.positions(slice(0, 9, 2)),
+        lambda d: d.positions(0, 6),
+        lambda d: d.positions(0, -1),
+        lambda d: d.affines(50),
+        lambda d: d.affines(0, 6),
+    ],
+    ids=[
+        "frame beyond",
+        "frame before",
+        "every other frame",
+        "level beyond",
+        "level before",
+        "maps of a frame beyond",
+        "maps of a level beyond",
+    ],
+)
 def test_what_is_not_in_the_file_is_refused_with_the_range(ask, bushy_ath):
     with athcodec.open(bushy_ath) as decoder:
         with pytest.raises(LevelUnavailable, match="expected") as caught:
@@ -398,7 +423,7 @@ def test_a_path_is_closed_again_and_a_file_object_is_left_open(bushy_ath):
 def test_a_file_that_cannot_be_opened_as_ath_is_closed(tmp_path):
     (tmp_path / "no.ath").write_bytes(b"nothing of the sort")
     with pytest.raises(FormatError):
-        athcodec.open(tmp_path / "no.ath")   # an open file would warn, and warnings are errors here
+        athcodec.open(tmp_path / "no.ath")  # an open file would warn, and warnings are errors here
 
 
 def test_str_path_and_file_object_give_the_same(bushy_ath):

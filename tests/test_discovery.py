@@ -46,8 +46,13 @@ def right_parents(found: discovery.Found, clip: MotionClip) -> float:
 def renumbered(clip: MotionClip, order: np.ndarray) -> MotionClip:
     """The clip with vertex order[i] as vertex i."""
     place = np.argsort(order)
-    return clip.replace(positions=clip.block(0, clip.frame_count)[:, order], faces=place[clip.faces],
-                        vertex_branch=clip.vertex_branch[order], stem_index=None, rest=clip.source_rest[order])
+    return clip.replace(
+        positions=clip.block(0, clip.frame_count)[:, order],
+        faces=place[clip.faces],
+        vertex_branch=clip.vertex_branch[order],
+        stem_index=None,
+        rest=clip.source_rest[order],
+    )
 
 
 def test_tubes_and_leaves_are_found_again(dressed):
@@ -68,8 +73,12 @@ def test_branches_are_found_whatever_the_order_of_the_vertices(dressed):
 
 def test_a_mesh_that_was_split_along_its_seams_hangs_together(dressed):
     corners = dressed.faces.reshape(-1)
-    split = MotionClip(dressed.block(0, FRAMES)[:, corners], dressed.time, rest=dressed.rest[corners],
-                       faces=np.arange(len(corners)).reshape(-1, 4))
+    split = MotionClip(
+        dressed.block(0, FRAMES)[:, corners],
+        dressed.time,
+        rest=dressed.rest[corners],
+        faces=np.arange(len(corners)).reshape(-1, 4),
+    )
     found = athcodec.find_branches(split, "components")
     assert len(found.branch_parent) == dressed.branch_count
 
@@ -162,8 +171,11 @@ def test_points_without_any_mesh_are_compressed_too(tmp_path, vertices):
 
 
 def test_far_pieces_are_plants_of_their_own(dressed):
-    two = MotionClip(np.concatenate([dressed.block(0, FRAMES), dressed.block(0, FRAMES) + 500], axis=1), dressed.time,
-                     faces=np.concatenate([dressed.faces, dressed.faces + dressed.vertex_count]))
+    two = MotionClip(
+        np.concatenate([dressed.block(0, FRAMES), dressed.block(0, FRAMES) + 500], axis=1),
+        dressed.time,
+        faces=np.concatenate([dressed.faces, dressed.faces + dressed.vertex_count]),
+    )
     found = athcodec.find_branches(two)
     assert len(found.branch_parent) == 2 * dressed.branch_count
     assert (found.branch_parent < 0).sum() == 2
@@ -205,11 +217,18 @@ def one_branch(vertex_count: int, parent: int, vertices: str) -> str:
     return json.dumps({"vertex_count": vertex_count, "branches": [branch]})
 
 
-@pytest.mark.parametrize("text, message", [
-    ("", "got no branches"), ("[]", "got no branches"), ('{"vertex_count": 3, "branches": [{}]}', "got no branches"),
-    (one_branch(3, -1, "0-1"), "expected each of 3 vertices"), (one_branch(2, 0, "0-1"), "its own parent"),
-    (one_branch(2, -1, "0-x"), "got no branches"), (one_branch(2, -1, "0-99999999999999"), "got no branches"),
-])
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "got no branches"),
+        ("[]", "got no branches"),
+        ('{"vertex_count": 3, "branches": [{}]}', "got no branches"),
+        (one_branch(3, -1, "0-1"), "expected each of 3 vertices"),
+        (one_branch(2, 0, "0-1"), "its own parent"),
+        (one_branch(2, -1, "0-x"), "got no branches"),
+        (one_branch(2, -1, "0-99999999999999"), "got no branches"),
+    ],
+)
 def test_a_file_without_usable_branches_is_refused(tmp_path, text, message):
     (tmp_path / "a.json").write_text(text)
     with pytest.raises(ClipError, match=message):

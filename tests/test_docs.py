@@ -42,8 +42,9 @@ def files(tmp_path_factory):
         clip.attributes["slack"] = np.ones(clip.vertex_count, np.float32)
         athcodec.write(clip, folder / "tree.usdc")
         for name, frames in {"calm": slice(0, 50), "gale": slice(60, 120), "storm": slice(60, 120)}.items():
-            motion = dataclasses.replace(clip, positions=clip.positions[frames], time=clip.time[frames],
-                                         rest=clip.rest.astype(np.float32))
+            motion = dataclasses.replace(
+                clip, positions=clip.positions[frames], time=clip.time[frames], rest=clip.rest.astype(np.float32)
+            )
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
     return folder
@@ -74,8 +75,18 @@ def test_the_c_program_shows_a_coarse_level_at_a_distance(files, tmp_path):
     ((_, text),) = blocks(ROOT / "docs" / "c-api.md", "c")
     (tmp_path / "example.c").write_text(text)
     library, warnings = library_path(), ("-std=c11", "-Wall", "-Wextra", "-Werror")
-    run("cc", *warnings, "-I", ROOT / "athcodec" / "core", "example.c", library, f"-Wl,-rpath,{library.parent}",
-        "-o", "example", cwd=tmp_path)
+    run(
+        "cc",
+        *warnings,
+        "-I",
+        ROOT / "athcodec" / "core",
+        "example.c",
+        library,
+        f"-Wl,-rpath,{library.parent}",
+        "-o",
+        "example",
+        cwd=tmp_path,
+    )
     shown = run(tmp_path / "example", files / "tree.ath", text=True)
     found = re.fullmatch(r"level (\d+): (\d+) matrices, (\d+) exact vertices\n", shown)
     level, matrices, exact = map(int, found.groups())
@@ -86,11 +97,14 @@ def test_the_c_program_shows_a_coarse_level_at_a_distance(files, tmp_path):
 def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
     ((_, text),) = blocks(ROOT / "docs" / "webassembly.md", "js")
     module = (ROOT / "athcodec" / "viewer" / "ath_decoder.mjs").as_uri()
-    given = ("import { readFileSync } from 'node:fs';\n"
-             "const bytes = new Uint8Array(readFileSync(process.argv[2]));\n"
-             "const [distance, fov, height, seconds] = [0.01, 1, 1080, 1];\n")  # so near that all detail is shown
-    (tmp_path / "example.mjs").write_text(given + text.replace("./ath_decoder.mjs", module)
-                                          + "process.stdout.write(new Uint8Array(positions.buffer));\n")
+    given = (
+        "import { readFileSync } from 'node:fs';\n"
+        "const bytes = new Uint8Array(readFileSync(process.argv[2]));\n"
+        "const [distance, fov, height, seconds] = [0.01, 1, 1080, 1];\n"
+    )  # so near that all detail is shown
+    (tmp_path / "example.mjs").write_text(
+        given + text.replace("./ath_decoder.mjs", module) + "process.stdout.write(new Uint8Array(positions.buffer));\n"
+    )
     shown = run("node", tmp_path / "example.mjs", files / "tree.ath")
     with athcodec.open(files / "tree.ath") as decoder:
         assert shown == decoder.positions(30).tobytes()

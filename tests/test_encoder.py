@@ -79,8 +79,9 @@ def test_the_sample_is_coded_in_a_fiftieth_of_its_size(sample_clip, tmp_path):
     assert athcodec.encode(sample_clip, tmp_path / "s.ath").ratio > 50
 
 
-@pytest.mark.parametrize("dtype, offset, bound", [(np.float32, 1e6, 1e-3), (np.float64, 1e6, 1e-12),
-                                                  (np.float32, 0.0, 1e-9)])
+@pytest.mark.parametrize(
+    "dtype, offset, bound", [(np.float32, 1e6, 1e-3), (np.float64, 1e6, 1e-12), (np.float32, 0.0, 1e-9)]
+)
 def test_a_bound_finer_than_the_sources_numbers_is_refused_with_the_least_possible(dtype, offset, bound, tmp_path):
     clip = plant(seed=1, branches=3, frames=16, dtype=dtype, offset=offset)
     with pytest.raises(BoundError, match=rf"expected more than .* spacing of the source's {np.dtype(dtype).name}"):
@@ -88,20 +89,23 @@ def test_a_bound_finer_than_the_sources_numbers_is_refused_with_the_least_possib
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("options, error, message", [
-    ({"max_error": 1.0, "rel_error": 1e-3}, ValueError, "max_error and rel_error; expected one"),
-    ({"rel_error": 1e-3, "target_size": 10}, ValueError, "rel_error and target_size; expected one"),
-    ({"max_error": 0.0}, BoundError, "max_error: got 0.0"),
-    ({"max_error": -1.0}, BoundError, "max_error: got -1.0"),
-    ({"max_error": float("nan")}, BoundError, "max_error: got nan"),
-    ({"rel_error": float("inf")}, BoundError, "rel_error: got inf"),
-    ({"rel_error": 0}, BoundError, "rel_error: got 0"),
-    ({"target_size": 0}, BoundError, "target_size: got 0"),
-    ({"segment_frames": 15}, ValueError, "segment_frames: got 15; expected 16 to 256"),
-    ({"segment_frames": 257}, ValueError, "segment_frames: got 257; expected 16 to 256"),
-    ({"attributes": "some"}, ValueError, "attributes: got 'some'"),
-    ({"effort": "heroic"}, ValueError, "effort: got 'heroic'; expected one of fast, default, best"),
-])
+@pytest.mark.parametrize(
+    "options, error, message",
+    [
+        ({"max_error": 1.0, "rel_error": 1e-3}, ValueError, "max_error and rel_error; expected one"),
+        ({"rel_error": 1e-3, "target_size": 10}, ValueError, "rel_error and target_size; expected one"),
+        ({"max_error": 0.0}, BoundError, "max_error: got 0.0"),
+        ({"max_error": -1.0}, BoundError, "max_error: got -1.0"),
+        ({"max_error": float("nan")}, BoundError, "max_error: got nan"),
+        ({"rel_error": float("inf")}, BoundError, "rel_error: got inf"),
+        ({"rel_error": 0}, BoundError, "rel_error: got 0"),
+        ({"target_size": 0}, BoundError, "target_size: got 0"),
+        ({"segment_frames": 15}, ValueError, "segment_frames: got 15; expected 16 to 256"),
+        ({"segment_frames": 257}, ValueError, "segment_frames: got 257; expected 16 to 256"),
+        ({"attributes": "some"}, ValueError, "attributes: got 'some'"),
+        ({"effort": "heroic"}, ValueError, "effort: got 'heroic'; expected one of fast, default, best"),
+    ],
+)
 def test_options_out_of_range_are_refused_by_name(options, error, message, small, tmp_path):
     with pytest.raises(error, match=message):
         athcodec.encode(small, tmp_path / "s.ath", **options)
@@ -115,10 +119,14 @@ def test_coordinates_beyond_what_a_file_can_hold_are_refused_and_leave_nothing(t
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("clip, message", [
-    (lambda: chain_plant(4097, 1, frames=2), "4097 branches on branches"),
-    (lambda: clip_of(np.zeros(((1 << 20) + 1, 1, 3)), np.zeros((1, 3)), [0], [-1]), "1048577 frames"),
-], ids=["depth", "frames"])
+@pytest.mark.parametrize(
+    "clip, message",
+    [
+        (lambda: chain_plant(4097, 1, frames=2), "4097 branches on branches"),
+        (lambda: clip_of(np.zeros(((1 << 20) + 1, 1, 3)), np.zeros((1, 3)), [0], [-1]), "1048577 frames"),
+    ],
+    ids=["depth", "frames"],
+)
 def test_counts_that_decoders_refuse_are_refused_when_encoding(clip, message, tmp_path):
     with pytest.raises(ClipError, match=message):
         athcodec.encode(clip(), tmp_path / "s.ath", effort="fast")
@@ -173,8 +181,13 @@ class Fading:
 @pytest.mark.parametrize("error", [None, OSError])
 @pytest.mark.parametrize("good_reads", [0, 1])
 def test_a_source_that_fails_while_it_is_coded_leaves_no_file(error, good_reads, small, tmp_path):
-    fading = MotionClip(positions=Fading(small.positions, good_reads, error), rest=small.rest, time=small.time,
-                        vertex_branch=small.vertex_branch, branch_parent=small.branch_parent)
+    fading = MotionClip(
+        positions=Fading(small.positions, good_reads, error),
+        rest=small.rest,
+        time=small.time,
+        vertex_branch=small.vertex_branch,
+        branch_parent=small.branch_parent,
+    )
     with pytest.raises(ClipError, match="positions: frame|positions: frames"):
         athcodec.encode(fading, tmp_path / "s.ath", segment_frames=16, effort="fast")
     assert not list(tmp_path.iterdir())
@@ -227,8 +240,13 @@ def test_a_name_without_a_folder_is_a_file_here(small, tmp_path, monkeypatch):
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tmp_path):
     calls: list[tuple[str, float]] = []
-    athcodec.encode(small, tmp_path / "s.ath", segment_frames=16, effort=effort,
-                    progress=lambda stage, fraction: calls.append((stage, fraction)))
+    athcodec.encode(
+        small,
+        tmp_path / "s.ath",
+        segment_frames=16,
+        effort=effort,
+        progress=lambda stage, fraction: calls.append((stage, fraction)),
+    )
     assert list(dict.fromkeys(stage for stage, _ in calls)) == ["survey", "search", "motion", "done"]
     fractions = [fraction for _, fraction in calls]
     assert fractions == sorted(fractions) and 0 < fractions[0] < 0.3 and fractions[-1] == 1.0
@@ -247,8 +265,14 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
         return analyse(self, source, dead_zone)
 
     monkeypatch.setattr(SegmentMotion, "analyse", counted)
-    athcodec.encode(endless_clip(frames, at_once=frames), tmp_path / "e.ath", segment_frames=32, effort=effort, jobs=1,
-                    progress=lambda stage, fraction: reported.append((fraction, done[0])))
+    athcodec.encode(
+        endless_clip(frames, at_once=frames),
+        tmp_path / "e.ath",
+        segment_frames=32,
+        effort=effort,
+        jobs=1,
+        progress=lambda stage, fraction: reported.append((fraction, done[0])),
+    )
     for part in (0.25, 0.5, 0.75):
         work = max([0, *(work for fraction, work in reported if fraction <= part)]) / done[0]
         assert work == pytest.approx(part, abs=0.25)
@@ -261,14 +285,17 @@ def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip, tmp_path):
 
 
 def test_the_number_of_threads_does_not_show_in_the_bytes(bushy_clip, tmp_path):
-    one, two, five = (encoded(bushy_clip, tmp_path, segment_frames=16, effort="default", jobs=jobs)
-                      for jobs in (1, 2, 5))
+    one, two, five = (
+        encoded(bushy_clip, tmp_path, segment_frames=16, effort="default", jobs=jobs) for jobs in (1, 2, 5)
+    )
     assert one == two == five
 
 
 def test_encoding_leaves_the_clip_as_it_was(bushy_clip, tmp_path):
-    before = {name: getattr(bushy_clip, name).tobytes() for name in ("positions", "rest", "time", "vertex_branch",
-                                                                    "branch_parent", "stem_index")}
+    before = {
+        name: getattr(bushy_clip, name).tobytes()
+        for name in ("positions", "rest", "time", "vertex_branch", "branch_parent", "stem_index")
+    }
     encoded(bushy_clip, tmp_path)
     assert all(getattr(bushy_clip, name).tobytes() == data for name, data in before.items())
 
@@ -280,15 +307,24 @@ def test_arrays_of_any_layout_and_byte_order_give_the_same_file(dtype, tmp_path)
     strided = np.asfortranarray(source.positions)
     files = []
     for positions in (source.positions, swapped, strided):
-        clip = MotionClip(positions=positions, rest=source.rest, time=source.time, vertex_branch=source.vertex_branch,
-                          branch_parent=source.branch_parent)
+        clip = MotionClip(
+            positions=positions,
+            rest=source.rest,
+            time=source.time,
+            vertex_branch=source.vertex_branch,
+            branch_parent=source.branch_parent,
+        )
         files.append(encoded(clip, tmp_path))
     assert files[0] == files[1] == files[2]
 
 
 def test_plain_lists_can_be_encoded(tmp_path):
-    clip = MotionClip(positions=np.zeros((2, 3, 3)) + [[[0.0], [1], [2]], [[0], [1], [2.5]]], time=[0, 1],
-                      vertex_branch=[0, 0, 0], branch_parent=[-1])
+    clip = MotionClip(
+        positions=np.zeros((2, 3, 3)) + [[[0.0], [1], [2]], [[0], [1], [2.5]]],
+        time=[0, 1],
+        vertex_branch=[0, 0, 0],
+        branch_parent=[-1],
+    )
     athcodec.encode(clip, tmp_path / "s.ath", rel_error=1e-3)
     with athcodec.open(tmp_path / "s.ath", strict=True) as decoder:
         assert np.abs(decoder.positions() - clip.positions).max() <= decoder.max_error_bound
@@ -320,8 +356,13 @@ class Endless:
 
 def endless_clip(frames: int, vertices: int = 200, at_once: int = 32) -> MotionClip:
     rest = np.stack([np.zeros(vertices), np.zeros(vertices), np.linspace(0, 3, vertices)], 1)
-    return MotionClip(positions=Endless(rest, frames, at_once), rest=rest, time=np.arange(frames) / 30,
-                      vertex_branch=np.zeros(vertices, int), branch_parent=[-1])
+    return MotionClip(
+        positions=Endless(rest, frames, at_once),
+        rest=rest,
+        time=np.arange(frames) / 30,
+        vertex_branch=np.zeros(vertices, int),
+        branch_parent=[-1],
+    )
 
 
 def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
@@ -338,8 +379,9 @@ def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
 def peak_memory(clip: MotionClip, folder) -> int:
     tracemalloc.start()
     try:
-        athcodec.encode(clip, folder / "s.ath", segment_frames=32, effort="fast",
-                        jobs=1)  # how far threads run ahead differs from run to run
+        athcodec.encode(
+            clip, folder / "s.ath", segment_frames=32, effort="fast", jobs=1
+        )  # how far threads run ahead differs from run to run
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -348,7 +390,7 @@ def peak_memory(clip: MotionClip, folder) -> int:
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(clip_module, "BLOCK_BYTES", 32 * 200 * 12)
     monkeypatch.setattr("athcodec.encoding.encoder.SPOOL_BYTES", 1 << 16)
-    peak_memory(endless_clip(64), tmp_path)   # what is made once, such as imports, is not counted
+    peak_memory(endless_clip(64), tmp_path)  # what is made once, such as imports, is not counted
     short, long = (peak_memory(endless_clip(frames), tmp_path) for frames in (320, 1600))
     raw = 1600 * 200 * 12
     assert long < 1.2 * short + 200_000, "but for a few numbers per frame and segment"
@@ -366,8 +408,13 @@ def test_the_work_of_decoding_is_proportional_to_the_length_of_a_clip(tmp_path, 
 
     def work(frames: int) -> int:
         wave = np.zeros((frames, 1, 3)) + np.sin(np.arange(frames) / 9)[:, None, None]
-        athcodec.encode(clip_of(wave, np.zeros((1, 3)), [0], [-1]), tmp_path / "s.ath", rel_error=1e-2,
-                        segment_frames=16, effort="fast")
+        athcodec.encode(
+            clip_of(wave, np.zeros((1, 3)), [0], [-1]),
+            tmp_path / "s.ath",
+            rel_error=1e-2,
+            segment_frames=16,
+            effort="fast",
+        )
         with athcodec.open(tmp_path / "s.ath") as decoder:
             return work_of(decoder.positions)
 

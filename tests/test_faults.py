@@ -55,11 +55,15 @@ def test_two_hundred_killed_writers_leave_the_older_file_or_a_whole_one(place):
     assert row.tried == 200 and row.wrong == 0
 
 
-@pytest.mark.parametrize("write", [
-    lambda path, ath: athcodec.truncate(ath, path, 1),
-    lambda path, ath: athcodec.write_hdf5(plant(frames=3), path),
-    lambda path, ath: athcodec.encode(plant(frames=3), path, effort="fast"),
-], ids=["truncate", "write_hdf5", "encode"])
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path, ath: athcodec.truncate(ath, path, 1),
+        lambda path, ath: athcodec.write_hdf5(plant(frames=3), path),
+        lambda path, ath: athcodec.encode(plant(frames=3), path, effort="fast"),
+    ],
+    ids=["truncate", "write_hdf5", "encode"],
+)
 def test_every_writer_removes_what_a_dead_one_left_and_nothing_else(write, bushy_ath, tmp_path):
     others = {".other.ath.0123abcd.part", ".target.ath.part", ".target.ath.0123abcd.part.txt", "target.ath.part"}
     for name in {DEAD, *others}:
@@ -122,14 +126,18 @@ def test_a_disk_that_is_really_full_is_one_line_and_leaves_nothing(place):
 
 
 def test_hdf5_is_written_where_the_environment_insists_on_its_locks(place, tmp_path):
-    process = faults.spawn(place.words("decode", tmp_path / "a.h5"),
-                           lambda: os.environ.update(HDF5_USE_FILE_LOCKING="TRUE"))
+    process = faults.spawn(
+        place.words("decode", tmp_path / "a.h5"), lambda: os.environ.update(HDF5_USE_FILE_LOCKING="TRUE")
+    )
     _, err = process.communicate(timeout=60)
     assert process.returncode == 0 and err == "" and faults.is_whole(tmp_path / "a.h5")
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("/dev/null"),
-                                  lambda path: path.symlink_to(path)], ids=["pipe", "device", "endless link"])
+@pytest.mark.parametrize(
+    "make",
+    [os.mkfifo, lambda path: path.symlink_to("/dev/null"), lambda path: path.symlink_to(path)],
+    ids=["pipe", "device", "endless link"],
+)
 def test_what_is_no_plain_file_is_refused_before_any_work(make, tmp_path, capsys):
     odd = tmp_path / "odd"
     make(odd)
@@ -219,14 +227,15 @@ def overwrite(path: Path) -> None:
     with h5py.File(path) as file:
         place = file["positions"].id.get_offset()
     data = bytearray(path.read_bytes())
-    data[place: place + 600] = np.linspace(0, 1, 150, dtype=np.float32).tobytes()
+    data[place : place + 600] = np.linspace(0, 1, 150, dtype=np.float32).tobytes()
     path.write_bytes(data)
 
 
 @pytest.mark.parametrize("stage", ["survey", "search", "motion"])
 @pytest.mark.parametrize("change", [shrink, overwrite])
-def test_a_source_that_changes_while_it_is_read_is_refused_by_name(change, stage, long_source, tmp_path, capsys,
-                                                                   monkeypatch):
+def test_a_source_that_changes_while_it_is_read_is_refused_by_name(
+    change, stage, long_source, tmp_path, capsys, monkeypatch
+):
     pending = [stage]
 
     def report(now: str, fraction: float) -> None:
@@ -262,8 +271,13 @@ class Restless:
 
 def restless(factor: float) -> athcodec.MotionClip:
     source = plant(seed=1, branches=5, longest=4, frames=40)
-    return athcodec.MotionClip(positions=Restless(source.positions, factor), rest=source.rest, time=source.time,
-                               vertex_branch=source.vertex_branch, branch_parent=source.branch_parent)
+    return athcodec.MotionClip(
+        positions=Restless(source.positions, factor),
+        rest=source.rest,
+        time=source.time,
+        vertex_branch=source.vertex_branch,
+        branch_parent=source.branch_parent,
+    )
 
 
 def test_arrays_that_change_a_little_between_two_readings_give_an_intact_file(tmp_path):

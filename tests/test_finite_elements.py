@@ -41,7 +41,7 @@ def moved(points):
     """(T, N, 3) float64, and its displacement."""
     rest = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
     motion = swaying(rest, len(TIMES), np.float64)
-    motion[..., points.shape[1]:] = 0
+    motion[..., points.shape[1] :] = 0
     return motion, (motion - rest)[..., : points.shape[1]]
 
 
@@ -52,8 +52,9 @@ def write_xdmf(path, points, cells, displacement, name="u", data_format="HDF", *
         with meshio.xdmf.TimeSeriesWriter(path.name, data_format) as writer:
             writer.write_points_cells(points, cells)
             for time, moved in zip(TIMES, displacement):
-                writer.write_data(float(time), point_data={name: moved, **more.get("point_data", {})},
-                                  cell_data=more.get("cell_data"))
+                writer.write_data(
+                    float(time), point_data={name: moved, **more.get("point_data", {})}, cell_data=more.get("cell_data")
+                )
     finally:
         os.chdir(before)
     return path
@@ -104,14 +105,24 @@ def test_second_order_cells_keep_their_middle_nodes(tmp_path):
         assert clip.vertex_count == 9
 
 
-@pytest.mark.parametrize("suffix, how", [(".vtu", {}), (".vtu", {"binary": False}), (".vtu", {"compression": None}),
-                                         (".vtu", {"compression": "lzma"}), (".vtk", {}), (".vtk", {"binary": False})])
+@pytest.mark.parametrize(
+    "suffix, how",
+    [
+        (".vtu", {}),
+        (".vtu", {"binary": False}),
+        (".vtu", {"compression": None}),
+        (".vtu", {"compression": "lzma"}),
+        (".vtk", {}),
+        (".vtk", {"binary": False}),
+    ],
+)
 def test_numbered_files_of_meshio_are_read(tmp_path, suffix, how):
     points, cells = CELLS["quads and lines"]
     motion, _ = moved(points)
     for frame, each in enumerate(motion, 7):
-        (meshio.vtu if suffix == ".vtu" else meshio.vtk).write(tmp_path / f"r{frame}{suffix}", meshio.Mesh(each, cells),
-                                                               **how)
+        (meshio.vtu if suffix == ".vtu" else meshio.vtk).write(
+            tmp_path / f"r{frame}{suffix}", meshio.Mesh(each, cells), **how
+        )
     with athcodec.read(tmp_path / f"r9{suffix}", fps=24) as clip:
         assert np.abs(clip.block(0, 5) - motion).max() < 1e-10 and clip.metadata["start_frame"] == 7
         assert clip.faces.tolist() == [[0, 1, 2, 3]] and clip.edges.tolist() == [[5, 6], [6, 7]]
@@ -133,8 +144,13 @@ def test_a_motion_comes_back_from_xdmf_pvd_and_vtu(tmp_path, make, dtype, name, 
 
 @pytest.mark.parametrize("name", ["a.xdmf", "a.pvd"])
 def test_volumes_and_data_per_cell_survive(tmp_path, name):
-    first = write_vtu(tmp_path, moved(CUBE)[0], [("hexahedron", HEXES)], cell_data={"material": [np.array([3, 4])]},
-                      point_data={"mass": np.arange(12.0)})
+    first = write_vtu(
+        tmp_path,
+        moved(CUBE)[0],
+        [("hexahedron", HEXES)],
+        cell_data={"material": [np.array([3, 4])]},
+        point_data={"mass": np.arange(12.0)},
+    )
     with athcodec.read(first) as clip:
         assert clip.attributes["material"].tolist() == [3, 4] and clip.metadata["domains"]["material"] == "cell"
         athcodec.write(clip, tmp_path / name)
@@ -204,8 +220,11 @@ def test_what_is_static_is_kept_and_what_moves_is_left_out(tmp_path):
         with meshio.xdmf.TimeSeriesWriter("a.xdmf") as writer:
             writer.write_points_cells(points, cells)
             for step, moving in enumerate(displacement):
-                writer.write_data(step / 24, {"u": moving, "mass": np.arange(8.0), "stress": np.full(8, float(step))},
-                                  {"part": [np.array([1, 2, 3])], "damage": [np.full(3, float(step))]})
+                writer.write_data(
+                    step / 24,
+                    {"u": moving, "mass": np.arange(8.0), "stress": np.full(8, float(step))},
+                    {"part": [np.array([1, 2, 3])], "damage": [np.full(3, float(step))]},
+                )
     with athcodec.read(path) as clip:
         assert clip.attributes.keys() == {"mass", "part", "part_vertex_counts"}
         assert clip.metadata["domains"]["part"] == "face" and clip.attributes["part"].tolist() == [1, 2, 3]
@@ -268,7 +287,8 @@ def test_steps_cut_out_of_one_array_are_read(tmp_path):
             f'<DataItem Dimensions="8 3" Format="HDF">a.h5:/VisualisationVector/{step}</DataItem>',
             '<DataItem ItemType="HyperSlab" Dimensions="8 3"><DataItem Dimensions="3 3" Format="XML">'
             f'{3 * step} 0 0 1 1 1 1 8 3</DataItem><DataItem Dimensions="5 8 3" Format="HDF">a.h5:/all</DataItem>'
-            '</DataItem>')
+            "</DataItem>",
+        )
     motion = fenics(tmp_path, text)
     with athcodec.read(tmp_path / "a.xdmf") as clip:
         assert np.abs(clip.block(0, 2) - motion[[0, 3]]).max() < 1e-12
@@ -282,8 +302,11 @@ def test_changing_cells_are_refused_with_the_frame(tmp_path):
     meshio.write(tmp_path / "r_0004.vtu", meshio.Mesh(motion[3], others))
     with athcodec.read(first) as clip, pytest.raises(ClipError, match=r"frame 3, r_0004\.vtu: got other cells"):
         list(clip.blocks())
-    own = FENICS.replace("<xi:include", '<Topology TopologyType="Triangle"><DataItem Dimensions="1 3" NumberType="Int" '
-                         'Format="XML">0 1 2</DataItem></Topology><xi:include')
+    own = FENICS.replace(
+        "<xi:include",
+        '<Topology TopologyType="Triangle"><DataItem Dimensions="1 3" NumberType="Int" '
+        'Format="XML">0 1 2</DataItem></Topology><xi:include',
+    )
     fenics(tmp_path, own)
     with athcodec.read(tmp_path / "a.xdmf") as clip, pytest.raises(ClipError, match="frame 1: got other cells"):
         list(clip.blocks())
@@ -307,11 +330,15 @@ REFUSED = {
     "entities": ('<!DOCTYPE Xdmf [<!ENTITY a "aaaaaaaaaa">]>' + FENICS.split("[]>")[1], "entities of its own"),
     "no mesh": (FENICS.replace("Geometry", "Other"), "no grid with a Geometry"),
     "times that do not grow": (FENICS.replace('"0.5"', '"0"'), "time: frame 1"),
-    "no vertex": (FENICS.replace('Format="HDF">a.h5:/Mesh/0/mesh/topology', 'Format="XML">0 1 2 3 4 5 6 7 8'),
-                  "expected 0 to 7"),
-    "too few numbers": (FENICS.replace('Format="HDF">a.h5:/Mesh/0/mesh/geometry', 'Format="XML">0 1 2'),
-                        "got 3 numbers"),
-    "pieces": (FENICS.replace('<Grid>', '<Grid GridType="Collection">'), "have to be merged"),
+    "no vertex": (
+        FENICS.replace('Format="HDF">a.h5:/Mesh/0/mesh/topology', 'Format="XML">0 1 2 3 4 5 6 7 8'),
+        "expected 0 to 7",
+    ),
+    "too few numbers": (
+        FENICS.replace('Format="HDF">a.h5:/Mesh/0/mesh/geometry', 'Format="XML">0 1 2'),
+        "got 3 numbers",
+    ),
+    "pieces": (FENICS.replace("<Grid>", '<Grid GridType="Collection">'), "have to be merged"),
     "another reference": (FENICS.replace("<DataItem", '<DataItem Reference="XML"'), "got a reference"),
 }
 

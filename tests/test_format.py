@@ -20,15 +20,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import zstandard
-from files import (
-    Parts,
-    basis_chunk,
-    exact_rest_chunk,
-    hierarchy_chunk,
-    opened,
-    roots,
-    still_file,
-)
+from files import Parts, basis_chunk, exact_rest_chunk, hierarchy_chunk, opened, roots, still_file
 from plants import plant
 
 import athcodec
@@ -46,7 +38,7 @@ TEXT = FORMAT.read_text(encoding="utf-8")
 def section(title: str) -> str:
     """The text under a heading, up to the next of the same or a higher rank."""
     heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
-    rest = TEXT[heading.end():]
+    rest = TEXT[heading.end() :]
     following = re.search(rf"^#{{1,{len(heading[1])}}} ", rest, re.M)
     return rest[: following.start()] if following else rest
 
@@ -87,17 +79,25 @@ def single(x: float) -> float:
 @pytest.fixture(scope="module")
 def spec() -> SimpleNamespace:
     """The decoder that FORMAT.md's Python blocks make, given only what its Conventions take for granted."""
+
     def utf8(data: bytes) -> str:
         try:
             return data.decode()
         except UnicodeDecodeError:
             raise names["Invalid"]("BAD_CHUNK") from None
 
-    names = {"u8": reader("<B"), "u16": reader("<H"), "u32": reader("<I"), "f32": reader("<f"),
-             "f64": reader("<d"), "sqrt": math.sqrt, "single": single,
-             "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
-             "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
-             "utf8": utf8}
+    names = {
+        "u8": reader("<B"),
+        "u16": reader("<H"),
+        "u32": reader("<I"),
+        "f32": reader("<f"),
+        "f64": reader("<d"),
+        "sqrt": math.sqrt,
+        "single": single,
+        "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
+        "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
+        "utf8": utf8,
+    }
     for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
         exec(block, names)
     return SimpleNamespace(**names)
@@ -122,8 +122,10 @@ def by_document(clips: list) -> list[tuple]:
 
 
 def by_code(decoder: athcodec.Decoder) -> list[tuple]:
-    return [(clip.name, clip.frame_count, clip.segment_count, list(clip.seam_errors) if clip.loop else None)
-            for clip in decoder.clips]
+    return [
+        (clip.name, clip.frame_count, clip.segment_count, list(clip.seam_errors) if clip.loop else None)
+        for clip in decoder.clips
+    ]
 
 
 # ---- tables and dumps ----
@@ -134,8 +136,10 @@ def test_document_describes_the_version_that_is_written():
     assert f"* **{container.MAJOR}.{container.MINOR}**" in section("Version changes")
 
 
-@pytest.mark.parametrize("title, form", [
-    ("Header", container._HEADER), ("Chunk table", container._CHUNK), ("Error table", container._ERRORS)])
+@pytest.mark.parametrize(
+    "title, form",
+    [("Header", container._HEADER), ("Chunk table", container._CHUNK), ("Error table", container._ERRORS)],
+)
 def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}
     expected, at = [], 0
@@ -185,9 +189,13 @@ def test_checksum_has_the_check_value_of_the_document(spec):
 
 
 def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
-    clip = MotionClip(positions=np.array([[[1, 2, 3]]], np.float32), time=np.zeros(1),
-                      vertex_branch=np.zeros(1, np.int32), branch_parent=np.array([-1], np.int32),
-                      rest=np.array([[1.0, 2.0, 3.0]]))
+    clip = MotionClip(
+        positions=np.array([[[1, 2, 3]]], np.float32),
+        time=np.zeros(1),
+        vertex_branch=np.zeros(1, np.int32),
+        branch_parent=np.array([-1], np.int32),
+        rest=np.array([[1.0, 2.0, 3.0]]),
+    )
     athcodec.encode(clip, tmp_path / "smallest.ath", max_error=2**-7, attributes="none")
     data = dump(section("Smallest file"))
     assert (tmp_path / "smallest.ath").read_bytes() == data
@@ -220,14 +228,21 @@ def test_worked_example_decodes_step_by_step(spec):
             return super().bit(context)
 
         def narrow(self, bound):
-            steps.append({"Probability": self.probability, "range": f"{self.range:016x}",
-                          "bound": f"{bound:016x}", "code": f"{self.code:016x}"})
+            steps.append(
+                {
+                    "Probability": self.probability,
+                    "range": f"{self.range:016x}",
+                    "bound": f"{bound:016x}",
+                    "code": f"{self.code:016x}",
+                }
+            )
             self.probability = "raw"
             steps[-1]["Bit"] = str(super().narrow(bound))
             return int(steps[-1]["Bit"])
 
-    decode = type(spec.decode_temporal)(spec.decode_temporal.__code__,
-                                        spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing})
+    decode = type(spec.decode_temporal)(
+        spec.decode_temporal.__code__, spec.decode_temporal.__globals__ | {"RangeDecoder": Tracing}
+    )
     assert decode(stream, 1, len(values), 8) == [values]
     assert steps == table("Worked example", "Probability")
     assert streams.encode_temporal(np.array([values], np.int32), 8) == stream
@@ -247,7 +262,7 @@ def test_shuffle_of_the_document_restores_an_array(spec):
     array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
     data = container.pack_array(array, "numbers")
     (length,) = struct.unpack_from("<H", data)
-    assert spec.unshuffle(zstandard.decompress(data[2 + length:]), array.size, 4) == array.tobytes()
+    assert spec.unshuffle(zstandard.decompress(data[2 + length :]), array.size, 4) == array.tobytes()
 
 
 def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path):
@@ -256,8 +271,9 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
     assert_same_bits(spec, path.read_bytes())
 
 
-@pytest.mark.parametrize("seed, is_float64, exact", [
-    (1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)])
+@pytest.mark.parametrize(
+    "seed, is_float64, exact", [(1, False, None), (2, True, None), (3, False, np.float32), (4, True, np.float64)]
+)
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
 
@@ -359,7 +375,6 @@ def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
 # ---- decisions made by chance ----
 
 
-
 @pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
 @pytest.mark.parametrize("seed", range(6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
@@ -371,7 +386,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
             continue
         head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4, container.SHAPES: 0}[kind]
         stream = random_stream(spec, random, *motion_function(spec, parts, chunk))
-        data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1:]])
+        data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1 :]])
         for level in range(chunk.level, parts.header.level_count):
             document = outcome(spec, lambda data: spec.decode(data, level), data)
             code = outcome(spec, lambda data: opened(data).positions(level=level), data)
@@ -384,8 +399,9 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
     if chunk.kind == container.CORRECTIONS:
         return "decode_corrections", parts.header.vertex_count, frames
     _, chunks = spec.parse_front(parts.file())
-    branches, *_ = spec.decode_hierarchy(spec.content(chunks, 1)[16:], parts.header.branch_count,
-                                         parts.header.vertex_count)
+    branches, *_ = spec.decode_hierarchy(
+        spec.content(chunks, 1)[16:], parts.header.branch_count, parts.header.vertex_count
+    )
     rest = spec.content(chunks, 2)
     plan = spec.make_plan(branches, spec.decode_rest(rest[36:], branches, spec.f64(rest, 28)))
     if chunk.kind == container.SHAPES:
@@ -454,8 +470,9 @@ INFINITY = {32: 0xFF << 23, 64: 0x7FF << 52}
 def awkward_numbers(random: np.random.Generator, count: int, dtype: type) -> np.ndarray:
     """Finite numbers of all magnitudes and both signs, zeros among them, and some close to the one before."""
     limits = np.finfo(dtype)
-    pool = np.array([0, -0.0, 1, -1, limits.max, limits.min, limits.tiny, -limits.tiny,
-                     limits.smallest_subnormal], dtype)
+    pool = np.array(
+        [0, -0.0, 1, -1, limits.max, limits.min, limits.tiny, -limits.tiny, limits.smallest_subnormal], dtype
+    )
     bits = random.integers(0, 256, count * limits.bits // 8, np.uint8).view(dtype)
     numbers = np.where(random.random(count) < 0.3, random.choice(pool, count), bits)
     near = np.cumsum(random.normal(size=count)).astype(dtype)
@@ -498,15 +515,19 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
     file = HandMade(seed, False, None)
     rows = stems(spec, file.branches)
     for count in (1, 1, 2, 2, 2, 3, 3, 3, 40):
-        assert_same_outcome(spec, random_stream(spec, random, "decode_times", count),
-                            lambda stream: np.array(spec.frame_times(container.pack_time(stream),
-                                                                     [spec.Record(frames=count)])),
-                            lambda stream: read_times(stream, count))
+        assert_same_outcome(
+            spec,
+            random_stream(spec, random, "decode_times", count),
+            lambda stream: np.array(spec.frame_times(container.pack_time(stream), [spec.Record(frames=count)])),
+            lambda stream: read_times(stream, count),
+        )
     for dtype, n in NUMBERS.items():
         assert_same_outcome(
-            spec, random_stream(spec, random, "decode_exact_rest", rows, n == 64),
+            spec,
+            random_stream(spec, random, "decode_exact_rest", rows, n == 64),
             lambda stream: np.array(spec.decode_exact_rest(stream, rows, n == 64), dtype),
-            lambda stream: read_exact_rest(stream, file.branches, dtype))
+            lambda stream: read_exact_rest(stream, file.branches, dtype),
+        )
 
 
 def assert_same_outcome(spec: SimpleNamespace, stream: bytes, *decoders: Callable) -> None:
@@ -532,15 +553,18 @@ def one_vertex(spec: SimpleNamespace) -> list:
 
 
 @pytest.mark.parametrize("dtype, n", NUMBERS.items())
-@pytest.mark.parametrize("beyond, negative, valid", [
-    (-1, False, True), (0, False, False), (1, False, False),
-    (0, True, True), (1, True, False), (2, True, False)])
+@pytest.mark.parametrize(
+    "beyond, negative, valid",
+    [(-1, False, True), (0, False, False), (1, False, False), (0, True, True), (1, True, False), (2, True, False)],
+)
 def test_numbers_that_are_not_finite_are_refused_alike(spec, dtype, n, beyond, negative, valid):
     """Downwards there is one number more: -0.0."""
     stream = exact_stream(spec, n, (INFINITY[n] + beyond, negative))
     number = float(np.finfo(dtype).min if negative else np.finfo(dtype).max)
-    for decode in (lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),
-                   lambda data: read_exact_rest(data, roots(1), dtype).tolist()):
+    for decode in (
+        lambda data: spec.decode_exact_rest(data, one_vertex(spec), n == 64),
+        lambda data: read_exact_rest(data, roots(1), dtype).tolist(),
+    ):
         assert outcome(spec, decode, stream) == ([[number, 0.0, 0.0]] if valid else "invalid")
 
 
@@ -549,8 +573,12 @@ def test_differences_wrap_around(spec):
     half = 1 << 63
     opposite = math.nextafter(-4.0, 0.0)
     for magnitude, negative, number in (
-            (half, False, opposite), (half, True, opposite), (half + 1, False, math.nextafter(opposite, 0.0)),
-            (half + 1, True, -4.0), (2 * half - 1, True, math.nextafter(1.0, 2.0))):
+        (half, False, opposite),
+        (half, True, opposite),
+        (half + 1, False, math.nextafter(opposite, 0.0)),
+        (half + 1, True, -4.0),
+        (2 * half - 1, True, math.nextafter(1.0, 2.0)),
+    ):
         there, back = decisions(64, magnitude, negative), decisions(64, magnitude, not negative)
         assert two_numbers(spec, from_zero(spec, 1.0), there) == [1.0, number]
         assert two_numbers(spec, from_zero(spec, number), back) == [number, 1.0]
@@ -596,8 +624,10 @@ def assert_refused_alike(spec: SimpleNamespace, data: bytes, error: str) -> None
 
 
 def test_a_branch_in_a_whole_subtree_may_not_be_whole(spec):
-    whole = [(parent, count, flags | WHOLE if b == 6 else flags)
-             for b, (parent, count, flags) in enumerate(HandMade.BRANCHES)]
+    whole = [
+        (parent, count, flags | WHOLE if b == 6 else flags)
+        for b, (parent, count, flags) in enumerate(HandMade.BRANCHES)
+    ]
     assert_refused_alike(spec, HandMade(1, False, None, whole).file(), "BAD_CHUNK")
 
 
@@ -610,24 +640,27 @@ def test_rows_may_not_code_more_frequencies_than_their_learned_basis_has(spec):
     assert_refused_alike(spec, file.file(), "BAD_CHUNK")
 
 
-@pytest.mark.parametrize("values, valid", [([128, -128], True), ([-128, 128], True), ([129, 0], False),
-                                           ([0, -129], False), ([0, 1 << 20], False)])
+@pytest.mark.parametrize(
+    "values, valid",
+    [([128, -128], True), ([-128, 128], True), ([129, 0], False), ([0, -129], False), ([0, 1 << 20], False)],
+)
 def test_entries_of_a_learned_basis_are_at_most_1(spec, values, valid):
     stream = streams.encode_temporal(np.array([values], np.int32), 30)
     for decode in lambda data: spec.decode_temporal(data, 1, 2, 8), lambda data: [read_basis(data, 2)]:
         assert outcome(spec, decode, stream) == ([values] if valid else "invalid")
 
 
-@pytest.mark.parametrize("kind, level", [(container.STEMS, 1), (container.STEMS, 4),
-                                         (container.AFFINES, 0)])
+@pytest.mark.parametrize("kind, level", [(container.STEMS, 1), (container.STEMS, 4), (container.AFFINES, 0)])
 def test_every_stream_that_the_hierarchy_asks_for_must_be_in_the_table(spec, kind, level):
     file = HandMade(1, False, None)
     file.leave_out = (kind, level, 1)
     assert_refused_alike(spec, file.file(), "BAD_CHUNK_TABLE")
 
 
-@pytest.mark.parametrize("kind, level", [(container.AFFINES, -1), (container.CORRECTIONS, 0),
-                                         (container.CORRECTIONS, -2), (container.SHAPES, 0)])
+@pytest.mark.parametrize(
+    "kind, level",
+    [(container.AFFINES, -1), (container.CORRECTIONS, 0), (container.CORRECTIONS, -2), (container.SHAPES, 0)],
+)
 def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec, kind, level):
     file = HandMade(1, False, None)
     file.store.add(kind, bytes(4), level % file.plan.level_count, 1)
@@ -641,10 +674,19 @@ def test_unknown_optional_kinds_are_skipped(spec):
     assert_same_bits(spec, file.file())
 
 
-@pytest.mark.parametrize("kind, level, error", [
-    (0x8001, 255, "UNKNOWN_CHUNK"), (0x0004, 255, "UNKNOWN_CHUNK"), (0x8010, 0, "UNKNOWN_CHUNK"),
-    (0x0020, 255, "UNKNOWN_CHUNK"), (21, 0, "UNKNOWN_CHUNK"), (0x801F, 255, "BAD_CHUNK_TABLE"),
-    (0x8021, 0, "BAD_CHUNK_TABLE"), (0x800F, 0, "BAD_CHUNK_TABLE")])
+@pytest.mark.parametrize(
+    "kind, level, error",
+    [
+        (0x8001, 255, "UNKNOWN_CHUNK"),
+        (0x0004, 255, "UNKNOWN_CHUNK"),
+        (0x8010, 0, "UNKNOWN_CHUNK"),
+        (0x0020, 255, "UNKNOWN_CHUNK"),
+        (21, 0, "UNKNOWN_CHUNK"),
+        (0x801F, 255, "BAD_CHUNK_TABLE"),
+        (0x8021, 0, "BAD_CHUNK_TABLE"),
+        (0x800F, 0, "BAD_CHUNK_TABLE"),
+    ],
+)
 def test_kinds_that_are_not_to_be_skipped_or_in_the_wrong_place_are_refused(spec, kind, level, error):
     file = HandMade(1, False, None)
     file.store.add(kind, b"from the future", level)
@@ -660,10 +702,26 @@ class HandMade:
     SEGMENTS, FRAMES = 2, 37
     # parent, vertices of the stem, flags; the stem of 70 makes two pieces. Nodes that are loose and have maps
     # of their own: 2, 3, and 16, which is whole. Loose and no nodes: 14, 17
-    BRANCHES = ((-1, 6, 0), (0, 1, 0), (0, 70, LOOSE), (2, 5, SHEET | LOOSE), (3, 3, LOOSE), (2, 9, WHOLE),
-                (5, 4, SHEET), (-1, 7, SHEET), (7, 2, SHEET | WHOLE), (7, 5, SHEET), (7, 4, 0), (10, 2, 0),
-                (-1, 1, WHOLE), (12, 2, 0), (12, 3, LOOSE), (-1, 3, 0), (15, 4, LOOSE | WHOLE),
-                (16, 2, LOOSE))
+    BRANCHES = (
+        (-1, 6, 0),
+        (0, 1, 0),
+        (0, 70, LOOSE),
+        (2, 5, SHEET | LOOSE),
+        (3, 3, LOOSE),
+        (2, 9, WHOLE),
+        (5, 4, SHEET),
+        (-1, 7, SHEET),
+        (7, 2, SHEET | WHOLE),
+        (7, 5, SHEET),
+        (7, 4, 0),
+        (10, 2, 0),
+        (-1, 1, WHOLE),
+        (12, 2, 0),
+        (12, 3, LOOSE),
+        (-1, 3, 0),
+        (15, 4, LOOSE | WHOLE),
+        (16, 2, LOOSE),
+    )
 
     def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
         self.random = np.random.default_rng(seed)
@@ -712,8 +770,9 @@ class HandMade:
         for segment in range(self.SEGMENTS):
             self._add_segment(segment)
         levels = self.plan.level_count
-        header = container.Header(self.vertex_count, len(self.branches), self.FRAMES, self.SEGMENTS, levels,
-                                  levels, 1.0, self.is_float64)
+        header = container.Header(
+            self.vertex_count, len(self.branches), self.FRAMES, self.SEGMENTS, levels, levels, 1.0, self.is_float64
+        )
         out = io.BytesIO()
         self.store.write(out, header, np.zeros((levels, self.SEGMENTS, 2)))
         return out.getvalue()
@@ -721,8 +780,10 @@ class HandMade:
     def _add_prelude(self) -> None:
         counts = len(self.branches), self.vertex_count
         permutations = [self.random.permutation(count).astype(np.int32) for count in counts]
-        self.store.add(container.HIERARCHY, container.pack_hierarchy(
-            (0.5, 3, 0.25, 1), streams.encode_hierarchy(self.branches, *permutations)))
+        self.store.add(
+            container.HIERARCHY,
+            container.pack_hierarchy((0.5, 3, 0.25, 1), streams.encode_hierarchy(self.branches, *permutations)),
+        )
         head = container.Rest(self.origin, 0.01, np.dtype(self.exact or np.float32), exact=bool(self.exact))
         times = container.pack_steady_time(np.arange(self.FRAMES) / 24.0)
         if self.exact:
@@ -755,8 +816,10 @@ class HandMade:
         return basis
 
     def _motion(self, frames: int, bases: dict[int, np.ndarray]) -> SegmentMotion:
-        streams = [LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 1, 4, 8)[level % 4]))
-                   for level in range(self.plan.level_count)]
+        streams = [
+            LevelStream(float(np.float32(0.03 + 0.01 * level)), float((0, 1, 4, 8)[level % 4]))
+            for level in range(self.plan.level_count)
+        ]
         for level, basis in bases.items():
             streams[level].temporal = basis * 2.0 ** (1 - self.bases[level][0])
         motion = SegmentMotion(self.plan, frames, streams, self.shapes)
@@ -769,15 +832,14 @@ class HandMade:
             first, low = piece["first"], piece["low_modes"]
             base_rank = ranks[piece["low_level"] if piece["low_level"] >= 0 else piece["level"]]
             motion.tracks[p, :, :, base_rank:] = 0
-            motion.coefficients[first: first + low, :, base_rank:] = 0
-            motion.coefficients[first + low: first + piece["count"], :, ranks[piece["level"]]:] = 0
+            motion.coefficients[first : first + low, :, base_rank:] = 0
+            motion.coefficients[first + low : first + piece["count"], :, ranks[piece["level"]] :] = 0
         return motion
 
     def _add_segment(self, segment: int) -> None:
         start, stop = (self.FRAMES * (segment + i) // self.SEGMENTS for i in (0, 1))
         frames, levels = stop - start, self.plan.level_count
-        bases = {level: self._basis(bits, rank + self.excess, frames)
-                 for level, (bits, rank) in self.bases.items()}
+        bases = {level: self._basis(bits, rank + self.excess, frames) for level, (bits, rank) in self.bases.items()}
         motion = self._motion(frames, bases)
         for level in range(levels):
             if self.plan.has_stems(level):
@@ -789,8 +851,9 @@ class HandMade:
                 self._add(container.STEMS, container.pack_stems(head, stream), level, segment)
             if self.plan.has_affines(level):
                 self._add(container.AFFINES, streams.encode_affines(motion, level), level, segment)
-        self._add(container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)),
-                  levels - 1, segment)
+        self._add(
+            container.CORRECTIONS, container.pack_corrections(0.125, self._corrections(frames)), levels - 1, segment
+        )
 
     def _add(self, kind: int, payload: bytes, level: int, segment: int) -> None:
         if (kind, level, segment) != self.leave_out:

@@ -47,14 +47,22 @@ class Maker:
         return self.accessor(self.view(data, stride), values.dtype, rows.shape, normalized=normalized)
 
     def view(self, data, stride=0):
-        self.gltf.bufferViews.append(pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(data),
-                                                          byteStride=stride or None))
+        self.gltf.bufferViews.append(
+            pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(data), byteStride=stride or None)
+        )
         self.data += data + bytes(-len(data) % 4)
         return len(self.gltf.bufferViews) - 1
 
     def accessor(self, view, dtype, shape, **more):
-        self.gltf.accessors.append(pygltflib.Accessor(bufferView=view, componentType=COMPONENTS[np.dtype(dtype).name],
-                                                      count=shape[0], type=TYPES[shape[1]], **more))
+        self.gltf.accessors.append(
+            pygltflib.Accessor(
+                bufferView=view,
+                componentType=COMPONENTS[np.dtype(dtype).name],
+                count=shape[0],
+                type=TYPES[shape[1]],
+                **more,
+            )
+        )
         return len(self.gltf.accessors) - 1
 
     def mesh(self, attributes, name=None, indices=None, mode=4, targets=None, weights=None):
@@ -76,8 +84,11 @@ class Maker:
         for node, path, times, values, interpolation in channels:
             width = {"rotation": 4, "weights": 1}.get(path, 3)
             output = self.array(np.asarray(values, np.float32).reshape(-1, width))
-            animation.samplers.append(pygltflib.AnimationSampler(
-                input=self.array(np.asarray(times, np.float32)), output=output, interpolation=interpolation))
+            animation.samplers.append(
+                pygltflib.AnimationSampler(
+                    input=self.array(np.asarray(times, np.float32)), output=output, interpolation=interpolation
+                )
+            )
             target = pygltflib.AnimationChannelTarget(node=node, path=path)
             animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
         self.gltf.animations.append(animation)
@@ -87,8 +98,9 @@ class Maker:
         self.gltf.set_binary_blob(self.data)
         self.gltf._path = path.parent
         if path.suffix == ".gltf":
-            self.gltf.convert_buffers(pygltflib.BufferFormat.BINFILE if "bin" in path.stem else
-                                      pygltflib.BufferFormat.DATAURI)
+            self.gltf.convert_buffers(
+                pygltflib.BufferFormat.BINFILE if "bin" in path.stem else pygltflib.BufferFormat.DATAURI
+            )
         self.gltf.save(str(path))
         return path
 
@@ -113,7 +125,8 @@ def about(axis, angle):
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return [*(np.sin(angle / 2) * axis), np.cos(angle / 2)], (
-        np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+        np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    )
 
 
 # ---- reading ----
@@ -150,8 +163,10 @@ def test_keys_are_interpolated_as_the_specification_says(tmp_path):
         "CUBICSPLINE": (0, "translation", [0, 1], np.array(cubic), "CUBICSPLINE"),
     }
     t = np.arange(11) / 10
-    found = {name: frames_of(moving_cube([channel]).save(tmp_path / f"{name}.glb"), fps=10)[0]
-             for name, channel in channels.items()}
+    found = {
+        name: frames_of(moving_cube([channel]).save(tmp_path / f"{name}.glb"), fps=10)[0]
+        for name, channel in channels.items()
+    }
     turned = np.stack([CUBE @ about([0, 0, 1], 2 * each)[1].T for each in t])
     assert np.allclose(found["LINEAR"], turned, atol=1e-6)
     assert np.allclose(found["STEP"][:, 0, 0], np.select([t < 0.5, t < 1], [0, 5], 7))
@@ -164,8 +179,15 @@ def test_skins_move_vertices_by_their_weights_and_ignore_their_own_node(tmp_path
     joints = np.tile(np.array([[0, 1, 0, 0]], np.uint8), (8, 1))
     share = np.linspace(0, 255, 8).astype(np.uint8)
     weights = np.stack([255 - share, share, 0 * share, 0 * share], axis=1)
-    mesh = made.mesh({"POSITION": made.array(CUBE), "JOINTS_0": made.array(joints),
-                      "WEIGHTS_0": made.array(weights, normalized=True)}, "skinned", mode=0)
+    mesh = made.mesh(
+        {
+            "POSITION": made.array(CUBE),
+            "JOINTS_0": made.array(joints),
+            "WEIGHTS_0": made.array(weights, normalized=True),
+        },
+        "skinned",
+        mode=0,
+    )
     first = made.node(name="root", translation=[1.0, 0.0, 0.0])
     second = made.node(first, name="tip", translation=[0.0, 2.0, 0.0])
     bind = np.stack([np.eye(4), np.eye(4)])
@@ -186,14 +208,29 @@ def test_skins_move_vertices_by_their_weights_and_ignore_their_own_node(tmp_path
 def test_morph_targets_are_added_also_sparse_ones(tmp_path):
     made = Maker()
     dense = made.array(np.full((8, 3), 0.25))
-    made.gltf.accessors.append(pygltflib.Accessor(
-        componentType=5126, count=8, type="VEC3", bufferView=None, sparse=pygltflib.Sparse(
-            count=2, indices=pygltflib.AccessorSparseIndices(
-                bufferView=made.view(np.array([1, 6], np.uint8).tobytes()), componentType=5121),
-            values=pygltflib.AccessorSparseValues(
-                bufferView=made.view(np.array([[1, 2, 3], [4, 5, 6]], np.float32).tobytes())))))
-    mesh = made.mesh({"POSITION": made.array(CUBE)}, mode=0, weights=[0.0, 0.5],
-                     targets=[pygltflib.Attributes(POSITION=dense), pygltflib.Attributes(POSITION=dense + 1)])
+    made.gltf.accessors.append(
+        pygltflib.Accessor(
+            componentType=5126,
+            count=8,
+            type="VEC3",
+            bufferView=None,
+            sparse=pygltflib.Sparse(
+                count=2,
+                indices=pygltflib.AccessorSparseIndices(
+                    bufferView=made.view(np.array([1, 6], np.uint8).tobytes()), componentType=5121
+                ),
+                values=pygltflib.AccessorSparseValues(
+                    bufferView=made.view(np.array([[1, 2, 3], [4, 5, 6]], np.float32).tobytes())
+                ),
+            ),
+        )
+    )
+    mesh = made.mesh(
+        {"POSITION": made.array(CUBE)},
+        mode=0,
+        weights=[0.0, 0.5],
+        targets=[pygltflib.Attributes(POSITION=dense), pygltflib.Attributes(POSITION=dense + 1)],
+    )
     node = made.node(mesh=mesh)
     made.animation([(node, "weights", [0, 1], [0.0, 1.0, 4.0, 0.0], "LINEAR")])
     positions, clip = frames_of(made.save(tmp_path / "a.glb"), fps=2)
@@ -208,18 +245,28 @@ def test_quantised_and_strided_positions_mean_the_same(tmp_path):
     made = Maker()
     made.gltf.extensionsUsed = made.gltf.extensionsRequired = ["KHR_mesh_quantization"]
     whole = np.round(CUBE / 3 * 65535).astype(np.uint16)
-    for values in (made.array(whole, normalized=True, stride=8), made.array(CUBE, stride=20),
-                   made.array(np.round(CUBE).astype(np.int8), stride=4)):
+    for values in (
+        made.array(whole, normalized=True, stride=8),
+        made.array(CUBE, stride=20),
+        made.array(np.round(CUBE).astype(np.int8), stride=4),
+    ):
         made.node(mesh=made.mesh({"POSITION": values}, mode=0), scale=[3.0] * 3 if values == 0 else None)
     positions, clip = frames_of(made.save(tmp_path / "a.glb"))
     assert np.allclose(positions[0].reshape(3, 8, 3), CUBE, atol=1e-4) and len(clip.metadata["part_names"]) == 3
 
 
-@pytest.mark.parametrize("mode, corners, rows", [
-    (1, [0, 1, 2, 3], [[0, 1], [2, 3]]), (2, [0, 1, 2], [[0, 1], [1, 2], [2, 0]]), (3, [0, 1, 2], [[0, 1], [1, 2]]),
-    (4, [0, 1, 2, 3, 4, 5], [[0, 1, 2], [3, 4, 5]]), (5, [0, 1, 2, 3, 4], [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
-    (5, [0, 1, 2, 2, 3, 4], [[0, 1, 2], [2, 4, 3]]), (6, [0, 1, 2, 3], [[1, 2, 0], [2, 3, 0]]),
-])
+@pytest.mark.parametrize(
+    "mode, corners, rows",
+    [
+        (1, [0, 1, 2, 3], [[0, 1], [2, 3]]),
+        (2, [0, 1, 2], [[0, 1], [1, 2], [2, 0]]),
+        (3, [0, 1, 2], [[0, 1], [1, 2]]),
+        (4, [0, 1, 2, 3, 4, 5], [[0, 1, 2], [3, 4, 5]]),
+        (5, [0, 1, 2, 3, 4], [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
+        (5, [0, 1, 2, 2, 3, 4], [[0, 1, 2], [2, 4, 3]]),
+        (6, [0, 1, 2, 3], [[1, 2, 0], [2, 3, 0]]),
+    ],
+)
 def test_every_kind_of_primitive_becomes_faces_or_edges(tmp_path, mode, corners, rows):
     made = Maker()
     made.node(mesh=made.mesh({"POSITION": made.array(CUBE)}, indices=corners, mode=mode))
@@ -232,10 +279,17 @@ def test_every_kind_of_primitive_becomes_faces_or_edges(tmp_path, mode, corners,
 def test_attributes_keep_their_names_and_numbers(tmp_path):
     made = Maker()
     ids, colors = np.arange(8, dtype=np.uint16) * 500, np.array([[255, 0, 51]] * 8, np.uint8)
-    first = made.mesh({"POSITION": made.array(CUBE), "TEXCOORD_0": made.array(CUBE[:, :2]),
-                       "COLOR_0": made.array(colors, normalized=True, stride=4),
-                       "_BRANCH_ID": made.array(ids, stride=4), "_radius": made.array(CUBE[:, 1]),
-                       "NORMAL": made.array(np.tile([0.0, 0, 1], (8, 1)))}, mode=0)
+    first = made.mesh(
+        {
+            "POSITION": made.array(CUBE),
+            "TEXCOORD_0": made.array(CUBE[:, :2]),
+            "COLOR_0": made.array(colors, normalized=True, stride=4),
+            "_BRANCH_ID": made.array(ids, stride=4),
+            "_radius": made.array(CUBE[:, 1]),
+            "NORMAL": made.array(np.tile([0.0, 0, 1], (8, 1))),
+        },
+        mode=0,
+    )
     made.node(mesh=first, rotation=about([1, 0, 0], np.pi / 2)[0])
     made.node(mesh=made.mesh({"POSITION": made.array(CUBE)}, mode=0))
     _, clip = frames_of(made.save(tmp_path / "a.glb"))
@@ -249,11 +303,19 @@ def test_attributes_keep_their_names_and_numbers(tmp_path):
     assert "normals" not in frames_of(made.save(tmp_path / "b.glb"))[1].attributes
 
 
-@pytest.mark.parametrize("fps, times", [
-    (24, np.arange(20) / 24), (30, np.arange(2, 40) / 30), (60, np.arange(7) / 60), (25, np.arange(90) / 25),
-    (24000 / 1001, np.arange(200) * 1001 / 24000), (30000 / 1001, np.arange(64) * 1001 / 30000),
-    (24, np.delete(np.arange(100), [3, 4, 50, 51, 52]) / 24), (12.5, np.arange(20) / 12.5),
-])
+@pytest.mark.parametrize(
+    "fps, times",
+    [
+        (24, np.arange(20) / 24),
+        (30, np.arange(2, 40) / 30),
+        (60, np.arange(7) / 60),
+        (25, np.arange(90) / 25),
+        (24000 / 1001, np.arange(200) * 1001 / 24000),
+        (30000 / 1001, np.arange(64) * 1001 / 30000),
+        (24, np.delete(np.arange(100), [3, 4, 50, 51, 52]) / 24),
+        (12.5, np.arange(20) / 12.5),
+    ],
+)
 def test_sampled_keys_come_back_one_per_frame(tmp_path, fps, times):
     values = np.zeros((len(times), 3), np.float32)
     values[:, 0] = np.arange(len(times)) ** 2
@@ -309,7 +371,11 @@ def test_takes_are_clips_of_their_own(tmp_path):
     path = with_takes(tmp_path / "a.glb")
     with read(path, fps=2, takes="all") as clip:
         assert [(clip_range.name, clip_range.frame_count, clip_range.loop) for clip_range in clip.clip_ranges] == [
-            ("walk", 3, False), ("walk.1", 5, False), ("animation 2", 3, False), ("turn", 4, True)]
+            ("walk", 3, False),
+            ("walk.1", 5, False),
+            ("animation 2", 3, False),
+            ("turn", 4, True),
+        ]
         found = {name: each.block(0, each.frame_count) for name, each in athcodec.split(clip).items()}
         assert np.array_equal(clip.block(0, 15), np.concatenate(list(found.values())))
         assert np.allclose(found["walk"][2], CUBE + [1, 0, 0]) and np.allclose(found["walk.1"][4], CUBE + [0, 2, 0])
@@ -363,10 +429,13 @@ def glb(structure, binary=b""):
 
 def cube_json(**changes):
     parts = {
-        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}],
         "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 96}], "buffers": [{"byteLength": 96}],
+        "bufferViews": [{"buffer": 0, "byteLength": 96}],
+        "buffers": [{"byteLength": 96}],
     }
     return parts | changes
 
@@ -381,10 +450,18 @@ REFUSED = {
     "too many": ({"accessors": [ACCESSOR | {"count": 2**20}]}, "fits into"),
     "too many zeros": ({"accessors": [{"componentType": 5126, "count": 2**20, "type": "VEC3"}]}, "without bytes"),
     "too many vertices": ({"accessors": [ACCESSOR | {"count": 2**50}]}, "vertices, expected at most"),
-    "a view too long": ({"bufferViews": [{"buffer": 0, "byteLength": 2**50}],
-                         "accessors": [ACCESSOR | {"count": 9000}]}, "buffer of 96"),
-    "sparse values nowhere": ({"accessors": [ACCESSOR | {"sparse": {
-        "count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {}}}]}, "got index None"),
+    "a view too long": (
+        {"bufferViews": [{"buffer": 0, "byteLength": 2**50}], "accessors": [ACCESSOR | {"count": 9000}]},
+        "buffer of 96",
+    ),
+    "sparse values nowhere": (
+        {
+            "accessors": [
+                ACCESSOR | {"sparse": {"count": 1, "indices": {"bufferView": 0, "componentType": 5121}, "values": {}}}
+            ]
+        },
+        "got index None",
+    ),
     "a type": ({"accessors": [ACCESSOR | {"type": "VEC9"}]}, "VEC9"),
     "a fraction": ({"accessors": [ACCESSOR | {"count": 7.5}]}, "7.5"),
     "no number": ({"nodes": [{"mesh": "0"}]}, "'0'"),
@@ -420,13 +497,17 @@ def rich_file(path):
     bind = made.array(np.stack([np.eye(4)] * 2).reshape(2, 16))
     made.gltf.skins.append(pygltflib.Skin(joints=[0, 1], inverseBindMatrices=bind))
     target = pygltflib.Attributes(POSITION=made.array(CUBE))
-    mesh = made.mesh({"POSITION": made.array(CUBE), "JOINTS_0": made.array(joints), "WEIGHTS_0": made.array(weights)},
-                     indices=np.arange(6), targets=[target])
+    mesh = made.mesh(
+        {"POSITION": made.array(CUBE), "JOINTS_0": made.array(joints), "WEIGHTS_0": made.array(weights)},
+        indices=np.arange(6),
+        targets=[target],
+    )
     made.node(mesh=mesh, skin=0)
     made.node(mesh=made.mesh({"POSITION": made.array(CUBE), "COLOR_0": made.array(CUBE / 3)}, indices=[0, 1], mode=1))
     t = np.arange(5) / 24
-    made.animation([(1, "rotation", t, np.tile([0.0, 0, 0, 1], (5, 1)), "LINEAR"),
-                    (2, "weights", t, np.linspace(0, 1, 5), "STEP")])
+    made.animation(
+        [(1, "rotation", t, np.tile([0.0, 0, 0, 1], (5, 1)), "LINEAR"), (2, "weights", t, np.linspace(0, 1, 5), "STEP")]
+    )
     return made.save(path)
 
 
@@ -488,11 +569,21 @@ def with_faces(clip, **metadata):
     rows = np.arange(clip.vertex_count - 2)
     kept = clip.vertex_branch[rows] == clip.vertex_branch[rows + 2]
     faces = np.stack([rows, rows + 1, rows + 2], axis=1)[kept]
-    attributes = {"radius": np.linspace(1, 2, clip.vertex_count), "species": np.arange(clip.vertex_count) % 300,
-                  "uv": clip.rest[:, :2].astype(np.float32), "colors": np.full((clip.vertex_count, 4), 0.5, np.float32),
-                  "normals": np.tile(np.float32([0, 0, 1]), (clip.vertex_count, 1)), "per_branch": np.arange(3.0)}
-    return dataclasses.replace(clip, faces=faces, attributes=attributes, rest=clip.rest.astype(np.float32),
-                               metadata={"unit": "m", "up_axis": "y", "fps": 30, "start_frame": 0} | metadata)
+    attributes = {
+        "radius": np.linspace(1, 2, clip.vertex_count),
+        "species": np.arange(clip.vertex_count) % 300,
+        "uv": clip.rest[:, :2].astype(np.float32),
+        "colors": np.full((clip.vertex_count, 4), 0.5, np.float32),
+        "normals": np.tile(np.float32([0, 0, 1]), (clip.vertex_count, 1)),
+        "per_branch": np.arange(3.0),
+    }
+    return dataclasses.replace(
+        clip,
+        faces=faces,
+        attributes=attributes,
+        rest=clip.rest.astype(np.float32),
+        metadata={"unit": "m", "up_axis": "y", "fps": 30, "start_frame": 0} | metadata,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -521,8 +612,14 @@ def accessor_of(gltf, index):
 def skinned_by_hand(gltf, frame):
     """Frame of a file of joints, evaluated from pygltflib's structure by the text of the specification; (N, 3)."""
     joints = gltf.skins[0].joints
-    poses = {node: {"translation": gltf.nodes[node].translation, "rotation": gltf.nodes[node].rotation,
-                    "scale": gltf.nodes[node].scale or [1, 1, 1]} for node in joints}
+    poses = {
+        node: {
+            "translation": gltf.nodes[node].translation,
+            "rotation": gltf.nodes[node].rotation,
+            "scale": gltf.nodes[node].scale or [1, 1, 1],
+        }
+        for node in joints
+    }
     for channel in gltf.animations[0].channels if gltf.animations else ():
         keys = accessor_of(gltf, gltf.animations[0].samplers[channel.sampler].output)
         poses[channel.target.node][channel.target.path] = keys[min(frame, len(keys) - 1)]
@@ -609,8 +706,12 @@ def test_axes_and_units_are_turned_by_a_node_and_vertices_keep_their_numbers(tmp
 @pytest.mark.parametrize("fps", [24, 24000 / 1001, 29.97, 60, 12.5])
 def test_frames_keep_their_numbers_and_times(fps, tmp_path):
     clip = plant(seed=2, frames=30)
-    clip = dataclasses.replace(clip, time=5.0 / fps + np.arange(30) / fps, rest=clip.rest.astype(np.float32),
-                               metadata={"fps": fps, "start_frame": 100})
+    clip = dataclasses.replace(
+        clip,
+        time=5.0 / fps + np.arange(30) / fps,
+        rest=clip.rest.astype(np.float32),
+        metadata={"fps": fps, "start_frame": 100},
+    )
     for animation in ("joints", "morphs"):
         write(clip, tmp_path / "a.glb", animation=animation)
         with read(tmp_path / "a.glb") as back:
@@ -623,10 +724,18 @@ def test_objects_stay_apart_and_corners_split_only_where_they_differ(tmp_path):
     counts, indices = np.array([4, 3]), np.array([0, 1, 2, 3, 0, 2, 3])
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0], [1, 1], [9, 9]], np.float32)
     clip = MotionClip(
-        positions=rest + np.arange(3, dtype=np.float32)[:, None, None], time=np.arange(3) / 24, rest=rest,
-        edges=np.array([[4, 5]]), attributes={"face_vertex_counts": counts, "face_vertex_indices": indices, "uv": uv,
-                                              "part_vertex_counts": np.array([4, 2])},
-        metadata={"part_names": ["leaf", "twig"], "domains": {"uv": "corner"}})
+        positions=rest + np.arange(3, dtype=np.float32)[:, None, None],
+        time=np.arange(3) / 24,
+        rest=rest,
+        edges=np.array([[4, 5]]),
+        attributes={
+            "face_vertex_counts": counts,
+            "face_vertex_indices": indices,
+            "uv": uv,
+            "part_vertex_counts": np.array([4, 2]),
+        },
+        metadata={"part_names": ["leaf", "twig"], "domains": {"uv": "corner"}},
+    )
     write(clip, tmp_path / "a.glb", animation="morphs")
     positions, back = frames_of(tmp_path / "a.glb")
     assert back.metadata["part_names"] == ["leaf", "twig"] and back.metadata["part_kinds"] == ["mesh", "curves"]
@@ -683,12 +792,20 @@ def seasons():
 
     def part(start, stop, fps, number=0):
         held = whole.block(start, start + 1).repeat(5, axis=0) if stop == start else whole.block(start, stop)
-        return dataclasses.replace(whole, positions=held, time=np.arange(len(held)) / fps,
-                                   rest=whole.rest.astype(np.float32),
-                                   metadata=whole.metadata | {"fps": fps, "start_frame": number})
+        return dataclasses.replace(
+            whole,
+            positions=held,
+            time=np.arange(len(held)) / fps,
+            rest=whole.rest.astype(np.float32),
+            metadata=whole.metadata | {"fps": fps, "start_frame": number},
+        )
 
-    return {"calm": athcodec.looped(part(0, 30, 30), 6), "gale": part(30, 45, 24, 100), "held": part(50, 50, 10),
-            "one": part(55, 56, 30)}
+    return {
+        "calm": athcodec.looped(part(0, 30, 30), 6),
+        "gale": part(30, 45, 24, 100),
+        "held": part(50, 50, 10),
+        "one": part(55, 56, 30),
+    }
 
 
 @pytest.fixture(scope="module")
@@ -736,8 +853,9 @@ def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path
 
 def test_clips_that_all_stand_still_become_animations(seasons, tmp_path):
     held = seasons["held"]
-    still = dataclasses.replace(held, positions=held.rest.astype(np.float32)[None].repeat(5, axis=0),
-                                rest=held.rest.astype(np.float32))
+    still = dataclasses.replace(
+        held, positions=held.rest.astype(np.float32)[None].repeat(5, axis=0), rest=held.rest.astype(np.float32)
+    )
     write(athcodec.join({"a": still, "b": still}), tmp_path / "a.glb", animation="joints")
     with read(tmp_path / "a.glb", takes="all") as clip:
         assert [(clip_range.name, clip_range.frame_count) for clip_range in clip.clip_ranges] == [("a", 5), ("b", 5)]

@@ -28,8 +28,14 @@ from athcodec.sources import read
 
 pytestmark = pytest.mark.programs
 SCRIPTS = Path(__file__).resolve().parent / "node"
-PACKAGES = ["three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@gltf-transform/core@4.5.1",
-            "@gltf-transform/extensions@4.5.1", "@gltf-transform/functions@4.5.1", "meshoptimizer@1.3.0"]
+PACKAGES = [
+    "three@0.187.0",
+    "gltf-validator@2.0.0-dev.3.10",
+    "@gltf-transform/core@4.5.1",
+    "@gltf-transform/extensions@4.5.1",
+    "@gltf-transform/functions@4.5.1",
+    "meshoptimizer@1.3.0",
+]
 
 
 @pytest.fixture(scope="session")
@@ -39,8 +45,9 @@ def node(request):
 
     def install():
         (folder / "package.json").write_text('{"name": "checks", "private": true, "type": "module"}')
-        subprocess.run(["npm", "install", "--no-audit", "--no-fund", *PACKAGES], cwd=folder, check=True,
-                       capture_output=True)
+        subprocess.run(
+            ["npm", "install", "--no-audit", "--no-fund", *PACKAGES], cwd=folder, check=True, capture_output=True
+        )
         for script in SCRIPTS.glob("*.mjs"):
             shutil.copy(script, folder)
 
@@ -59,12 +66,21 @@ def node(request):
 def panda(request, tmp_path_factory):
     """A walking panda that people drew and rigged, as Panda3D moves it; see node/panda.py."""
     folder, package = Path(request.config.cache.mkdir("panda3d")), "panda3d==1.10.16"
-    install_once(folder, package, lambda: subprocess.run(
-        [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder, package], check=True))
+    install_once(
+        folder,
+        package,
+        lambda: subprocess.run(
+            [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", folder, package], check=True
+        ),
+    )
     out = tmp_path_factory.mktemp("panda") / "panda.npz"
     path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
-    subprocess.run([sys.executable, SCRIPTS / "panda.py", out], check=True, env=os.environ | {"PYTHONPATH": path},
-                   capture_output=True)
+    subprocess.run(
+        [sys.executable, SCRIPTS / "panda.py", out],
+        check=True,
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+    )
     return dict(np.load(out))
 
 
@@ -118,8 +134,9 @@ def test_files_beside_each_other_by_gltf_transform_are_the_same_clip(three_file,
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
-def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(animation, leafy_ath, node, played,
-                                                                             tmp_path):
+def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(
+    animation, leafy_ath, node, played, tmp_path
+):
     path = tmp_path / "a.glb"
     with athcodec.open(leafy_ath) as decoder:
         for level in range(decoder.level_count):
@@ -132,8 +149,9 @@ def test_what_is_written_is_valid_and_three_plays_it_within_the_stated_error(ani
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
-def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(animation, seasons, seasons_ath,
-                                                                          node, played, tmp_path):
+def test_three_lists_clips_by_name_and_plays_each_within_the_stated_error(
+    animation, seasons, seasons_ath, node, played, tmp_path
+):
     path = tmp_path / "a.glb"
     with athcodec.open(seasons_ath) as decoder:
         write(ClipView(decoder, all_clips=True), path, animation=animation)
@@ -177,8 +195,10 @@ def test_lines_points_objects_and_colours_are_valid_too(leafy, node, tmp_path):
         write(sample, tmp_path / "lines.glb", animation="joints")
         write(sample.replace(edges=None), tmp_path / "points.glb")
     counts = np.array([leafy.vertex_count])
-    objects = leafy.replace(attributes=leafy.attributes | {"part_vertex_counts": counts},
-                            metadata=leafy.metadata | {"part_names": ["bush"], "unit": "cm", "up_axis": "z"})
+    objects = leafy.replace(
+        attributes=leafy.attributes | {"part_vertex_counts": counts},
+        metadata=leafy.metadata | {"part_names": ["bush"], "unit": "cm", "up_axis": "z"},
+    )
     write(objects, tmp_path / "objects.glb", animation="joints")
     for name in ("lines", "points", "objects"):
         assert_valid(node, tmp_path / f"{name}.glb")
@@ -201,13 +221,23 @@ def test_three_loads_the_textures_of_matrices_and_their_mesh_is_valid(leafy_ath,
 def rigged(panda, path):
     """The panda as a skin with keys of its joints, made with pygltflib."""
     made = Maker()
-    mesh = made.mesh({"POSITION": made.array(panda["rest"]), "JOINTS_0": made.array(panda["joints"]),
-                      "WEIGHTS_0": made.array(panda["weights"])}, "panda", indices=panda["faces"].ravel())
+    mesh = made.mesh(
+        {
+            "POSITION": made.array(panda["rest"]),
+            "JOINTS_0": made.array(panda["joints"]),
+            "WEIGHTS_0": made.array(panda["weights"]),
+        },
+        "panda",
+        indices=panda["faces"].ravel(),
+    )
     times, matrices = np.arange(len(panda["matrices"])) / panda["fps"], panda["matrices"]
     joints = [made.node() for _ in range(matrices.shape[1])]
     turns = quaternions(matrices[..., :3, :3])
-    made.animation([(node, "translation", times, matrices[:, i, :3, 3], "LINEAR") for i, node in enumerate(joints)]
-                   + [(node, "rotation", times, turns[:, i], "LINEAR") for i, node in enumerate(joints)], "walk")
+    made.animation(
+        [(node, "translation", times, matrices[:, i, :3, 3], "LINEAR") for i, node in enumerate(joints)]
+        + [(node, "rotation", times, turns[:, i], "LINEAR") for i, node in enumerate(joints)],
+        "walk",
+    )
     made.gltf.skins.append(pygltflib.Skin(joints=joints))
     made.node(mesh=mesh, skin=0)
     return made.save(path)

@@ -15,8 +15,18 @@ from athcodec.errors import ClipError
 
 RATE = 24000 / 1001
 FORMATS = {
-    "hdf5": "a.h5", "npz": "a.npz", "usdc": "a.usdc", "usda": "a.usda", "alembic": "a.abc", "gltf": "a.glb",
-    "pc2": "a.pc2", "mdd": "a.mdd", "obj": "a.obj", "ply": "a.ply", "xdmf": "a.xdmf", "pvd": "a.pvd",
+    "hdf5": "a.h5",
+    "npz": "a.npz",
+    "usdc": "a.usdc",
+    "usda": "a.usda",
+    "alembic": "a.abc",
+    "gltf": "a.glb",
+    "pc2": "a.pc2",
+    "mdd": "a.mdd",
+    "obj": "a.obj",
+    "ply": "a.ply",
+    "xdmf": "a.xdmf",
+    "pvd": "a.pvd",
 }
 NUMBERED = {"obj", "ply"}  # a file per frame
 
@@ -36,9 +46,13 @@ def clip() -> MotionClip:
     quads = np.stack(corners, axis=2).reshape(-1, 4).astype(np.int32)
     weights = np.linspace(1, 2, made.vertex_count).astype(np.float32)
     return dataclasses.replace(
-        made, time=np.arange(9) / RATE, faces=quads, rest=made.rest.astype(np.float32),
+        made,
+        time=np.arange(9) / RATE,
+        faces=quads,
+        rest=made.rest.astype(np.float32),
         attributes={"uv": np.random.default_rng(0).random((made.vertex_count, 2)).astype(np.float32), "slack": weights},
-        metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": 1001})
+        metadata={"unit": "cm", "up_axis": "z", "fps": RATE, "start_frame": 1001},
+    )
 
 
 def there_and_back(clip, folder, name: str) -> MotionClip:

@@ -274,9 +274,7 @@ def test_a_clip_can_be_written_over_the_file_that_it_is_read_from(forked, tmp_pa
 def test_anything_with_frame_blocks_can_be_written(forked, tmp_path):
     positions = forked["positions"]
     decoded = SimpleNamespace(
-        **writer_arguments(forked),
-        dtype=np.dtype("f4"),
-        blocks=lambda: ((i, positions[i : i + 1]) for i in range(5)),
+        **writer_arguments(forked), dtype=np.dtype("f4"), blocks=lambda: ((i, positions[i : i + 1]) for i in range(5))
     )
     write_hdf5(decoded, tmp_path / "a.h5")
     with read_hdf5(tmp_path / "a.h5") as clip:

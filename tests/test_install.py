@@ -78,8 +78,9 @@ target_link_libraries(play PRIVATE athcodec::ath m)
 
 
 def run(*command, env=TOOLS) -> str:
-    done = subprocess.run([str(part) for part in command], env=env, text=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT)
+    done = subprocess.run(
+        [str(part) for part in command], env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     assert done.returncode == 0, f"{command}: exit {done.returncode}\n{done.stdout}"
     return done.stdout
 
@@ -87,10 +88,11 @@ def run(*command, env=TOOLS) -> str:
 # ---- compiling ----
 
 
-@pytest.mark.parametrize("command", [
-    *([name, "-std=c11"] for name in C_COMPILERS),
-    *([name, "-x", "c++", "-std=c++17"] for name in CXX_COMPILERS),
-], ids=lambda command: command[0])
+@pytest.mark.parametrize(
+    "command",
+    [*([name, "-std=c11"] for name in C_COMPILERS), *([name, "-x", "c++", "-std=c++17"] for name in CXX_COMPILERS)],
+    ids=lambda command: command[0],
+)
 def test_decoding_compiles_freestanding_without_warnings_and_needs_only_memory_functions(command, tmp_path):
     strict = "-O2 -ffreestanding -fno-math-errno -ffp-contract=off -Wall -Wextra -Wconversion -Werror".split()
     objects = []
@@ -134,8 +136,17 @@ def engine(installed, tmp_path_factory) -> Path:
     """The build folder of a project that uses the installed decoder through find_package."""
     project = tmp_path_factory.mktemp("engine")
     write_project(project, f"find_package(athcodec {athcodec.__version__} REQUIRED)")
-    run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={installed}",
-        "-DCMAKE_BUILD_TYPE=Release")
+    run(
+        "cmake",
+        "-G",
+        "Ninja",
+        "-S",
+        project,
+        "-B",
+        project / "build",
+        f"-DCMAKE_PREFIX_PATH={installed}",
+        "-DCMAKE_BUILD_TYPE=Release",
+    )
     run("cmake", "--build", project / "build")
     return project / "build"
 
@@ -157,8 +168,12 @@ def library_folder(installed: Path) -> Path:
 def test_an_install_holds_the_header_both_libraries_and_both_ways_to_find_them(installed):
     folder = library_folder(installed)
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert {"libath.a", "pkgconfig/athcodec.pc", "cmake/athcodec/athcodecConfig.cmake",
-            "cmake/athcodec/athcodecConfigVersion.cmake"} <= files
+    assert {
+        "libath.a",
+        "pkgconfig/athcodec.pc",
+        "cmake/athcodec/athcodecConfig.cmake",
+        "cmake/athcodec/athcodecConfigVersion.cmake",
+    } <= files
     assert (installed / "include" / "ath.h").read_bytes() == (CORE / "ath.h").read_bytes()
     assert not [path for path in installed.rglob("*") if path.suffix == ".h" and path.name != "ath.h"]
 
@@ -177,7 +192,8 @@ def test_a_program_that_finds_the_package_decodes_what_python_does(program, engi
 
 @pytest.mark.parametrize("compiler", C_COMPILERS)
 def test_a_program_compiled_through_pkg_config_decodes_what_python_does(
-        compiler, installed, sample_ath, expected, tmp_path):
+    compiler, installed, sample_ath, expected, tmp_path
+):
     folder = library_folder(installed)
     environment = TOOLS | {"PKG_CONFIG_PATH": str(folder / "pkgconfig")}
     flags = run("pkg-config", "--cflags", "--libs", "athcodec", env=environment).split()
@@ -239,14 +255,20 @@ def test_the_example_plays_the_same_again(played, engine, sample_ath):
     assert without_times(again) == without_times(played) and len(rows(played)) == 24
 
 
-@pytest.mark.parametrize("damage, says", [
-    (lambda data: b"", "header: got 0 bytes; expected 64"),
-    (lambda data: data[:200], r"chunk table: got 136 bytes; expected \d+"),
-    (lambda data: b"PK" + data, "file: got first bytes 0x504b8941; expected 0x89415448"),
-    (lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:],
-     "preparing: chunk STEMS of level 2, segment 1 at byte 8329: "
-     "got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
-], ids=["empty", "cut off", "another file", "damaged"])
+@pytest.mark.parametrize(
+    "damage, says",
+    [
+        (lambda data: b"", "header: got 0 bytes; expected 64"),
+        (lambda data: data[:200], r"chunk table: got 136 bytes; expected \d+"),
+        (lambda data: b"PK" + data, "file: got first bytes 0x504b8941; expected 0x89415448"),
+        (
+            lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:],
+            "preparing: chunk STEMS of level 2, segment 1 at byte 8329: "
+            "got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}",
+        ),
+    ],
+    ids=["empty", "cut off", "another file", "damaged"],
+)
 def test_the_example_says_in_one_line_what_is_wrong_with_a_file(damage, says, engine, sample_ath, tmp_path):
     (tmp_path / "bad.ath").write_bytes(damage(sample_ath.read_bytes()))
     done = subprocess.run([engine / "play", tmp_path / "bad.ath"], capture_output=True, text=True)

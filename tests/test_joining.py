@@ -42,7 +42,8 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
                 assert level.max_error == pytest.approx(measured, rel=1e-5)
         assert [level["max_error"] for level in decoder.file.info()["levels"]] == [
             max(decoder.play(name).levels[level].max_error for name in medley_clips)
-            for level in range(decoder.level_count)]
+            for level in range(decoder.level_count)
+        ]
 
 
 def test_decoders_of_two_clips_serve_at_the_same_time(medley_clips, medley_ath):
@@ -51,8 +52,8 @@ def test_decoders_of_two_clips_serve_at_the_same_time(medley_clips, medley_ath):
         whole = {name: decoder.play(name).positions() for name in names}
         blocks = [decoder.play(name).blocks() for name in (names[0], names[1])]
         for (start, one), (other_start, other) in zip(*blocks):
-            assert np.array_equal(one, whole[names[0]][start: start + len(one)])
-            assert np.array_equal(other, whole[names[1]][other_start: other_start + len(other)])
+            assert np.array_equal(one, whole[names[0]][start : start + len(one)])
+            assert np.array_equal(other, whole[names[1]][other_start : other_start + len(other)])
         with athcodec.open(medley_ath, clip=names[1]) as alone:
             assert np.array_equal(decoder.play(names[1]).affines(20).matrices, alone.affines(20).matrices)
 
@@ -70,16 +71,25 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
 
     clips = {f"part{start}": part(start, start + 40) for start in (0, 40, 80)}
     together = athcodec.encode(athcodec.join(clips), tmp_path / "together.ath", rel_error=1e-3)
-    apart = [athcodec.encode(clip, tmp_path / f"{name}.ath", max_error=together.max_error_bound).bytes
-             for name, clip in clips.items()]
+    apart = [
+        athcodec.encode(clip, tmp_path / f"{name}.ath", max_error=together.max_error_bound).bytes
+        for name, clip in clips.items()
+    ]
     assert together.bytes < 0.6 * sum(apart)
 
 
 def test_the_size_does_not_depend_on_the_order_of_the_clips(medley_clips, tmp_path):
     names = list(medley_clips)
     orders = (names, names[::-1], names[1:] + names[:1])
-    sizes = [athcodec.encode(athcodec.join({name: medley_clips[name] for name in order}), tmp_path / "a.ath",
-                             max_error=1e-3, segment_frames=16).bytes for order in orders]
+    sizes = [
+        athcodec.encode(
+            athcodec.join({name: medley_clips[name] for name in order}),
+            tmp_path / "a.ath",
+            max_error=1e-3,
+            segment_frames=16,
+        ).bytes
+        for order in orders
+    ]
     assert max(sizes) - min(sizes) < 0.005 * max(sizes)
 
 
@@ -160,8 +170,10 @@ def test_the_file_is_the_same_when_coded_in_steps_or_with_any_number_of_jobs(med
 
 
 def test_a_target_size_is_that_of_all_clips_and_branches_are_found_for_all(medley_clips, tmp_path):
-    bare = {name: clip.replace(vertex_branch=None, branch_parent=None, stem_index=None)
-            for name, clip in medley_clips.items()}
+    bare = {
+        name: clip.replace(vertex_branch=None, branch_parent=None, stem_index=None)
+        for name, clip in medley_clips.items()
+    }
     made = athcodec.encode(athcodec.join(bare), tmp_path / "bare.ath", target_size=12_000)
     assert 0.9 * 12_000 <= made.bytes <= 12_000
     with pytest.raises(BoundError):
@@ -171,15 +183,26 @@ def test_a_target_size_is_that_of_all_clips_and_branches_are_found_for_all(medle
 def test_clips_of_other_plants_are_refused_by_what_differs(medley_clips):
     calm = medley_clips["calm"]
     other = {
-        "vertices": ({"positions": calm.block(0, 9)[:, :-1], "time": calm.time[:9], "rest": calm.rest[:-1],
-                      "clip_ranges": (), "vertex_branch": None, "branch_parent": None, "stem_index": None},
-                     "b: got .* vertices, expected"),
+        "vertices": (
+            {
+                "positions": calm.block(0, 9)[:, :-1],
+                "time": calm.time[:9],
+                "rest": calm.rest[:-1],
+                "clip_ranges": (),
+                "vertex_branch": None,
+                "branch_parent": None,
+                "stem_index": None,
+            },
+            "b: got .* vertices, expected",
+        ),
         "rest": ({"rest": calm.rest + 1}, "b: got another rest pose than a .vertex"),
         "faces": ({"faces": np.array([[0, 1, 2]])}, "b: got other faces than a"),
         "attributes": ({"attributes": {"radius": np.ones(3)}}, "b: got another attribute radius than a"),
         "branches": ({"branch_parent": None, "vertex_branch": None, "stem_index": None}, "b: got other vertex_branch"),
-        "clip_ranges": ({"clip_ranges": (ClipRange("x", 10), ClipRange("y", 10))},
-                        "b: got 2 clips in one, expected a single one"),
+        "clip_ranges": (
+            {"clip_ranges": (ClipRange("x", 10), ClipRange("y", 10))},
+            "b: got 2 clips in one, expected a single one",
+        ),
     }
     for changes, message in other.values():
         with pytest.raises(ClipError, match=message):
@@ -243,8 +266,9 @@ def test_a_clip_view_of_all_clips_is_what_each_is(medley_clips, medley_ath):
         assert not ClipView(decoder, 1, range(3)).clip_ranges[0].loop, "some frames of a loop are none"
 
 
-@pytest.mark.parametrize("kind", [each for each in exporters.FORMATS if not each.holds_several],
-                         ids=lambda kind: kind.name)
+@pytest.mark.parametrize(
+    "kind", [each for each in exporters.FORMATS if not each.holds_several], ids=lambda kind: kind.name
+)
 def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
     path = tmp_path / f"a{kind.suffixes[0]}"
     with athcodec.open(medley_ath) as decoder:
@@ -318,20 +342,24 @@ def test_a_float32_rest_pose_made_for_several_clips_is_stored_as_float32(sources
 
 
 def test_the_output_may_stand_behind_the_inputs_or_between_options(sources, tmp_path):
-    for place, words in enumerate(([*sources, "{}"], [sources[0], "--effort", "fast", "{}"],
-                                   ["-o", "{}", *sources], [sources[0], "-o", "{}"])):
+    for place, words in enumerate(
+        ([*sources, "{}"], [sources[0], "--effort", "fast", "{}"], ["-o", "{}", *sources], [sources[0], "-o", "{}"])
+    ):
         out = str(tmp_path / f"{place}.ath")
         assert main(["encode", *(word.format(out) for word in words)]) == 0
         with athcodec.open(out) as decoder:
             assert [clip.name for clip in decoder.clips] == (["calm", "Böe"] if sources[1] in words else [""])
 
 
-@pytest.mark.parametrize("words, message", [
-    (["--names", "a"], "--names: got 1, expected 2, one for each clip"),
-    (["--names", "a,a"], "clip 'a': got 2 of this name, expected one"),
-    (["--loop", "gale"], "clip 'gale': got 0 of this name, expected one"),
-    (["--loop-blend", "3"], "--loop-blend: got no clips to make loops of"),
-])
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["--names", "a"], "--names: got 1, expected 2, one for each clip"),
+        (["--names", "a,a"], "clip 'a': got 2 of this name, expected one"),
+        (["--loop", "gale"], "clip 'gale': got 0 of this name, expected one"),
+        (["--loop-blend", "3"], "--loop-blend: got no clips to make loops of"),
+    ],
+)
 def test_names_that_do_not_fit_the_inputs_are_refused(sources, tmp_path, capsys, words, message):
     assert main(["encode", *sources, str(tmp_path / "x.ath"), *words]) == 1
     assert message in capsys.readouterr().err and not (tmp_path / "x.ath").exists()

@@ -83,7 +83,7 @@ def test_a_missing_or_corrupted_exact_level_is_refused_by_name(tmp_path):
     last = parts.header.level_count - 1
     i = parts.index(ct.EXACT, last, 1)
     with pytest.raises(BadChunkTable, match="EXACT"):
-        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1:])).file.check()
+        opened(parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1 :])).file.check()
     for payload in (parts.payload(ct.EXACT, last) + b"\x01" * 12, b"\xff" * 900):
         decoder = opened(parts.with_payload(ct.EXACT, payload, last))
         with pytest.raises(BadChunk, match="EXACT"):

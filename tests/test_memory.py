@@ -21,8 +21,11 @@ with athcodec.open(sys.argv[1]) as decoder:
     athcodec.write(ClipView(decoder), sys.argv[2], sys.argv[3], animation="morphs")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
-STREAMING = [kind for kind in FORMATS if kind.name in ("hdf5", "npz", "pc2", "mdd", "xdmf", "vtk", "sequence", "usd",
-                                                       "alembic", "gltf")]
+STREAMING = [
+    kind
+    for kind in FORMATS
+    if kind.name in ("hdf5", "npz", "pc2", "mdd", "xdmf", "vtk", "sequence", "usd", "alembic", "gltf")
+]
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +35,13 @@ def files(tmp_path_factory):
     paths = []
     for frames in (FRAMES, TIMES * FRAMES):
         sway = np.sin(np.arange(frames) / 7)[:, None, None] * np.linspace(0, 1, VERTICES)[None, :, None] ** 2
-        clip = athcodec.MotionClip((rest + sway * [1.0, 0.0, 0.2]).astype(np.float32), np.arange(frames) / 30,
-                                   np.zeros(VERTICES, int), [-1], rest=rest)
+        clip = athcodec.MotionClip(
+            (rest + sway * [1.0, 0.0, 0.2]).astype(np.float32),
+            np.arange(frames) / 30,
+            np.zeros(VERTICES, int),
+            [-1],
+            rest=rest,
+        )
         path = tmp_path_factory.mktemp("long") / f"{frames}.ath"
         athcodec.encode(clip, path, rel_error=1e-3, segment_frames=32, effort="fast")
         paths.append(path)
@@ -49,6 +57,7 @@ def test_exporting_more_frames_takes_no_more_memory(kind, files, tmp_path):
 
 
 def _peak(source, target, kind: str) -> int:
-    done = subprocess.run([sys.executable, "-c", EXPORT, str(source), str(target), kind], check=True,
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", EXPORT, str(source), str(target), kind], check=True, capture_output=True, text=True
+    )
     return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)

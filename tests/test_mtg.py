@@ -41,24 +41,51 @@ def written(tmp_path, code, header=HEADER):
 
 def described(mtg):
     """{branch: (labels, parent)}, as lists."""
-    return [([label for label, on in zip(mtg.labels, mtg.branch) if on == branch], int(parent))
-            for branch, parent in enumerate(mtg.branch_parent)]
+    return [
+        ([label for label, on in zip(mtg.labels, mtg.branch) if on == branch], int(parent))
+        for branch, parent in enumerate(mtg.branch_parent)
+    ]
 
 
-PLANT = [(["U1", "U2", "U3", "U4"], -1), (["S1"], 0), (["S2"], 0), (["U1", "U2"], 0), (["S1"], 3),
-         (["U1", "U2", "U3", "U4"], 0), (["U1"], 5), (["S1"], 6)]
+PLANT = [
+    (["U1", "U2", "U3", "U4"], -1),
+    (["S1"], 0),
+    (["S2"], 0),
+    (["U1", "U2"], 0),
+    (["S1"], 3),
+    (["U1", "U2", "U3", "U4"], 0),
+    (["U1"], 5),
+    (["S1"], 6),
+]
 
 
 def test_the_ways_to_write_one_plant_give_the_same_branches(tmp_path):
-    absolute = "TOPO\n/P1/A1\n" + "".join(f"/P1/A1{code}\n" for code in (
-        "/U1<U2+S1", "/U1<U2+S2", "/U1<U2+A1", "/U1<U2+A1/U1<U2+S1", "/U1<U2<U3+A2", "/U1<U2<U3+A2/U1<U2<U3+A3",
-        "/U1<U2<U3+A2/U1<U2<U3+A3/U1+S1", "/U1<U2<U3+A2/U1<U2<U3<U4", "/U1<U2<U3<U4"))
-    aliases = ("TOPO\t\tAlias\n/P1/A1\t\tA1\n(A1)/U1<U2+S1\n(A1)/U1<U2+S2\n(A1)/U1<U2+A1\n(A1)/U1<U2+A1/U1<U2+S1\n"
-               "(A1)/U1<U2<U3+A2\t\tA2\n(A2)/U1<U2<U3+A3/U1+S1\n(A2)/U1<U2<U3<U4\n/P1/A1/U1<U2<U3<U4\n")
-    shifted = ("TOPO\n/P1/A1\n\t/U1<U2\n\t\t+S1\n\t\t+S2\n\t\t+A1/U1<U2+S1\n\t\t<U3\n\t\t\t+A2/U1<U2<U3\n"
-               "\t\t\t\t+A3/U1+S1\n\t\t\t\t<U4\n\t\t\t<U4\n")
-    hats = ("TOPO\n/P1/A1\n^/U1<U2\n\t+S1\n\t+S2\n\t+A1/U1<U2+S1\n^<U3\n\t+A2/U1<<U3\t# a comment\n\t\t+A3/U1+S1\n"
-            "\t^<U4\n^<U4\n")
+    absolute = "TOPO\n/P1/A1\n" + "".join(
+        f"/P1/A1{code}\n"
+        for code in (
+            "/U1<U2+S1",
+            "/U1<U2+S2",
+            "/U1<U2+A1",
+            "/U1<U2+A1/U1<U2+S1",
+            "/U1<U2<U3+A2",
+            "/U1<U2<U3+A2/U1<U2<U3+A3",
+            "/U1<U2<U3+A2/U1<U2<U3+A3/U1+S1",
+            "/U1<U2<U3+A2/U1<U2<U3<U4",
+            "/U1<U2<U3<U4",
+        )
+    )
+    aliases = (
+        "TOPO\t\tAlias\n/P1/A1\t\tA1\n(A1)/U1<U2+S1\n(A1)/U1<U2+S2\n(A1)/U1<U2+A1\n(A1)/U1<U2+A1/U1<U2+S1\n"
+        "(A1)/U1<U2<U3+A2\t\tA2\n(A2)/U1<U2<U3+A3/U1+S1\n(A2)/U1<U2<U3<U4\n/P1/A1/U1<U2<U3<U4\n"
+    )
+    shifted = (
+        "TOPO\n/P1/A1\n\t/U1<U2\n\t\t+S1\n\t\t+S2\n\t\t+A1/U1<U2+S1\n\t\t<U3\n\t\t\t+A2/U1<U2<U3\n"
+        "\t\t\t\t+A3/U1+S1\n\t\t\t\t<U4\n\t\t\t<U4\n"
+    )
+    hats = (
+        "TOPO\n/P1/A1\n^/U1<U2\n\t+S1\n\t+S2\n\t+A1/U1<U2+S1\n^<U3\n\t+A2/U1<<U3\t# a comment\n\t\t+A3/U1+S1\n"
+        "\t^<U4\n^<U4\n"
+    )
     for code in (absolute, aliases, shifted, hats):
         assert sorted(described(read_mtg(written(tmp_path, code)))) == sorted(PLANT), code
 
@@ -78,9 +105,11 @@ def test_features_belong_to_the_last_entity_or_to_all_of_a_run(tmp_path):
     assert mtg.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [6, 7]]
 
 
-MEASURED = ("TOPO\t\t\tXX\tYY\tZZ\n/P1\n^/A1\t\t\t0\t0\t0\n^/U1<<U4\t\t\t0\t4\t0\n"
-            "\t+A2/U1<<U3\t\t3\t4\t0\n^<U5<U6\t\t\t0\t8\t0\n"
-            "\t+A3/U1\t\t\t\t\n\t\t+S1\t-2\t8\t0\n")
+MEASURED = (
+    "TOPO\t\t\tXX\tYY\tZZ\n/P1\n^/A1\t\t\t0\t0\t0\n^/U1<<U4\t\t\t0\t4\t0\n"
+    "\t+A2/U1<<U3\t\t3\t4\t0\n^<U5<U6\t\t\t0\t8\t0\n"
+    "\t+A3/U1\t\t\t\t\n\t\t+S1\t-2\t8\t0\n"
+)
 
 
 def measured_clip():

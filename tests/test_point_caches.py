@@ -24,8 +24,9 @@ def pc2_bytes(motion=MOTION, start=10.0, step=1.0, magic=b"POINTCACHE2\0", versi
 
 
 def mdd_bytes(motion=MOTION, times=(0.0, 1 / 24, 2 / 24, 3 / 24)):
-    return (struct.pack(">2i", *motion.shape[:2]) + struct.pack(f">{len(times)}f", *times)
-            + motion.astype(">f4").tobytes())
+    return (
+        struct.pack(">2i", *motion.shape[:2]) + struct.pack(f">{len(times)}f", *times) + motion.astype(">f4").tobytes()
+    )
 
 
 def test_a_pc2_cache_as_the_format_is_described_is_read(tmp_path):
@@ -142,15 +143,24 @@ def test_only_the_frames_asked_for_are_read(tmp_path, monkeypatch):
 
 
 REFUSED = {
-    "a.pc2": [(pc2_bytes(version=2), "version: got 2"), (pc2_bytes(step=0.0), "expected a step above 0"),
-              (pc2_bytes(start=float("nan")), "got the start nan"), (pc2_bytes()[:-1], "got 271 bytes, expected 272"),
-              (pc2_bytes() + b"\0", "got 273 bytes, expected 272"), (pc2_bytes(MOTION[:0]), "at least one"),
-              (b"POINTCACHE2\0" + struct.pack("<iiffi", 1, 2**31 - 1, 0, 1, 2**31 - 1), "expected 55340232"),
-              (b"something else that is long enough", "expected a PC2 point cache"),
-              (pc2_bytes(MOTION + np.float32("inf")), "frame 0, vertex 0")],
-    "a.mdd": [(mdd_bytes()[:30], "expected 264"), (mdd_bytes(times=(0, 0, 0, 0)), "do not increase"),
-              (mdd_bytes(times=(0, 1, float("nan"), 2)), "do not increase"), (struct.pack(">2i", -1, 5), "-1 frames"),
-              (struct.pack(">2i", 2**31 - 1, 2**31 - 1), "no more than the file can hold")],
+    "a.pc2": [
+        (pc2_bytes(version=2), "version: got 2"),
+        (pc2_bytes(step=0.0), "expected a step above 0"),
+        (pc2_bytes(start=float("nan")), "got the start nan"),
+        (pc2_bytes()[:-1], "got 271 bytes, expected 272"),
+        (pc2_bytes() + b"\0", "got 273 bytes, expected 272"),
+        (pc2_bytes(MOTION[:0]), "at least one"),
+        (b"POINTCACHE2\0" + struct.pack("<iiffi", 1, 2**31 - 1, 0, 1, 2**31 - 1), "expected 55340232"),
+        (b"something else that is long enough", "expected a PC2 point cache"),
+        (pc2_bytes(MOTION + np.float32("inf")), "frame 0, vertex 0"),
+    ],
+    "a.mdd": [
+        (mdd_bytes()[:30], "expected 264"),
+        (mdd_bytes(times=(0, 0, 0, 0)), "do not increase"),
+        (mdd_bytes(times=(0, 1, float("nan"), 2)), "do not increase"),
+        (struct.pack(">2i", -1, 5), "-1 frames"),
+        (struct.pack(">2i", 2**31 - 1, 2**31 - 1), "no more than the file can hold"),
+    ],
 }
 
 

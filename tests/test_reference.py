@@ -33,18 +33,20 @@ def assert_same_bits(data: bytes) -> None:
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
-            assert_same_numbers(file.positions(level),
-                                np.concatenate([clip.positions(level=level) for clip in played]))
+            assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
         assert_same_numbers(file.rest(), decoder.rest)
         assert_same_numbers(np.concatenate(file.times), np.concatenate([clip.time for clip in played]))
         assert [(clip.name, clip.frames, clip.segments, clip.seams) for clip in file.clips] == [
             (clip.name, clip.frame_count, clip.segment_count, clip.seam_errors if clip.loop else None)
-            for clip in decoder.clips]
+            for clip in decoder.clips
+        ]
         common = file.metadata()
         own = common.pop("clips", {})
         assert [common | own.get(clip.clip.name, {}) for clip in played] == [clip.metadata for clip in played]
-        assert_same_static([file.faces(), file.edges(), *file.attributes().values()],
-                           [decoder.faces, decoder.edges, *decoder.attributes.values()])
+        assert_same_static(
+            [file.faces(), file.edges(), *file.attributes().values()],
+            [decoder.faces, decoder.edges, *decoder.attributes.values()],
+        )
         assert list(file.attributes()) == list(decoder.attributes)
 
 
@@ -73,9 +75,11 @@ def chunk_kinds(data: bytes) -> set[str]:
 # ---- what the encoder writes ----
 
 
-@pytest.mark.parametrize("options", [
-    {"effort": "fast"}, {"rel_error": 1e-3, "segment_frames": 256}, {"max_error": 1e-5, "effort": "fast"}],
-    ids=["default bound", "coarse, one segment", "fine"])
+@pytest.mark.parametrize(
+    "options",
+    [{"effort": "fast"}, {"rel_error": 1e-3, "segment_frames": 256}, {"max_error": 1e-5, "effort": "fast"}],
+    ids=["default bound", "coarse, one segment", "fine"],
+)
 def test_the_sample_has_the_same_bits(options, sample_clip, tmp_path):
     assert_same_bits(encoded(sample_clip, tmp_path, **options))
 
@@ -95,25 +99,33 @@ def test_learned_time_bases_have_the_same_bits(tmp_path):
     labels, parents = random_hierarchy(rng, branches=20, longest=9)
     rest = grow(rng, labels, parents)
     signals, reach = rng.normal(size=(48, 3)), 0.3 * rng.normal(size=(3, len(rest), 3))
-    data = encoded(clip_of(rest + np.einsum("tk,knc->tnc", signals, reach), rest, labels, parents), tmp_path,
-                   rel_error=1e-4, segment_frames=24)
+    data = encoded(
+        clip_of(rest + np.einsum("tk,knc->tnc", signals, reach), rest, labels, parents),
+        tmp_path,
+        rel_error=1e-4,
+        segment_frames=24,
+    )
     file = reference.AthFile(data)
     stems = [file.content(16, chunk.level, chunk.segment) for chunk in file.chunks if chunk.kind == 16]
     assert any(content[5] for content in stems), "no basis was learned"
     assert_same_bits(data)
 
 
-@pytest.mark.parametrize("make, options", [
-    (lambda: awkward(seed=8, branches=9, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
-    (lambda: plant(seed=2, roots=2, offset=50.0), {"exact_rest": True}),
-    (lambda: plant(seed=3, dtype=np.float64), {"exact_rest": True}),
-    (lambda: tube(rings=10, around=8, frames=20), {}),
-    (lambda: awkward(seed=4, shape="flat", motion="spin", longest=12), {}),
-    (lambda: awkward(seed=5, motion="mirror", longest=70, shuffled=True), {}),
-    (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
-    (lambda: chain_plant(branches=12, longest=3), {"segment_frames": 16}),
-    (lambda: bush(branches=25), {"rel_error": 1e-2}),
-], ids=["wide", "exact rest", "wide exact rest", "tube", "sheets", "mirrored", "coincident", "chain", "bush"])
+@pytest.mark.parametrize(
+    "make, options",
+    [
+        (lambda: awkward(seed=8, branches=9, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
+        (lambda: plant(seed=2, roots=2, offset=50.0), {"exact_rest": True}),
+        (lambda: plant(seed=3, dtype=np.float64), {"exact_rest": True}),
+        (lambda: tube(rings=10, around=8, frames=20), {}),
+        (lambda: awkward(seed=4, shape="flat", motion="spin", longest=12), {}),
+        (lambda: awkward(seed=5, motion="mirror", longest=70, shuffled=True), {}),
+        (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
+        (lambda: chain_plant(branches=12, longest=3), {"segment_frames": 16}),
+        (lambda: bush(branches=25), {"rel_error": 1e-2}),
+    ],
+    ids=["wide", "exact rest", "wide exact rest", "tube", "sheets", "mirrored", "coincident", "chain", "bush"],
+)
 def test_plants_of_all_sorts_have_the_same_bits(make, options, tmp_path):
     assert_same_bits(encoded(make(), tmp_path, effort="fast", **options))
 

@@ -63,8 +63,10 @@ class Handler(BaseHTTPRequestHandler):
         if start >= len(self.server.data):
             self.send_head(416, {"Content-Range": f"bytes */{len(self.server.data)}", "Content-Length": "0"})
             return
-        part = {"Content-Range": f"bytes {start}-{stop - 1}/{len(self.server.data)}",
-                "Content-Length": str(stop - start)}
+        part = {
+            "Content-Range": f"bytes {start}-{stop - 1}/{len(self.server.data)}",
+            "Content-Length": str(stop - start),
+        }
         self.send_head(206, part | headers)
         self.wfile.write(self.server.data[start:stop] if body is None else body)
 
@@ -108,7 +110,7 @@ def after(count: int, fault: Callable) -> Callable:
 def drop(handler: Handler, start: int, stop: int) -> bool:
     """Half of the answer, and the connection is gone."""
     stop = min(stop, len(handler.server.data))
-    handler.send_range(start, stop, handler.server.data[start: (start + stop) // 2])
+    handler.send_range(start, stop, handler.server.data[start : (start + stop) // 2])
     handler.close_connection = True
     return True
 
@@ -310,9 +312,10 @@ def test_a_passing_fault_is_retried_unnoticed(fault, server, local):
         assert len(server.ranges) >= 5
 
 
-@pytest.mark.parametrize("fault, message", [
-    (drop, r"connection (failed|ended)"), (hang_up, "the connection failed"), (overloaded, "the server answers 503"),
-])
+@pytest.mark.parametrize(
+    "fault, message",
+    [(drop, r"connection (failed|ended)"), (hang_up, "the connection failed"), (overloaded, "the server answers 503")],
+)
 @pytest.mark.parametrize("when", [0, 1])
 def test_a_fault_that_stays_is_named_with_the_number_of_tries(fault, message, when, server):
     server.fault = after(when, fault)
@@ -376,15 +379,25 @@ def test_a_server_that_compresses_on_the_way_is_understood(server, local):
         assert np.array_equal(decoder.positions(0), local.positions(0))
 
 
-@pytest.mark.parametrize("fault, message", [
-    (lambda h, a, b: h.send_range(a + 1, b) or True, "got bytes 1 to .*, expected 0 to"),
-    (lambda h, a, b: h.send_range(a, b, **{"Content-Range": "bytes 0-5/*"}) or True, "got Content-Range 'bytes 0-5/"),
-    (lambda h, a, b: h.send_range(a, b, **{"Content-Encoding": "gzip"}) or True, "Content-Encoding 'gzip'"),
-    (lambda h, a, b: h.send_head(404, {"Content-Length": "0"}) or True, "answers 404"),
-    (lambda h, a, b: h.send_head(403, {"Content-Length": "0"}) or True, "answers 403"),
-    (lambda h, a, b: h.send_head(416, {"Content-Length": "0", "Content-Range": "bytes */9"}) or True, "answers 416"),
-    (lambda h, a, b: h.send_head(302, {"Location": h.path, "Content-Length": "0"}) or True, "TooManyRedirects"),
-], ids=["other bytes", "no length", "compressed part", "not there", "not allowed", "no such range", "in circles"])
+@pytest.mark.parametrize(
+    "fault, message",
+    [
+        (lambda h, a, b: h.send_range(a + 1, b) or True, "got bytes 1 to .*, expected 0 to"),
+        (
+            lambda h, a, b: h.send_range(a, b, **{"Content-Range": "bytes 0-5/*"}) or True,
+            "got Content-Range 'bytes 0-5/",
+        ),
+        (lambda h, a, b: h.send_range(a, b, **{"Content-Encoding": "gzip"}) or True, "Content-Encoding 'gzip'"),
+        (lambda h, a, b: h.send_head(404, {"Content-Length": "0"}) or True, "answers 404"),
+        (lambda h, a, b: h.send_head(403, {"Content-Length": "0"}) or True, "answers 403"),
+        (
+            lambda h, a, b: h.send_head(416, {"Content-Length": "0", "Content-Range": "bytes */9"}) or True,
+            "answers 416",
+        ),
+        (lambda h, a, b: h.send_head(302, {"Location": h.path, "Content-Length": "0"}) or True, "TooManyRedirects"),
+    ],
+    ids=["other bytes", "no length", "compressed part", "not there", "not allowed", "no such range", "in circles"],
+)
 def test_an_answer_that_makes_no_sense_is_refused_at_once(fault, message, server):
     server.fault = fault
     with pytest.raises(RemoteError, match=f"^{re.escape(server.url)}: .*{message}"):
@@ -527,10 +540,10 @@ def test_what_an_object_store_does_not_have_is_one_line_without_keys(name, s3, c
     assert "hush" not in err
 
 
-@pytest.mark.parametrize("url, message", [
-    ("memory://nothing.ath", "memory://nothing.ath: FileNotFoundError"),
-    ("nonsense://a.ath", "Protocol not known"),
-])
+@pytest.mark.parametrize(
+    "url, message",
+    [("memory://nothing.ath", "memory://nothing.ath: FileNotFoundError"), ("nonsense://a.ath", "Protocol not known")],
+)
 def test_what_fsspec_refuses_is_one_line(url, message):
     with pytest.raises(RemoteError, match=message) as caught:
         athcodec.open(url)
@@ -541,13 +554,16 @@ def test_what_fsspec_refuses_is_one_line(url, message):
 def test_without_the_optional_packages_the_message_names_the_command_that_installs_them(module, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, module, None)
     assert cli.main(["info", "https://example.org/tree.ath"]) == 1
-    assert capsys.readouterr().err == (f'athcodec: error: https://example.org/tree.ath: reading a URL needs {module}: '
-                                       'pip install "athcodec[remote]"\n')
+    assert capsys.readouterr().err == (
+        f'athcodec: error: https://example.org/tree.ath: reading a URL needs {module}: pip install "athcodec[remote]"\n'
+    )
 
 
 def test_a_local_file_is_opened_without_fsspec_and_aiohttp():
-    code = ("import sys; sys.modules['fsspec'] = sys.modules['aiohttp'] = None\n"
-            "import athcodec.sources, athcodec.cli; assert 'asyncio' not in sys.modules")
+    code = (
+        "import sys; sys.modules['fsspec'] = sys.modules['aiohttp'] = None\n"
+        "import athcodec.sources, athcodec.cli; assert 'asyncio' not in sys.modules"
+    )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 

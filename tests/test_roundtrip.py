@@ -9,18 +9,7 @@ import pytest
 from files import opened, still_file
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from plants import (
-    MOTIONS,
-    SHAPES,
-    STEADY,
-    awkward,
-    awkward_plants,
-    bush,
-    chain_plant,
-    clip_of,
-    plant,
-    tube,
-)
+from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bush, chain_plant, clip_of, plant, tube
 
 import athcodec
 from athcodec import MotionClip, Thresholds
@@ -72,8 +61,14 @@ def reopened(clip: MotionClip, folder, **options) -> athcodec.Decoder:
 
 
 def with_static(clip: MotionClip, **more) -> MotionClip:
-    return MotionClip(positions=clip.positions, rest=clip.rest, time=clip.time, vertex_branch=clip.vertex_branch,
-                      branch_parent=clip.branch_parent, **more)
+    return MotionClip(
+        positions=clip.positions,
+        rest=clip.rest,
+        time=clip.time,
+        vertex_branch=clip.vertex_branch,
+        branch_parent=clip.branch_parent,
+        **more,
+    )
 
 
 # ---- motion ----
@@ -100,8 +95,13 @@ def test_degenerate_plants_stay_within_the_bound(scratch, clip, fraction, segmen
 
 @pytest.mark.slow
 @settings(STEADY, max_examples=3000)
-@given(awkward_plants(), st.sampled_from([1e-1, 1e-2, 1e-3, 1e-4, 1e-5]), st.integers(16, 256),
-       st.sampled_from(["fast", "default", "best"]), st.booleans())
+@given(
+    awkward_plants(),
+    st.sampled_from([1e-1, 1e-2, 1e-3, 1e-4, 1e-5]),
+    st.integers(16, 256),
+    st.sampled_from(["fast", "default", "best"]),
+    st.booleans(),
+)
 def test_many_degenerate_plants_stay_within_the_bound(scratch, clip, fraction, segment_frames, effort, exact_rest):
     assert_comes_back(clip, scratch, fraction, segment_frames=segment_frames, effort=effort, exact_rest=exact_rest)
 
@@ -117,24 +117,31 @@ def test_every_effort_keeps_the_bound(effort, scratch):
     assert_comes_back(plant(seed=4, branches=15, frames=40), scratch, 1e-4, effort=effort)
 
 
-@pytest.mark.parametrize("clip", [
-    pytest.param(lambda: chain_plant(9, 4), id="orders up to 8"),
-    pytest.param(lambda: chain_plant(45, 2), id="orders up to 44"),
-    pytest.param(lambda: chain_plant(500, 1), id="500 single vertices in a chain"),
-    pytest.param(lambda: plant(branches=1400, longest=4, frames=8), id="1400 branches"),
-    pytest.param(lambda: bush(1001), id="1000 branches on one stem"),
-    pytest.param(lambda: plant(branches=30, roots=30, frames=20), id="30 roots and nothing else"),
-    pytest.param(lambda: awkward(2, branches=20, roots=5, motion="drift"), id="moving roots"),
-    pytest.param(lambda: tube(200, 15, 20), id="a bark tube of 3000 vertices"),
-    pytest.param(lambda: clip_of(np.zeros((1, 1, 3)), np.zeros((1, 3)), [0], [-1]), id="one vertex in one frame"),
-    pytest.param(lambda: clip_of(np.full((9, 4, 3), 7e5), np.full((4, 3), 7e5), [0, 0, 1, 1], [-1, 0]),
-                 id="all vertices in one far place"),
-    pytest.param(lambda: plant(frames=257, branches=3), id="257 frames"),
-    pytest.param(lambda: awkward(8, motion="sway", offset=1e4), id="far from the origin in float32"),
-    pytest.param(lambda: awkward(8, motion="sway", offset=1e9, dtype=np.float64), id="far from the origin in float64"),
-    pytest.param(lambda: plant(3, scale=1e-6), id="micrometres"),
-    pytest.param(lambda: plant(3, scale=1e6), id="a million units"),
-])
+@pytest.mark.parametrize(
+    "clip",
+    [
+        pytest.param(lambda: chain_plant(9, 4), id="orders up to 8"),
+        pytest.param(lambda: chain_plant(45, 2), id="orders up to 44"),
+        pytest.param(lambda: chain_plant(500, 1), id="500 single vertices in a chain"),
+        pytest.param(lambda: plant(branches=1400, longest=4, frames=8), id="1400 branches"),
+        pytest.param(lambda: bush(1001), id="1000 branches on one stem"),
+        pytest.param(lambda: plant(branches=30, roots=30, frames=20), id="30 roots and nothing else"),
+        pytest.param(lambda: awkward(2, branches=20, roots=5, motion="drift"), id="moving roots"),
+        pytest.param(lambda: tube(200, 15, 20), id="a bark tube of 3000 vertices"),
+        pytest.param(lambda: clip_of(np.zeros((1, 1, 3)), np.zeros((1, 3)), [0], [-1]), id="one vertex in one frame"),
+        pytest.param(
+            lambda: clip_of(np.full((9, 4, 3), 7e5), np.full((4, 3), 7e5), [0, 0, 1, 1], [-1, 0]),
+            id="all vertices in one far place",
+        ),
+        pytest.param(lambda: plant(frames=257, branches=3), id="257 frames"),
+        pytest.param(lambda: awkward(8, motion="sway", offset=1e4), id="far from the origin in float32"),
+        pytest.param(
+            lambda: awkward(8, motion="sway", offset=1e9, dtype=np.float64), id="far from the origin in float64"
+        ),
+        pytest.param(lambda: plant(3, scale=1e-6), id="micrometres"),
+        pytest.param(lambda: plant(3, scale=1e6), id="a million units"),
+    ],
+)
 def test_extreme_plants_stay_within_the_bound(clip, scratch):
     assert_comes_back(clip(), scratch)
 
@@ -226,8 +233,13 @@ def test_uneven_times_survive_a_file(full_ath, full_clip):
 @pytest.mark.parametrize("rest_pose", ["first", "mean"])
 def test_a_clip_without_a_rest_pose_gets_one_from_its_frames(rest_pose, scratch):
     source = plant(seed=7, branches=6, frames=20)
-    clip = MotionClip(positions=source.positions, time=source.time, vertex_branch=source.vertex_branch,
-                      branch_parent=source.branch_parent, rest_pose=rest_pose)
+    clip = MotionClip(
+        positions=source.positions,
+        time=source.time,
+        vertex_branch=source.vertex_branch,
+        branch_parent=source.branch_parent,
+        rest_pose=rest_pose,
+    )
     expected = source.positions[0] if rest_pose == "first" else source.positions.mean(axis=0, dtype=np.float64)
     decoder = reopened(clip, scratch)
     assert np.linalg.norm(decoder.rest - expected, axis=1).max() <= decoder.max_error_bound
@@ -239,8 +251,14 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
     source = awkward(seed=8, branches=12, frames=20, motion="sway", shuffled=True, offset=3.0)
     rest = source.rest.astype(dtype)
     rest[0, 0] = -0.0
-    clip = MotionClip(positions=source.positions, time=source.time, vertex_branch=source.vertex_branch,
-                      branch_parent=source.branch_parent, stem_index=source.stem_index, rest=rest)
+    clip = MotionClip(
+        positions=source.positions,
+        time=source.time,
+        vertex_branch=source.vertex_branch,
+        branch_parent=source.branch_parent,
+        stem_index=source.stem_index,
+        rest=rest,
+    )
     decoder = reopened(clip, scratch, exact_rest=True)
     assert decoder.rest.dtype == dtype and decoder.rest.tobytes() == rest.tobytes()
     assert largest_error(decoder.positions(), clip) <= decoder.max_error_bound
@@ -300,17 +318,22 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
     assert sizes[0] < 30 < sizes[1], "edges that follow from the hierarchy cost next to nothing"
 
 
-@pytest.mark.parametrize("faces", [np.array([[0, 1, 2], [2, 1, 3]], np.uint16), np.array([[3, 2, 1, 0]], ">i8"),
-                                   np.zeros((0, 3), np.int32)])
+@pytest.mark.parametrize(
+    "faces", [np.array([[0, 1, 2], [2, 1, 3]], np.uint16), np.array([[3, 2, 1, 0]], ">i8"), np.zeros((0, 3), np.int32)]
+)
 def test_faces_come_back_unchanged(faces, scratch):
     assert same_array(reopened(with_static(plant(frames=3), faces=faces), scratch).faces, faces)
 
 
-@pytest.mark.parametrize("metadata", [
-    {}, {"unit": "cm", "up_axis": "z"},
-    {"größe": "über 🌳", "count": 2**60, "ratio": 0.1, "yes": True, "list": [1, "two", [3.5, False]], "empty": ""},
-    {"long": "wind " * 5000},
-])
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        {},
+        {"unit": "cm", "up_axis": "z"},
+        {"größe": "über 🌳", "count": 2**60, "ratio": 0.1, "yes": True, "list": [1, "two", [3.5, False]], "empty": ""},
+        {"long": "wind " * 5000},
+    ],
+)
 def test_metadata_come_back_unchanged(metadata, scratch):
     assert reopened(with_static(plant(frames=3), metadata=metadata), scratch).metadata == metadata
 
@@ -327,16 +350,27 @@ def test_attributes_none_keeps_the_motion_and_the_units_alone(full_clip, scratch
     assert np.array_equal(bare.positions(), full.positions()) and bare.file.file_length < full.file.file_length
 
 
-@pytest.mark.parametrize("more", [
-    {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
-    {"attributes": {"n" * 5000: np.zeros(1)}},
-    {"attributes": {"wide": np.zeros(1, "S2000000")}},
-    {"attributes": {"void": np.zeros(3, "V0")}},
-    {"metadata": {"text": "x" * (1 << 20)}},
-    {"metadata": {"object": {1, 2}}},
-    {"metadata": {"text": "\ud800"}},
-], ids=["257 attributes", "a name of 5000 bytes", "items of 2 MB", "items of no bytes", "1 MiB of metadata",
-        "metadata that is no JSON", "metadata that is no UTF-8"])
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"attributes": {f"a{i}": np.zeros(1) for i in range(257)}},
+        {"attributes": {"n" * 5000: np.zeros(1)}},
+        {"attributes": {"wide": np.zeros(1, "S2000000")}},
+        {"attributes": {"void": np.zeros(3, "V0")}},
+        {"metadata": {"text": "x" * (1 << 20)}},
+        {"metadata": {"object": {1, 2}}},
+        {"metadata": {"text": "\ud800"}},
+    ],
+    ids=[
+        "257 attributes",
+        "a name of 5000 bytes",
+        "items of 2 MB",
+        "items of no bytes",
+        "1 MiB of metadata",
+        "metadata that is no JSON",
+        "metadata that is no UTF-8",
+    ],
+)
 def test_static_data_beyond_what_a_decoder_accepts_are_refused_when_encoding(more, tmp_path):
     with pytest.raises(athcodec.errors.ClipError):
         athcodec.encode(with_static(plant(frames=3), **more), tmp_path / "refused.ath", effort="fast")

@@ -49,8 +49,12 @@ def test_a_motion_comes_back_bit_for_bit(tmp_path, suffix, dtype, make):
 
 def test_what_vertices_have_beside_a_position_comes_back_from_ply(tmp_path):
     clip, count = quad_clip(), 24
-    more = {"colors": np.arange(3 * count, dtype=np.uint8).reshape(-1, 3), "radius": np.linspace(0, 1, count),
-            "branch": np.arange(count, dtype=np.int32), "uv": np.ones((count, 2), np.float32)}
+    more = {
+        "colors": np.arange(3 * count, dtype=np.uint8).reshape(-1, 3),
+        "radius": np.linspace(0, 1, count),
+        "branch": np.arange(count, dtype=np.int32),
+        "uv": np.ones((count, 2), np.float32),
+    }
     clip.attributes |= more
     athcodec.write(clip, tmp_path / "tree.ply")
     with athcodec.read(tmp_path / "tree_0001.ply") as again:
@@ -84,10 +88,12 @@ def test_a_single_file_is_a_single_frame(tmp_path):
 
 
 def test_changing_topology_is_refused_with_the_frame(tmp_path):
-    for text, message in (("v 0 0 1\nv 1 0 0\nv 0 1 0\nf 1 3 2\n", "got other faces"),
-                          (TRIANGLE.format(1) + "v 1 1 1\n", "got 4 vertices, expected 3"),
-                          (TRIANGLE.format(1) + "l 1 2\n", "got further edges"),
-                          ("v 0 0 1\nv 1 0 0\nv 0 1 0\n", "got no faces")):
+    for text, message in (
+        ("v 0 0 1\nv 1 0 0\nv 0 1 0\nf 1 3 2\n", "got other faces"),
+        (TRIANGLE.format(1) + "v 1 1 1\n", "got 4 vertices, expected 3"),
+        (TRIANGLE.format(1) + "l 1 2\n", "got further edges"),
+        ("v 0 0 1\nv 1 0 0\nv 0 1 0\n", "got no faces"),
+    ):
         write_triangles(tmp_path, [f"a_{i}.obj" for i in range(4)])
         (tmp_path / "a_2.obj").write_text(text)
         with athcodec.read(tmp_path / "a_0.obj") as clip:
@@ -98,15 +104,19 @@ def test_changing_topology_is_refused_with_the_frame(tmp_path):
 def test_normals_and_names_that_change_from_file_to_file_are_no_topology(tmp_path):
     for i in range(3):
         (tmp_path / f"a_{i}.obj").write_text(
-            f"mtllib a_{i}.mtl\no leaf{i}\nv 0 0 {i}\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n" + "vn 1 0 0\n" * i
-            + f"f 1//{i + 1} 2//1 3//1\n")
+            f"mtllib a_{i}.mtl\no leaf{i}\nv 0 0 {i}\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n"
+            + "vn 1 0 0\n" * i
+            + f"f 1//{i + 1} 2//1 3//1\n"
+        )
     with athcodec.read(tmp_path / "a_1.obj") as clip:
         assert clip.block(0, 3)[:, 0, 2].tolist() == [0, 1, 2] and clip.faces.tolist() == [[0, 1, 2]]
 
 
 def test_obj_with_comments_continuations_and_relative_numbers_is_read():
-    mesh = obj("# a leaf\r\nv  0 0 0 1 0 0\r\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\nvt 1 1\n"
-               "usemtl green\nf -4/1/1 -3/2/1 \\\n -2/3/1\nusemtl bark\nf 1 3 4\nl 1 2 3\np 4\ns off\ncstype bezier\n")
+    mesh = obj(
+        "# a leaf\r\nv  0 0 0 1 0 0\r\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\nvt 1 1\n"
+        "usemtl green\nf -4/1/1 -3/2/1 \\\n -2/3/1\nusemtl bark\nf 1 3 4\nl 1 2 3\np 4\ns off\ncstype bezier\n"
+    )
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.edges.tolist() == [[0, 1], [1, 2]]
     assert mesh.attributes["colors"].tolist()[3] == [1, 1, 1] and mesh.points.dtype == np.float32
     assert mesh.attributes["uv"].tolist() == [[0, 0], [1, 0], [1, 1], [0, 0], [0, 0], [0, 0]]

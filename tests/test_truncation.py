@@ -165,7 +165,8 @@ def test_a_truncated_file_promises_the_error_of_its_last_level(whole, tmp_path):
             expected = whole.bound if level.level == len(whole.levels) - 1 else level.max_error
             assert decoder.max_error_bound == expected
             assert [(d.max_error, d.rms_error, d.nodes) for d in decoder.levels] == [
-                (d.max_error, d.rms_error, d.nodes) for d in whole.levels[: level.level + 1]]
+                (d.max_error, d.rms_error, d.nodes) for d in whole.levels[: level.level + 1]
+            ]
 
 
 def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, tmp_path):
@@ -176,7 +177,8 @@ def test_a_truncated_file_is_shorter_and_keeps_its_static_data(full, full_clip, 
         assert np.array_equal(decoder.faces, full_clip.faces) and np.array_equal(decoder.edges, full_clip.edges)
         assert decoder.metadata == full_clip.metadata
         assert {name: a.tobytes() for name, a in decoder.attributes.items()} == {
-            name: a.tobytes() for name, a in full_clip.attributes.items()}
+            name: a.tobytes() for name, a in full_clip.attributes.items()
+        }
 
 
 def test_truncating_twice_is_truncating_once(bushy, tmp_path):
@@ -218,20 +220,33 @@ def damaged(whole: Whole, change) -> bytes:
 def flip(place: int):
     def change(data: bytearray) -> None:
         data[place] ^= 4
+
     return change
 
 
-@pytest.mark.parametrize("make, level, error", [
-    (lambda w: w.data[: w.levels[1].bytes - 1], 1, Truncated),
-    (lambda w: w.data[: w.prelude - 1], 0, Truncated),
-    (lambda w: damaged(w, flip(w.prelude + 3)), 1, BadChecksum),
-    (lambda w: damaged(w, flip(w.prelude - 3)), 0, BadChecksum),
-    (lambda w: damaged(w, flip(70)), 0, FormatError),
-    (lambda w: b"no ath file at all", 0, NotAnAthFile),
-    (lambda w: w.data, 6, LevelUnavailable),
-    (lambda w: w.data, -1, LevelUnavailable),
-], ids=["level cut off", "prelude cut off", "level damaged", "prelude damaged", "table damaged", "something else",
-        "level beyond", "level before"])
+@pytest.mark.parametrize(
+    "make, level, error",
+    [
+        (lambda w: w.data[: w.levels[1].bytes - 1], 1, Truncated),
+        (lambda w: w.data[: w.prelude - 1], 0, Truncated),
+        (lambda w: damaged(w, flip(w.prelude + 3)), 1, BadChecksum),
+        (lambda w: damaged(w, flip(w.prelude - 3)), 0, BadChecksum),
+        (lambda w: damaged(w, flip(70)), 0, FormatError),
+        (lambda w: b"no ath file at all", 0, NotAnAthFile),
+        (lambda w: w.data, 6, LevelUnavailable),
+        (lambda w: w.data, -1, LevelUnavailable),
+    ],
+    ids=[
+        "level cut off",
+        "prelude cut off",
+        "level damaged",
+        "prelude damaged",
+        "table damaged",
+        "something else",
+        "level beyond",
+        "level before",
+    ],
+)
 def test_truncating_what_cannot_be_truncated_raises_and_leaves_nothing(make, level, error, bushy, tmp_path):
     source, folder = tmp_path / "source.ath", tmp_path / "out"
     source.write_bytes(make(bushy))

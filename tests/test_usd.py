@@ -73,8 +73,15 @@ def test_a_moving_mesh_below_a_moving_transform_is_read_in_world_space(tmp_path,
         expected = (sway(101 + i) + np.array([i, 0, 5])) @ rotation.T
         assert np.allclose(positions[i], expected, rtol=0, atol=3e-6)
     assert np.array_equal(clip.faces, QUADS) and clip.faces.dtype == np.int32
-    assert clip.metadata == {"fps": FPS, "start_frame": 101, "unit": "cm", "up_axis": "z", "part_names": ["grid"],
-                             "part_kinds": ["mesh"], "domains": {"part_vertex_counts": "constant"}}
+    assert clip.metadata == {
+        "fps": FPS,
+        "start_frame": 101,
+        "unit": "cm",
+        "up_axis": "z",
+        "part_names": ["grid"],
+        "part_kinds": ["mesh"],
+        "domains": {"part_vertex_counts": "constant"},
+    }
     assert np.allclose(clip.time, np.arange(10) / FPS, rtol=0, atol=1e-12)
 
 
@@ -184,7 +191,7 @@ def test_instances_are_read_where_they_stand_and_what_is_hidden_is_not(tmp_path)
     clip, positions = read_all(tmp_path / "a.usda")
     assert sorted(clip.metadata["part_names"]) == ["/late", "/tree0/grid", "/tree1/grid"]
     first = 12 * clip.metadata["part_names"].index("/tree0/grid")
-    assert np.allclose(positions[:, first + 12: first + 24] - positions[:, first: first + 12], [10, 0, 0], atol=1e-5)
+    assert np.allclose(positions[:, first + 12 : first + 24] - positions[:, first : first + 12], [10, 0, 0], atol=1e-5)
 
 
 def skinned(path):
@@ -337,7 +344,11 @@ def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
     assert UsdGeom.GetStageMetersPerUnit(stage) == 0.01 and UsdGeom.GetStageUpAxis(stage) == "Z"
     prims = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased)]
     assert [(prim.GetName(), prim.GetTypeName()) for prim in prims] == [
-        ("grid", "Mesh"), ("leaf", "Mesh"), ("hair", "BasisCurves"), ("dust", "Points")]
+        ("grid", "Mesh"),
+        ("leaf", "Mesh"),
+        ("hair", "BasisCurves"),
+        ("dust", "Points"),
+    ]
     assert UsdGeom.Mesh(prims[0]).GetSubdivisionSchemeAttr().Get() == "none"
     for i, code in enumerate(range(101, 111)):
         points = np.concatenate([np.array(UsdGeom.PointBased(prim).GetPointsAttr().Get(code)) for prim in prims])
@@ -354,15 +365,32 @@ def awkward_clip():
     rng = np.random.default_rng(3)
     record = np.array([(1, 2.5), (3, 4.5)], [("a", "<i2"), ("b", "<f8")])
     return MotionClip(
-        positions=rng.random((5, 12, 3), np.float32), time=np.array([0, 0.1, 0.3, 0.35, 2.0]), faces=QUADS,
-        vertex_branch=np.repeat([0, 1], 6), branch_parent=np.array([-1, 0]),
-        edges=np.array([[0, 1], [6, 7]], np.uint16), stem_index=np.array([5, 4, 3, 2, 1, 0] * 2),
-        attributes={"age": np.arange(12, dtype=np.int16), "mass": np.arange(2.0), "record": record,
-                    "alive": np.ones(12, bool),
-                    "scans/first": rng.random((12, 3)), "matrix": rng.random((12, 3, 3)), "species": np.array([b"oak"]),
-                    "big": np.arange(12, dtype=">i4"), "face_kind": np.arange(6, dtype=np.uint8)},
-        metadata={"unit": "m", "up_axis": "x", "note": "wind from the west", "fps": 30.0, "start_frame": 7,
-                  "domains": {"mass": "branch", "record": "constant", "species": "constant", "face_kind": "face"}},
+        positions=rng.random((5, 12, 3), np.float32),
+        time=np.array([0, 0.1, 0.3, 0.35, 2.0]),
+        faces=QUADS,
+        vertex_branch=np.repeat([0, 1], 6),
+        branch_parent=np.array([-1, 0]),
+        edges=np.array([[0, 1], [6, 7]], np.uint16),
+        stem_index=np.array([5, 4, 3, 2, 1, 0] * 2),
+        attributes={
+            "age": np.arange(12, dtype=np.int16),
+            "mass": np.arange(2.0),
+            "record": record,
+            "alive": np.ones(12, bool),
+            "scans/first": rng.random((12, 3)),
+            "matrix": rng.random((12, 3, 3)),
+            "species": np.array([b"oak"]),
+            "big": np.arange(12, dtype=">i4"),
+            "face_kind": np.arange(6, dtype=np.uint8),
+        },
+        metadata={
+            "unit": "m",
+            "up_axis": "x",
+            "note": "wind from the west",
+            "fps": 30.0,
+            "start_frame": 7,
+            "domains": {"mass": "branch", "record": "constant", "species": "constant", "face_kind": "face"},
+        },
     )
 
 

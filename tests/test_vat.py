@@ -127,7 +127,8 @@ def test_openvat_textures_show_every_position(tmp_path, vertices, frames, half):
     assert stated <= (np.linalg.norm(span) / 65535 / 2 if half else 1e-6) + 1e-6
     assert (facts["athcodec"]["fps"], facts["athcodec"]["start_frame"]) == (24.0, 7)
     assert sorted(os.listdir(tmp_path / "a.openvat")) == sorted(
-        ["a-remap_info.json", "a_vat.glb", "a_vat.png" if half else "a_vat.exr"])
+        ["a-remap_info.json", "a_vat.glb", "a_vat.png" if half else "a_vat.exr"]
+    )
 
 
 def test_the_mesh_is_the_rest_pose_with_all_that_does_not_move(leafy, tmp_path):  # noqa: F811

@@ -22,8 +22,13 @@ VECTORS = conformance.vectors()
 
 def run(*words, code: int = 0) -> str:
     """What the program prints."""
-    done = subprocess.run([sys.executable, "-m", "spec.conformance", *map(str, words)], cwd=ROOT, text=True,
-                          capture_output=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-m", "spec.conformance", *map(str, words)],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        timeout=120,
+    )
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout
 
@@ -95,8 +100,11 @@ def test_existing_vectors_are_left_alone(tmp_path):
     kept, listed = "valid/smallest.ath 00000000 strict=ok # an older one", folder / "expected.txt"
     (folder / "valid").mkdir(parents=True)
     (folder / "valid/smallest.ath").write_bytes(b"older")
-    others = "\n".join(f"{vector.path} 00000000 # there" for vector in make_vectors.VECTORS
-                       if vector.name not in ("smallest", "smallest-wide"))
+    others = "\n".join(
+        f"{vector.path} 00000000 # there"
+        for vector in make_vectors.VECTORS
+        if vector.name not in ("smallest", "smallest-wide")
+    )
     listed.write_text(f"# head\n{kept}\n{others}\n")
     assert make_vectors.make(folder=folder) == 1
     assert (folder / "valid/smallest.ath").read_bytes() == b"older" and kept in listed.read_text()
@@ -138,16 +146,23 @@ def test_a_program_that_decodes_well_passes(tmp_path):
     assert "1 vectors, 0 wrong" in run("--only", "invalid/cut-in-attributes.ath", *REFERENCE)
 
 
-@pytest.mark.parametrize("body, only, complaint", [
-    ("data = bytes([data[0] ^ 1]) + data[1:] if item == '1' else data", "valid/all-at-origin.ath", "1: got "),
-    ("error = error.replace(b'BAD_CHUNK', b'BAD_HEADER')", "invalid/time-equal.ath",
-     "got BAD_HEADER; expected BAD_CHUNK"),
-    ("error = b''", "invalid/time-equal.ath", "exit status 1 and no error's name"),
-    ("done.returncode = 0", "invalid/time-equal.ath", "open: got ok; expected BAD_CHUNK"),
-    ("os.abort()", "valid/all-at-origin.ath", "exit status -6 and no error's name"),
-    ("data = b''", "valid/all-at-origin.ath", "0: got 00000000"),
-    ("data = data.replace(b'storm', b'Storm')", "valid/clips-two.ath", "clips: got "),
-], ids=["other bits", "another error", "no error's name", "no error", "a crash", "nothing", "another name"])
+@pytest.mark.parametrize(
+    "body, only, complaint",
+    [
+        ("data = bytes([data[0] ^ 1]) + data[1:] if item == '1' else data", "valid/all-at-origin.ath", "1: got "),
+        (
+            "error = error.replace(b'BAD_CHUNK', b'BAD_HEADER')",
+            "invalid/time-equal.ath",
+            "got BAD_HEADER; expected BAD_CHUNK",
+        ),
+        ("error = b''", "invalid/time-equal.ath", "exit status 1 and no error's name"),
+        ("done.returncode = 0", "invalid/time-equal.ath", "open: got ok; expected BAD_CHUNK"),
+        ("os.abort()", "valid/all-at-origin.ath", "exit status -6 and no error's name"),
+        ("data = b''", "valid/all-at-origin.ath", "0: got 00000000"),
+        ("data = data.replace(b'storm', b'Storm')", "valid/clips-two.ath", "clips: got "),
+    ],
+    ids=["other bits", "another error", "no error's name", "no error", "a crash", "nothing", "another name"],
+)
 def test_a_wrong_answer_of_a_program_is_reported(body, only, complaint, tmp_path):
     printed = run("--only", only, *decoder_that(tmp_path, body), code=1)
     assert complaint in printed and only in printed and "0 wrong" not in printed

@@ -131,8 +131,12 @@ def test_a_clip_to_begin_with_is_named_in_the_address_and_in_the_page(medley_ath
 def test_a_file_that_cannot_be_shown_is_an_error_of_one_line(sample_ath, tmp_path, monkeypatch, capsys):
     broken = tmp_path / "broken.ath"
     broken.write_bytes(b"no plant at all")
-    for arguments in (["view", str(broken)], ["view", str(broken), "--export", str(tmp_path / "x.html")],
-                      ["view", str(tmp_path / "none.ath")], ["view", "ftp://example.org/tree.ath"]):
+    for arguments in (
+        ["view", str(broken)],
+        ["view", str(broken), "--export", str(tmp_path / "x.html")],
+        ["view", str(tmp_path / "none.ath")],
+        ["view", "ftp://example.org/tree.ath"],
+    ):
         assert cli.main(arguments) == 1
         error = capsys.readouterr().err.strip()
         assert error.startswith("athcodec: error: ") and "\n" not in error and arguments[1] in error
@@ -185,14 +189,34 @@ def test_the_npm_package_installs_from_its_tarball(tmp_path):
 
     tarball = npm("pack", "--silent", "--pack-destination", str(tmp_path), cwd=VIEWER).split()[-1]
     (tmp_path / "package.json").write_text('{"type": "module", "private": true}')
-    npm("install", "--silent", "--no-audit", "--no-fund", f"./{tarball}", "three@0.187.0", "typescript@5.9.3",
-        "@types/three", cwd=tmp_path)
+    npm(
+        "install",
+        "--silent",
+        "--no-audit",
+        "--no-fund",
+        f"./{tarball}",
+        "three@0.187.0",
+        "typescript@5.9.3",
+        "@types/three",
+        cwd=tmp_path,
+    )
     (tmp_path / "use.mjs").write_text(PACKED)
     done = subprocess.run(["node", "use.mjs"], cwd=tmp_path, capture_output=True, text=True)
     assert json.loads(done.stdout) == ["function", "function", True, "/x/ath_worker.js"], done.stderr
     (tmp_path / "use.ts").write_text(TYPED)
-    command = ["npx", "tsc", "--noEmit", "--strict", "--target", "es2022", "--module", "esnext",
-               "--moduleResolution", "bundler", "use.ts"]
+    command = [
+        "npx",
+        "tsc",
+        "--noEmit",
+        "--strict",
+        "--target",
+        "es2022",
+        "--module",
+        "esnext",
+        "--moduleResolution",
+        "bundler",
+        "use.ts",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
 
@@ -257,8 +281,15 @@ def gusty_tree():
         swing = gust * np.sin(rng.uniform(3, 9) * time_ + rng.uniform(0, 6))
         along = np.linspace(0, 1, len(mine)) ** 2
         positions[:, mine] += swing[:, None, None] * along[:, None] * rng.normal(size=3) * 0.15
-    return clip_of(positions, plant.position, plant.branch, plant.branch_parent, edges=plant.edges,
-                   attributes={"radius": plant.radius.astype(np.float32)}, metadata={"unit": "m", "up_axis": "y"})
+    return clip_of(
+        positions,
+        plant.position,
+        plant.branch,
+        plant.branch_parent,
+        edges=plant.edges,
+        attributes={"radius": plant.radius.astype(np.float32)},
+        metadata={"unit": "m", "up_axis": "y"},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -271,14 +302,24 @@ def gusty_ath(gusty_tree, tmp_path_factory):
 @pytest.fixture(scope="module")
 def windy_ath(gusty_tree, tmp_path_factory):
     """Three clips of that tree: a calm that was blended into a loop, a gust, and a storm that is one."""
+
     def part(start: int, stop: int, force: float):
         rest = gusty_tree.rest
-        return clip_of(rest + force * (gusty_tree.block(start, stop) - rest), rest, gusty_tree.vertex_branch,
-                       gusty_tree.branch_parent, edges=gusty_tree.edges, attributes=gusty_tree.attributes,
-                       metadata=gusty_tree.metadata)
+        return clip_of(
+            rest + force * (gusty_tree.block(start, stop) - rest),
+            rest,
+            gusty_tree.vertex_branch,
+            gusty_tree.branch_parent,
+            edges=gusty_tree.edges,
+            attributes=gusty_tree.attributes,
+            metadata=gusty_tree.metadata,
+        )
 
-    clips = {"calm": athcodec.looped(part(0, 40, 0.3), blend=8), "gust": part(30, 80, 1.0),
-             "storm": athcodec.looped(part(60, 120, 1.6), blend=20)}
+    clips = {
+        "calm": athcodec.looped(part(0, 40, 0.3), blend=8),
+        "gust": part(30, 80, 1.0),
+        "storm": athcodec.looped(part(60, 120, 1.6), blend=20),
+    }
     path = tmp_path_factory.mktemp("windy") / "windy.ath"
     athcodec.encode(athcodec.join(clips), path, rel_error=1e-4, effort="fast", segment_frames=16)
     return path
@@ -376,10 +417,10 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
             played = {segment for name in names for segment in clips[name].segments}
             asked = np.zeros(len(data), bool)
             for _, first, size in line.log[1:]:
-                asked[first: first + size] = True
+                asked[first : first + size] = True
             for chunk in decoder.file.chunks:
                 if chunk.offset in common or chunk.segment in played:
-                    asked[chunk.offset: chunk.offset + chunk.length] = False
+                    asked[chunk.offset : chunk.offset + chunk.length] = False
             return int(asked.sum())
 
         page = opened(line.page("tree.ath", clip="storm"))
@@ -460,7 +501,8 @@ def test_a_loop_goes_over_its_seam_without_a_jump_and_other_clips_end(opened, me
             round_ = page.evaluate("athcodecViewer.motion.duration")
             assert page.get_attribute("#loop", "aria-pressed") == str(clip.loop).lower()
             page.wait_for_function(
-                "(loop) => document.getElementById('facts').textContent.includes('Loop seam') === loop", arg=clip.loop)
+                "(loop) => document.getElementById('facts').textContent.includes('Loop seam') === loop", arg=clip.loop
+            )
             if not clip.loop:
                 assert round_ == pytest.approx(clip.duration)
                 held = positions_of(page, f"athcodecViewer.decoded({round_ + 1}, {deepest})")
@@ -547,7 +589,8 @@ def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
         page.evaluate("athcodecViewer.setLevel('1')")
         line.release()
         page.wait_for_function(
-            "() => athcodecViewer.motion.readyLevel >= 1 && athcodecViewer.plants[0].ath.attributes.radius")
+            "() => athcodecViewer.motion.readyLevel >= 1 && athcodecViewer.plants[0].ath.attributes.radius"
+        )
         settle(page, line)
         assert page.evaluate("athcodecViewer.motion.level") == 1
         assert line.sent("tree.ath") < 0.6 * len(data) and decoder.level_count > 2
@@ -587,10 +630,16 @@ def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
 
 
 @browser_test
-@pytest.mark.parametrize("damage, words", [
-    (lambda data: b"<!doctype html>" + data[15:], "not an .ath file"), (lambda data: data[:40], "cut off"),
-    (lambda data: data[:900] + bytes([data[900] ^ 1]) + data[901:], "damaged"), (lambda data: b"", "not an .ath file"),
-    (None, "cannot be fetched")])
+@pytest.mark.parametrize(
+    "damage, words",
+    [
+        (lambda data: b"<!doctype html>" + data[15:], "not an .ath file"),
+        (lambda data: data[:40], "cut off"),
+        (lambda data: data[:900] + bytes([data[900] ^ 1]) + data[901:], "damaged"),
+        (lambda data: b"", "not an .ath file"),
+        (None, "cannot be fetched"),
+    ],
+)
 def test_the_page_says_that_a_file_cannot_be_shown(opened, sample_ath, damage, words):
     files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
     with ThrottledServer(files) as line:
@@ -603,7 +652,7 @@ def test_the_intact_levels_of_a_damaged_file_play(opened, sample_ath):
     parts = sample_ath.read_bytes()
     with athcodec.open(sample_ath) as decoder:
         at = decoder.file.info()["levels"][1]["bytes"] + 50
-    damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1:]
+    damaged = parts[:at] + bytes([parts[at] ^ 4]) + parts[at + 1 :]
     with ThrottledServer({"tree.ath": damaged}) as line:
         page = opened(line.page("tree.ath"), "!document.getElementById('note').hidden")
         assert "damaged" in page.inner_text("#note")
@@ -653,14 +702,23 @@ def ink(page) -> float:
 def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
     """Faces of four corners; of different sizes; uv per corner."""
     clip = tube(40, 12, 30)
-    quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
-                      for r in range(39) for k in range(12)], np.int32)
+    quads = np.array(
+        [
+            [12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
+            for r in range(39)
+            for k in range(12)
+        ],
+        np.int32,
+    )
     mixed = {"face_vertex_counts": np.full(len(quads), 4, np.int32), "face_vertex_indices": quads.ravel()}
     mixed["face_vertex_counts"][0] = 3
     mixed["face_vertex_indices"] = np.delete(quads.ravel(), 3)
     uv = np.linspace(0, 1, 2 * quads.size, dtype=np.float32).reshape(-1, 2)
-    cases = {"quads.ath": (quads, {}, {}), "mixed.ath": (None, mixed, {}),
-             "corners.ath": (quads, {"uv": uv}, {"domains": {"uv": "corner"}})}
+    cases = {
+        "quads.ath": (quads, {}, {}),
+        "mixed.ath": (None, mixed, {}),
+        "corners.ath": (quads, {"uv": uv}, {"domains": {"uv": "corner"}}),
+    }
     files = {}
     for name, (clip.faces, clip.attributes, clip.metadata) in cases.items():
         clip.metadata = clip.metadata | {"up_axis": "z"}
@@ -678,8 +736,12 @@ def test_meshes_of_all_kinds_are_drawn(opened, tmp_path):
             }""")
             triangles = 2 * len(quads) - (name == "mixed.ath")
             vertices = quads.size if name == "corners.ath" else clip.vertex_count
-            assert mesh == {"index": 3 * triangles, "vertices": vertices, "normal": vertices,
-                            "uv": vertices if name == "corners.ath" else 0}
+            assert mesh == {
+                "index": 3 * triangles,
+                "vertices": vertices,
+                "normal": vertices,
+                "uv": vertices if name == "corners.ath" else 0,
+            }
             page.wait_for_function("() => athcodecViewer.counters.pictures > 5")
             assert ink(page) > 0.01, name
 
@@ -696,8 +758,14 @@ def smooth_normals(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
 @browser_test
 def test_normals_turn_with_the_surface_at_every_level(opened, tmp_path):
     clip = tube(40, 12, 30)
-    quads = np.array([[12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
-                      for r in range(39) for k in range(12)], np.int32)
+    quads = np.array(
+        [
+            [12 * r + k, 12 * r + (k + 1) % 12, 12 * r + 12 + (k + 1) % 12, 12 * r + 12 + k]
+            for r in range(39)
+            for k in range(12)
+        ],
+        np.int32,
+    )
     clip.positions = clip.positions * np.float32(1)
     clip.positions[..., 0] += 0.06 * clip.rest[:, 2] ** 2  # so that it has turned far
     clip.faces = quads

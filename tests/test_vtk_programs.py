@@ -71,15 +71,28 @@ def test_vtk_reads_what_is_written(tmp_path, make, name, gzip):
         assert np.array_equal(out["corners"], [*edges.reshape(-1), *corners])
 
 
-@pytest.mark.parametrize("mode, compressor", [("Ascii", "None"), ("Binary", "None"), ("Binary", "ZLib"),
-                                              ("Appended", "None"), ("Appended", "ZLib"), ("Appended", "LZMA")])
+@pytest.mark.parametrize(
+    "mode, compressor",
+    [
+        ("Ascii", "None"),
+        ("Binary", "None"),
+        ("Binary", "ZLib"),
+        ("Appended", "None"),
+        ("Appended", "ZLib"),
+        ("Appended", "LZMA"),
+    ],
+)
 def test_what_vtk_writes_is_read(tmp_path, mode, compressor):
     clip = mixed_clip()
     counts, corners = clip.polygons
     starts = np.cumsum(counts) - counts
-    cells = [value for count, start in zip(counts, starts) for value in (count, *corners[start: start + count])]
-    np.savez(tmp_path / "in.npz", motion=clip.block(0, 6), cells=np.array([*cells, 2, 5, 6, 2, 6, 7]),
-             types=np.array([*np.where(counts == 3, 5, 9), 3, 3], np.uint8))
+    cells = [value for count, start in zip(counts, starts) for value in (count, *corners[start : start + count])]
+    np.savez(
+        tmp_path / "in.npz",
+        motion=clip.block(0, 6),
+        cells=np.array([*cells, 2, 5, 6, 2, 6, 7]),
+        types=np.array([*np.where(counts == 3, 5, 9), 3, 3], np.uint8),
+    )
     run_script(vtk_python(), WRITE, tmp_path / "in.npz", tmp_path, mode, compressor)
     with athcodec.read(tmp_path / "v_002.vtu", fps=24) as again:
         assert_same_motion(again, clip, 1e-6 if mode == "Ascii" else 0.0)

@@ -75,16 +75,29 @@ class Info(ctypes.Structure):
 
     _fields_ = [(name, ctypes.c_uint64) for name in ("file_length", "prelude_length")]
     _fields_ += [("max_error", c_double), ("origin", c_double * 3)]
-    _fields_ += [(name, c_int32) for name in (
-        "vertex_count", "branch_count", "frame_count", "segment_count", "clip_count", "level_count",
-        "full_level_count", "node_count", "chunk_count", "is_float64")]
+    _fields_ += [
+        (name, c_int32)
+        for name in (
+            "vertex_count",
+            "branch_count",
+            "frame_count",
+            "segment_count",
+            "clip_count",
+            "level_count",
+            "full_level_count",
+            "node_count",
+            "chunk_count",
+            "is_float64",
+        )
+    ]
     _fields_ += [("more", c_int32 * 16)]
 
 
 class Clip(ctypes.Structure):
     _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
-    _fields_ += [(name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop "
-                                              "reserved").split()]
+    _fields_ += [
+        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
+    ]
 
 
 class Native:
@@ -116,8 +129,10 @@ class Native:
 
     def prepare(self, level: int):
         """Pointers to all segments."""
-        work, size = c_size_t(self.lib.ath_work_size(self.file)), c_size_t(
-            self.lib.ath_segment_size(self.file, c_int32(level)))
+        work, size = (
+            c_size_t(self.lib.ath_work_size(self.file)),
+            c_size_t(self.lib.ath_segment_size(self.file, c_int32(level))),
+        )
         segments = [self.block(size.value) for _ in range(self.info.segment_count)]
         scratch = self.block(work.value)
         for i, segment in enumerate(segments):
@@ -133,8 +148,14 @@ class Native:
     def show(self, function: str, shape, dtype, segments, frame: float, *order) -> np.ndarray:
         out = np.zeros(shape, dtype)
         result = getattr(self.lib, function)(
-            self.file, segments, c_int32(len(segments)), c_double(frame), *order, c_void_p(out.ctypes.data),
-            c_size_t(out[:1].nbytes))
+            self.file,
+            segments,
+            c_int32(len(segments)),
+            c_double(frame),
+            *order,
+            c_void_p(out.ctypes.data),
+            c_size_t(out[:1].nbytes),
+        )
         assert result == OK
         return out
 
@@ -175,7 +196,7 @@ def key_framed(seed: int = 3):
 
 def first_chunk(data: bytes) -> int:
     """Where the first chunk begins (FORMAT.md, "Header")."""
-    chunks, segments = (int.from_bytes(data[at: at + 4], "little") for at in (24, 40))
+    chunks, segments = (int.from_bytes(data[at : at + 4], "little") for at in (24, 40))
     return 64 + 16 * chunks + 8 * segments * data[44]
 
 
@@ -183,7 +204,7 @@ def learned_chunks(data: bytes) -> int:
     """How many STEMS chunks bring a time basis of their own (FORMAT.md, "STEMS")."""
     offset, learned = first_chunk(data), 0
     for i in range(int.from_bytes(data[24:28], "little")):
-        kind, length = data[64 + 16 * i], int.from_bytes(data[72 + 16 * i: 76 + 16 * i], "little")
+        kind, length = data[64 + 16 * i], int.from_bytes(data[72 + 16 * i : 76 + 16 * i], "little")
         learned += kind == 16 and data[offset + 5] > 0
         offset += length
     return learned
@@ -243,14 +264,21 @@ def test_every_level_shows_the_bits_of_the_c_library_at_and_between_frames(any_a
     for level in range(native.info.level_count):
         segments = native.prepare(level)
         (nodes, exact), all_frames = native.cut(level), range(native.info.frame_count)
-        wanted.append({
-            "frames": digest(*(native.positions(segments, t) for t in all_frames)),
-            "wide": digest(*(native.positions(segments, t, dtype=np.float64) for t in all_frames)),
-            "between": [digest(
-                native.positions(segments, t, order=0),
-                native.show("ath_matrices", (nodes, 12), np.float32, segments, t),
-                native.show("ath_exact", (exact, 3), np.float32, segments, t),
-                native.show("ath_matrices_float64", (nodes, 12), np.float64, segments, t)) for t in times]})
+        wanted.append(
+            {
+                "frames": digest(*(native.positions(segments, t) for t in all_frames)),
+                "wide": digest(*(native.positions(segments, t, dtype=np.float64) for t in all_frames)),
+                "between": [
+                    digest(
+                        native.positions(segments, t, order=0),
+                        native.show("ath_matrices", (nodes, 12), np.float32, segments, t),
+                        native.show("ath_exact", (exact, 3), np.float32, segments, t),
+                        native.show("ath_matrices_float64", (nodes, 12), np.float64, segments, t),
+                    )
+                    for t in times
+                ],
+            }
+        )
     assert run_node(tmp_path, SHOW, any_ath, json.dumps(times)) == wanted
 
 
@@ -284,22 +312,51 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
     lib.ath_rest_float64(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
     wanted = {
-        "info": [info.file_length, info.prelude_length, info.max_error, list(info.origin), info.vertex_count,
-                 info.branch_count, info.frame_count, info.segment_count, info.clip_count, info.level_count,
-                 info.full_level_count, info.node_count, info.chunk_count, bool(info.is_float64)],
+        "info": [
+            info.file_length,
+            info.prelude_length,
+            info.max_error,
+            list(info.origin),
+            info.vertex_count,
+            info.branch_count,
+            info.frame_count,
+            info.segment_count,
+            info.clip_count,
+            info.level_count,
+            info.full_level_count,
+            info.node_count,
+            info.chunk_count,
+            bool(info.is_float64),
+        ],
         "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 32 * info.branch_count))),
         "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
         "rest": [digest(rest), digest(wide)],
-        "errors": [[native.level_error(level, segment) for segment in (0, info.segment_count - 1)]
-                   for level in range(info.level_count)],
-        "frameAt": [[[lib.ath_frame_at(file, clip, c_double(s), wrap) for s in seconds]
-                     for clip in range(info.clip_count)] for wrap in range(4)],
-        "clips": [[clip.name.decode(), clip.duration, clip.first_frame, clip.frame_count, clip.first_segment,
-                   clip.segment_count, bool(clip.loop),
-                   [lib.ath_seam_error(file, i, level) for level in range(info.level_count)]]
-                  for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])],
-        "levelFor": [lib.ath_level_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080),
-                                       c_double(1)) for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)]}
+        "errors": [
+            [native.level_error(level, segment) for segment in (0, info.segment_count - 1)]
+            for level in range(info.level_count)
+        ],
+        "frameAt": [
+            [[lib.ath_frame_at(file, clip, c_double(s), wrap) for s in seconds] for clip in range(info.clip_count)]
+            for wrap in range(4)
+        ],
+        "clips": [
+            [
+                clip.name.decode(),
+                clip.duration,
+                clip.first_frame,
+                clip.frame_count,
+                clip.first_segment,
+                clip.segment_count,
+                bool(clip.loop),
+                [lib.ath_seam_error(file, i, level) for level in range(info.level_count)],
+            ]
+            for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])
+        ],
+        "levelFor": [
+            lib.ath_level_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
+            for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)
+        ],
+    }
     assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
 
 
@@ -438,18 +495,22 @@ def test_a_damaged_chunk_is_named_and_can_be_fed_anew(sample_ath, tmp_path):
     assert first <= at < first + length
     for error in (result["error"], result["read_back"]):
         assert (error["type"], error["codeName"], error["code"]) == ("AthError", "BAD_CHECKSUM", 5)
-    assert result["chunk"] == hashlib.sha256(data[first: first + length]).hexdigest()
+    assert result["chunk"] == hashlib.sha256(data[first : first + length]).hexdigest()
     assert result["repaired"] == result["undamaged"]
 
 
 OPEN = "answer(thrown(() => AthFile.open(read(path))));"
 
 
-@pytest.mark.parametrize("at, name, in_chunk, sentence", [
-    (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
-    (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.4; expected 0.4"),
-    (70, "BAD_CHECKSUM", False, "header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
-    (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}")])
+@pytest.mark.parametrize(
+    "at, name, in_chunk, sentence",
+    [
+        (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
+        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.4; expected 0.4"),
+        (70, "BAD_CHECKSUM", False, "header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
+        (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
+    ],
+)
 def test_a_file_that_cannot_be_opened_is_an_error_with_a_code(sample_ath, tmp_path, at, name, in_chunk, sentence):
     """at: the byte that is damaged; -1: one of the hierarchy. The sentence is that of C and of Python."""
     at = first_chunk(sample_ath.read_bytes()) + 20 if at < 0 else at

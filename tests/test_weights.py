@@ -69,12 +69,15 @@ def test_verify_checks_vertex_by_vertex(twiggy, tmp_path, capsys):
     assert not json.loads(capsys.readouterr().out)["clips"][0]["levels"][-1]["kept"]
 
 
-@pytest.mark.parametrize("weights, message", [
-    ("nothing", "weights: got 'nothing', expected one of slack"),
-    (np.ones(3), "weights: got float64 of shape"),
-    ("zero", "weights: vertex 4 has 0 in 'zero', expected a number above 0"),
-    ("nan", "weights: vertex 4 has nan"),
-])
+@pytest.mark.parametrize(
+    "weights, message",
+    [
+        ("nothing", "weights: got 'nothing', expected one of slack"),
+        (np.ones(3), "weights: got float64 of shape"),
+        ("zero", "weights: vertex 4 has 0 in 'zero', expected a number above 0"),
+        ("nan", "weights: vertex 4 has nan"),
+    ],
+)
 def test_unusable_weights_are_refused(twiggy, tmp_path, weights, message):
     for name, value in (("zero", 0.0), ("nan", np.nan)):
         if isinstance(weights, str) and weights == name:

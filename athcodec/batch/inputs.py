@@ -25,8 +25,17 @@ from athcodec.sources.sequence import sequence_files
 
 FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtk")  # of formats that have one file per frame
 SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
-TAGS = ("ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified", "mtime", "md5Hash", "generation",
-        "created")  # what file systems say of a file that changes with it
+TAGS = (
+    "ETag",
+    "Last-Modified",
+    "Content-MD5",
+    "LastModified",
+    "last_modified",
+    "mtime",
+    "md5Hash",
+    "generation",
+    "created",
+)  # what file systems say of a file that changes with it
 
 
 @dataclass(frozen=True)
@@ -59,9 +68,13 @@ class Item:
         return without_secrets(self.input) if is_url(self.input) else self.input
 
 
-def find(inputs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str], *,
-         settings: Mapping[str, Any] | None = None,
-         patterns: Mapping[str, Mapping[str, Any]] | None = None) -> list[Item]:
+def find(
+    inputs: Iterable[str | os.PathLike[str]],
+    output: str | os.PathLike[str],
+    *,
+    settings: Mapping[str, Any] | None = None,
+    patterns: Mapping[str, Mapping[str, Any]] | None = None,
+) -> list[Item]:
     """List the clips of a batch.
 
     Parameters
@@ -106,8 +119,9 @@ def _target(output: str, name: str) -> str:
     if not is_url(output):
         return os.path.abspath(os.path.join(output, name))
     if "::" in output or "?" in output:
-        raise ClipError(f"{without_secrets(output)}: got a chain of file systems or a query, expected the plain URL "
-                        "of a directory")
+        raise ClipError(
+            f"{without_secrets(output)}: got a chain of file systems or a query, expected the plain URL of a directory"
+        )
     return f"{output.rstrip('/')}/{name}"
 
 
@@ -126,19 +140,30 @@ def _named(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[tuple[str, str]
         pairs = list(_remote(given) if is_url(given) else _local(given))
         yield from pairs
         if not pairs:
-            raise ClipError(f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits "
-                            "some")
+            raise ClipError(
+                f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits some"
+            )
 
 
 def _local(given: str) -> Iterator[tuple[str, str]]:
     if os.path.isdir(given):
-        yield from _below(given, (os.path.join(folder, name) for folder, folders, names in os.walk(given)
-                                  for _ in [folders.sort()] for name in sorted(names) if _is_clip(name)))
+        yield from _below(
+            given,
+            (
+                os.path.join(folder, name)
+                for folder, folders, names in os.walk(given)
+                for _ in [folders.sort()]
+                for name in sorted(names)
+                if _is_clip(name)
+            ),
+        )
     elif os.path.exists(given) or is_pattern(given):
         yield os.path.basename(given), os.path.abspath(given)
     elif glob.has_magic(given):
-        yield from _below(_fixed_part(given, os.sep), (
-            path for path in sorted(glob.glob(given, recursive=True)) if os.path.isfile(path)))
+        yield from _below(
+            _fixed_part(given, os.sep),
+            (path for path in sorted(glob.glob(given, recursive=True)) if os.path.isfile(path)),
+        )
     else:
         raise FileNotFoundError(f"{given}: No such file or directory")
 

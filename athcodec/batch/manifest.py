@@ -90,8 +90,10 @@ class Manifest:
         except (BlockingIOError, PermissionError):
             raise ManifestError(f"{self.path}: another run has this manifest open, expected one at a time") from None
         except OSError as error:
-            raise ManifestError(f"{self.path}: cannot be locked here ({error.strerror}), expected a file system with "
-                                "locks; --manifest may name a file elsewhere") from None
+            raise ManifestError(
+                f"{self.path}: cannot be locked here ({error.strerror}), expected a file system with "
+                "locks; --manifest may name a file elsewhere"
+            ) from None
 
 
 def read_records(path: str | os.PathLike[str]) -> dict[str, Record]:

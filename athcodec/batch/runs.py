@@ -38,8 +38,7 @@ SPLIT = 4  # segments
 PATIENCE = 0.25  # seconds between looks at the scheduler
 CONNECTING = 30  # seconds, to a scheduler, and of a scheduler without workers
 ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
-LOST = ("scheduler: the connection was lost, expected one until the end; the same command goes on where this one "
-        "ended")
+LOST = "scheduler: the connection was lost, expected one until the end; the same command goes on where this one ended"
 
 
 class SchedulerError(AthError):
@@ -94,8 +93,13 @@ class Todo:
     known: Record | None = None
 
 
-def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
-            redo: bool = False) -> list[Todo]:
+def preview(
+    items: Sequence[Item],
+    output: str | os.PathLike[str],
+    *,
+    manifest: str | os.PathLike[str] | None = None,
+    redo: bool = False,
+) -> list[Todo]:
     """What `run` would do with each clip. Nothing is written.
 
     Parameters
@@ -119,9 +123,18 @@ def preview(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: 
     return [_todo(item, records.get(_key(item, output)), redo) for item in items]
 
 
-def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str | os.PathLike[str] | None = None,
-        workers: int | None = None, scheduler: str | None = None, split: int = SPLIT, verify: bool = False,
-        redo: bool = False, show: Show | None = None) -> Outcome:
+def run(
+    items: Sequence[Item],
+    output: str | os.PathLike[str],
+    *,
+    manifest: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    split: int = SPLIT,
+    verify: bool = False,
+    redo: bool = False,
+    show: Show | None = None,
+) -> Outcome:
     """Encode those clips of a batch whose files are not up to date.
 
     Parameters
@@ -190,8 +203,9 @@ def run(items: Sequence[Item], output: str | os.PathLike[str], *, manifest: str 
 
 def _manifest_path(output: str | os.PathLike[str], manifest: str | os.PathLike[str] | None) -> str:
     if manifest is None and is_url(output):
-        raise ManifestError(f"{without_secrets(output)}: got no manifest, expected a file of this machine where "
-                            "outputs go to a URL")
+        raise ManifestError(
+            f"{without_secrets(output)}: got no manifest, expected a file of this machine where outputs go to a URL"
+        )
     return os.path.abspath(manifest or os.path.join(output, MANIFEST))
 
 
@@ -208,7 +222,7 @@ def _tidy(outputs: Iterable[str]) -> None:
 def _key(item: Item, output: str | os.PathLike[str]) -> str:
     """What the manifest calls an output: the directory may be moved with it."""
     if is_url(item.output):
-        return item.output[len(os.fspath(output).rstrip("/")) + 1:]
+        return item.output[len(os.fspath(output).rstrip("/")) + 1 :]
     return Path(os.path.relpath(item.output, output)).as_posix()
 
 
@@ -262,8 +276,14 @@ def _cluster(workers: int) -> Any:
     try:
         with _interrupts_held_back(), dask.config.set({ENVIRONMENT: environment}):
             return distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, security=private,
-                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL)
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                security=private,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,
+            )
     except (OSError, RuntimeError) as error:
         raise SchedulerError(f"workers: cannot be started: {one_line(error)}") from None
 
@@ -308,8 +328,17 @@ def _interrupts_held_back() -> Iterator[None]:
 class _Run:
     """The clips that workers encode, and their results."""
 
-    def __init__(self, client: Any, output: str, folder: str, notes: Manifest, outcome: Outcome, show: Show, split: int,
-                 verify: bool):
+    def __init__(
+        self,
+        client: Any,
+        output: str,
+        folder: str,
+        notes: Manifest,
+        outcome: Outcome,
+        show: Show,
+        split: int,
+        verify: bool,
+    ):
         self.client, self.output, self.folder, self.notes = client, output, folder, notes
         self.outcome, self.show, self.split, self.verify = outcome, show, split, verify
         self.topic = f"{SCRATCH}-{secrets.token_hex(8)}"
@@ -330,8 +359,17 @@ class _Run:
             for entry in todo:
                 if not is_url(entry.item.output):
                     os.makedirs(os.path.dirname(entry.item.output), exist_ok=True)
-                self._submit(entry.item, "begin", tasks.begin, self._folder(entry.item), split=self.split,
-                             verify=self.verify, version=athcodec.__version__, topic=self.topic, known=entry.known)
+                self._submit(
+                    entry.item,
+                    "begin",
+                    tasks.begin,
+                    self._folder(entry.item),
+                    split=self.split,
+                    verify=self.verify,
+                    version=athcodec.__version__,
+                    topic=self.topic,
+                    known=entry.known,
+                )
             while self.pending:
                 self._take()
         finally:
@@ -373,8 +411,10 @@ class _Run:
         if self.client.scheduler_info()["workers"]:
             self.seen_workers = time.monotonic()
         elif time.monotonic() - self.seen_workers > CONNECTING:
-            raise SchedulerError(f"scheduler: got no worker for {CONNECTING} s, expected at least one; the same "
-                                 "command goes on where this one ended")
+            raise SchedulerError(
+                f"scheduler: got no worker for {CONNECTING} s, expected at least one; the same "
+                "command goes on where this one ended"
+            )
 
     def _result(self, future: Any, item: Item) -> Result:
         import distributed
@@ -383,8 +423,10 @@ class _Run:
             return future.result()
         except distributed.scheduler.KilledWorker as error:
             times = getattr(error, "allowed_failures", 0) + 1
-            return {"failed": f"{item.shown}: {times} workers died that worked on it, expected none to; perhaps there "
-                              "is too little memory"}
+            return {
+                "failed": f"{item.shown}: {times} workers died that worked on it, expected none to; perhaps there "
+                "is too little memory"
+            }
         except Exception as error:
             if future.status == "cancelled":
                 raise SchedulerError(LOST) from None
@@ -407,11 +449,18 @@ class _Run:
             self.show.kept(item)
             return
         if "done" in result and is_url(item.output) and _fault_of_output(item, result["done"]):
-            result = {"failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
-                                "workers need a file system that all share"}
+            result = {
+                "failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
+                "workers need a file system that all share"
+            }
         status = "done" if "done" in result else "failed"
-        record = {"output": _key(item, self.output), "input": item.shown, "status": status, "settings": item.settings,
-                  "version": athcodec.__version__}
+        record = {
+            "output": _key(item, self.output),
+            "input": item.shown,
+            "status": status,
+            "settings": item.settings,
+            "version": athcodec.__version__,
+        }
         record |= result.get("done") or {"reason": result["failed"]}
         self.notes.add(record)
         (self.outcome.done if "done" in result else self.outcome.failed).append(record)

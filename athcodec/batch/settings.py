@@ -71,8 +71,9 @@ def load_settings(path: str | os.PathLike[str]) -> dict[str, Settings]:
     return content
 
 
-def check_settings(settings: Mapping[str, Any], where: str = "settings",
-                   folder: str | os.PathLike[str] = ".") -> Settings:
+def check_settings(
+    settings: Mapping[str, Any], where: str = "settings", folder: str | os.PathLike[str] = "."
+) -> Settings:
     """Check the settings of clips, and bring them to the form in which the manifest has them.
 
     Parameters
@@ -237,10 +238,26 @@ def _path(value: Any) -> str:
 
 _BOOL, _TEXT = _of_kind(bool, "true or false"), _of_kind(str, "text")
 _CHECKS: dict[str, Callable[[Any], Any]] = {
-    "max_error": _positive_length, "rel_error": _fraction, "target_size": _size,
-    "segment_frames": _whole(MIN_SEGMENT, MAX_SEGMENT), "tam": _tam, "hierarchy": _path, "exact_rest": _BOOL,
-    "lossless": _BOOL, "weights": _TEXT, "attributes": _one_of("all", "none"), "effort": _one_of(*EFFORTS),
-    "source_format": _format, "rest": _one_of("auto", "first", "mean"), "fps": _rate, "mesh": _path, "field": _TEXT,
-    "only": _patterns, "takes": _patterns, "unit": _TEXT, "up_axis": _one_of("x", "y", "z"),
-    "loop": _BOOL, "loop_blend": _whole(0, 1 << 31),
+    "max_error": _positive_length,
+    "rel_error": _fraction,
+    "target_size": _size,
+    "segment_frames": _whole(MIN_SEGMENT, MAX_SEGMENT),
+    "tam": _tam,
+    "hierarchy": _path,
+    "exact_rest": _BOOL,
+    "lossless": _BOOL,
+    "weights": _TEXT,
+    "attributes": _one_of("all", "none"),
+    "effort": _one_of(*EFFORTS),
+    "source_format": _format,
+    "rest": _one_of("auto", "first", "mean"),
+    "fps": _rate,
+    "mesh": _path,
+    "field": _TEXT,
+    "only": _patterns,
+    "takes": _patterns,
+    "unit": _TEXT,
+    "up_axis": _one_of("x", "y", "z"),
+    "loop": _BOOL,
+    "loop_blend": _whole(0, 1 << 31),
 }

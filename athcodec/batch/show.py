@@ -103,8 +103,10 @@ class LiveTable(Show):
         with self.lock:
             rows, counts = sorted(self.rows.items(), key=lambda row: row[1][0] in ENDED), dict(self.counts)
         ended = counts["done"] + counts["failed"]
-        head = (f"{ended} of {self.total}: {counts['done']} done, {counts['failed']} failed, {counts['kept']} kept, "
-                f"{self.bytes:,} bytes, {time.monotonic() - self.start:.0f} s")
+        head = (
+            f"{ended} of {self.total}: {counts['done']} done, {counts['failed']} failed, {counts['kept']} kept, "
+            f"{self.bytes:,} bytes, {time.monotonic() - self.start:.0f} s"
+        )
         table = Table(box=SIMPLE_HEAD, pad_edge=False, expand=True)
         table.add_column("clip", no_wrap=True, ratio=2)
         table.add_column("state", no_wrap=True, min_width=8)

@@ -35,8 +35,16 @@ Result = dict[str, Any]
 Report = Callable[[str, float], None]
 
 
-def begin(item: Item, folder: str, *, split: int, verify: bool, version: str, topic: str | None = None,
-          known: dict[str, Any] | None = None) -> Result:
+def begin(
+    item: Item,
+    folder: str,
+    *,
+    split: int,
+    verify: bool,
+    version: str,
+    topic: str | None = None,
+    known: dict[str, Any] | None = None,
+) -> Result:
     """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
     folder. known: the record of an output that is up to date unless the content of its input has changed."""
     return _result(lambda: _begin(item, folder, split, verify, version, _reporter(item, topic), known), item, folder)
@@ -55,8 +63,9 @@ def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool, to
     return _result(lambda: _finish(item, folder, parts, verify, _reporter(item, topic)), item, folder)
 
 
-def _begin(item: Item, folder: str, split: int, verify: bool, version: str, report: Report,
-           known: dict[str, Any] | None) -> Result:
+def _begin(
+    item: Item, folder: str, split: int, verify: bool, version: str, report: Report, known: dict[str, Any] | None
+) -> Result:
     if version != athcodec.__version__:
         raise AthError(f"worker: has athcodec {athcodec.__version__}, expected {version} as where the run was started")
     start = time.perf_counter()
@@ -101,11 +110,22 @@ def _done(item: Item, source: dict[str, Any], summary: encoding.Summary, verify:
             decoder.file.check()
     stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
     last = summary.levels[-1]
-    return {"done": stored | {
-        "source": source, "bytes": summary.bytes, "raw_bytes": summary.raw_bytes,
-        "max_error_bound": summary.max_error_bound, "relative_bound": summary.relative_bound,
-        "max_error": last.max_error, "rms_error": last.rms_error, "levels": len(summary.levels),
-        "sha256": sha256(summary.path), "verified": verify, "seconds": round(time.perf_counter() - start, 3)}}
+    return {
+        "done": stored
+        | {
+            "source": source,
+            "bytes": summary.bytes,
+            "raw_bytes": summary.raw_bytes,
+            "max_error_bound": summary.max_error_bound,
+            "relative_bound": summary.relative_bound,
+            "max_error": last.max_error,
+            "rms_error": last.rms_error,
+            "levels": len(summary.levels),
+            "sha256": sha256(summary.path),
+            "verified": verify,
+            "seconds": round(time.perf_counter() - start, 3),
+        }
+    }
 
 
 # ---- the clip ----

@@ -43,9 +43,11 @@ def pack(output: Path, wheels: Sequence[Path]) -> None:
     platforms = sorted({platform(wheel) for wheel in own})
     names = sorted({wheel.name: wheel for wheel in wheels})
     manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
-    for before, after in (('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
-                          ("platforms = []", f"platforms = {_toml(platforms)}"),
-                          ("wheels = []", f"wheels = {_toml([f'./wheels/{name}' for name in names])}")):
+    for before, after in (
+        ('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
+        ("platforms = []", f"platforms = {_toml(platforms)}"),
+        ("wheels = []", f"wheels = {_toml([f'./wheels/{name}' for name in names])}"),
+    ):
         manifest = manifest.replace(before, after)
     with new_file(output) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("blender_manifest.toml", manifest)
@@ -77,8 +79,24 @@ def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
     for tag in sorted({wheel.stem.split("-")[-1] for wheel in wheels}):
         tags = [option for name in _pip_platforms(tag) for option in ("--platform", name)]
         for python in PYTHONS:
-            subprocess.run([sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
-                            "--python-version", python, *tags, "--dest", str(folder), *missing], check=True)
+            subprocess.run(
+                [
+                    sys.executable,
+                    "-m",
+                    "pip",
+                    "download",
+                    "--quiet",
+                    "--no-deps",
+                    "--only-binary=:all:",
+                    "--python-version",
+                    python,
+                    *tags,
+                    "--dest",
+                    str(folder),
+                    *missing,
+                ],
+                check=True,
+            )
     return sorted(folder.glob("*.whl"))
 
 

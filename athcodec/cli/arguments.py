@@ -39,96 +39,176 @@ def make_parser() -> argparse.ArgumentParser:
         sub.set_defaults(run=run)
         return sub
 
-    _encode_arguments(verb(
-        "encode", verbs.encode, "compress a motion into an .ath file",
-        f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
-        f"{LOSSLESS_REL_ERROR:g}.",
-    ))
-    _batch_arguments(verb(
-        "batch", verbs.batch, "compress many motions, by several processes",
-        "An interrupted run goes on where it ended when the command is given again. "
-        "Exit code 1 where a clip failed; the others are done all the same.",
-    ))
-    _decode_arguments(verb(
-        "decode", verbs.decode, "write the motion of an .ath file in another format",
-        "A file that was cut off is decoded to its deepest complete level, with a warning.",
-    ))
+    _encode_arguments(
+        verb(
+            "encode",
+            verbs.encode,
+            "compress a motion into an .ath file",
+            f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
+            f"{LOSSLESS_REL_ERROR:g}.",
+        )
+    )
+    _batch_arguments(
+        verb(
+            "batch",
+            verbs.batch,
+            "compress many motions, by several processes",
+            "An interrupted run goes on where it ended when the command is given again. "
+            "Exit code 1 where a clip failed; the others are done all the same.",
+        )
+    )
+    _decode_arguments(
+        verb(
+            "decode",
+            verbs.decode,
+            "write the motion of an .ath file in another format",
+            "A file that was cut off is decoded to its deepest complete level, with a warning.",
+        )
+    )
     _info_arguments(verb("info", verbs.info, "show what an .ath file holds, level by level"))
-    _verify_arguments(verb(
-        "verify", verbs.verify, "check that an .ath file is whole and undamaged, and how far off its source it is",
-        "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
-    ))
+    _verify_arguments(
+        verb(
+            "verify",
+            verbs.verify,
+            "check that an .ath file is whole and undamaged, and how far off its source it is",
+            "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
+        )
+    )
     _truncate_arguments(verb("truncate", verbs.truncate, "leave out the levels beyond one, without decoding"))
-    _hierarchy_arguments(verb(
-        "hierarchy", verbs.hierarchy, "find the branches of a source that names none",
-        "Encoding does so by itself; here the result is shown, and saved to be edited.",
-    ))
+    _hierarchy_arguments(
+        verb(
+            "hierarchy",
+            verbs.hierarchy,
+            "find the branches of a source that names none",
+            "Encoding does so by itself; here the result is shown, and saved to be edited.",
+        )
+    )
     formats = verb("formats", verbs.formats, "list the formats that are read and written, and what each needs")
     formats.add_argument("--json", action="store_true", help="print as JSON")
-    _view_arguments(verb(
-        "view", verbs.view, "play an .ath file in a browser",
-        "Serves the viewer on this computer only, until it is interrupted.",
-    ))
-    _demo_arguments(verb(
-        "demo", verbs.demo, "encode the included sample, decode and measure every level",
-        f"Ends with a page that shows it, {verbs.DEMO_PAGE}, in DIR or in the current folder.",
-    ))
+    _view_arguments(
+        verb(
+            "view",
+            verbs.view,
+            "play an .ath file in a browser",
+            "Serves the viewer on this computer only, until it is interrupted.",
+        )
+    )
+    _demo_arguments(
+        verb(
+            "demo",
+            verbs.demo,
+            "encode the included sample, decode and measure every level",
+            f"Ends with a page that shows it, {verbs.DEMO_PAGE}, in DIR or in the current folder.",
+        )
+    )
     return parser
 
 
 def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.usage = "athcodec encode IN [IN ...] OUT.ath [options]"
-    verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists; several "
-                      "of one plant share their hierarchy and rest pose in the file")
+    verb.add_argument(
+        "input",
+        metavar="IN",
+        help="a clip in one of the formats that `athcodec formats` lists; several "
+        "of one plant share their hierarchy and rest pose in the file",
+    )
     verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)
-    verb.add_argument("-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front "
-                      "of it or behind")
-    verb.add_argument("--names", metavar="NAME,...", type=_argument(_names),
-                      help="of the clips (default: their own, such as those of takes; else, of several, their files' "
-                      "names without suffix)")
-    verb.add_argument("--loop", metavar="NAME,...", type=_argument(_names),
-                      help="clips that are loops, their first frame following their last; all: every one")
-    verb.add_argument("--loop-blend", metavar="FRAMES", type=_argument(_whole), default=0,
-                      help="for loops that do not end where they began: take so many frames off their end and blend "
-                      "them into those at their beginning")
+    verb.add_argument(
+        "-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front of it or behind"
+    )
+    verb.add_argument(
+        "--names",
+        metavar="NAME,...",
+        type=_argument(_names),
+        help="of the clips (default: their own, such as those of takes; else, of several, their files' "
+        "names without suffix)",
+    )
+    verb.add_argument(
+        "--loop",
+        metavar="NAME,...",
+        type=_argument(_names),
+        help="clips that are loops, their first frame following their last; all: every one",
+    )
+    verb.add_argument(
+        "--loop-blend",
+        metavar="FRAMES",
+        type=_argument(_whole),
+        default=0,
+        help="for loops that do not end where they began: take so many frames off their end and blend "
+        "them into those at their beginning",
+    )
     _source_arguments(verb)
     _coding_arguments(verb)
-    verb.add_argument("--jobs", metavar="N", type=_argument(_jobs), help="threads (default: one per core, at most 4, "
-                      "fewer for large meshes); the file is the same whatever their number")
+    verb.add_argument(
+        "--jobs",
+        metavar="N",
+        type=_argument(_jobs),
+        help="threads (default: one per core, at most 4, "
+        "fewer for large meshes); the file is the same whatever their number",
+    )
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 class _Output(argparse.Action):
     """Says where to, so that no further path has to."""
 
-    def __call__(self, parser: argparse.ArgumentParser, args: argparse.Namespace, value: Any,
-                 option: Any = None) -> None:
+    def __call__(
+        self, parser: argparse.ArgumentParser, args: argparse.Namespace, value: Any, option: Any = None
+    ) -> None:
         args.output = value
         next(action for action in parser._actions if action.dest == "paths").required = False
 
 
 def _batch_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("inputs", metavar="IN", nargs="*", help="files, directories, patterns such as 'trees/**/*.h5', "
-                      "or URLs of them that fsspec knows (a directory's ends in a slash)")
+    verb.add_argument(
+        "inputs",
+        metavar="IN",
+        nargs="*",
+        help="files, directories, patterns such as 'trees/**/*.h5', "
+        "or URLs of them that fsspec knows (a directory's ends in a slash)",
+    )
     verb.add_argument("--list", metavar="FILE", help="a file with further inputs, one per line; - is stdin")
-    verb.add_argument("--out", metavar="DIR", required=True, help="directory of the .ath files and of the manifest, or "
-                      "the URL of one that fsspec can write to")
-    verb.add_argument("--settings", metavar="FILE.toml", help='settings by pattern of the clip\'s name: ["oaks/*"] and '
-                      'below it options of encode, such as max_error = "1mm"; they come before those given here')
+    verb.add_argument(
+        "--out",
+        metavar="DIR",
+        required=True,
+        help="directory of the .ath files and of the manifest, or the URL of one that fsspec can write to",
+    )
+    verb.add_argument(
+        "--settings",
+        metavar="FILE.toml",
+        help='settings by pattern of the clip\'s name: ["oaks/*"] and '
+        'below it options of encode, such as max_error = "1mm"; they come before those given here',
+    )
     verb.add_argument("--workers", metavar="N", type=_argument(_jobs), help="processes (default: one per core)")
-    verb.add_argument("--scheduler", metavar="ADDRESS", help="of a running Dask cluster that sees the same paths, in "
-                      "place of processes on this machine")
-    verb.add_argument("--split", metavar="SEGMENTS", type=_argument(_jobs), help="clips of more segments are "
-                      "coded so many at a time by whatever worker is free (default 4)")
-    verb.add_argument("--manifest", metavar="FILE.jsonl", help="what is done and what failed (default: "
-                      "athcodec-batch.jsonl in DIR; needed where that is a URL)")
+    verb.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a running Dask cluster that sees the same paths, in place of processes on this machine",
+    )
+    verb.add_argument(
+        "--split",
+        metavar="SEGMENTS",
+        type=_argument(_jobs),
+        help="clips of more segments are coded so many at a time by whatever worker is free (default 4)",
+    )
+    verb.add_argument(
+        "--manifest",
+        metavar="FILE.jsonl",
+        help="what is done and what failed (default: athcodec-batch.jsonl in DIR; needed where that is a URL)",
+    )
     verb.add_argument("--redo", action="store_true", help="encode everything again")
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
     verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
-    verb.add_argument("--loop-blend", metavar="FRAMES", type=_argument(_whole), help="make loops of clips that do not "
-                      "end where they began: take so many frames off their end and blend them into those at their "
-                      "beginning")
+    verb.add_argument(
+        "--loop-blend",
+        metavar="FRAMES",
+        type=_argument(_whole),
+        help="make loops of clips that do not "
+        "end where they began: take so many frames off their end and blend them into those at their "
+        "beginning",
+    )
     _source_arguments(verb)
     _coding_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -137,49 +217,70 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
 def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
-        "--max-error", metavar="LENGTH", type=_argument(_positive_length),
+        "--max-error",
+        metavar="LENGTH",
+        type=_argument(_positive_length),
         help="largest distance of any vertex in any frame from the source: in scene units, or 1mm, 0.5cm, "
         f"2in ({', '.join(METRES)}) where the clip says its unit",
     )
     bound.add_argument(
-        "--rel-error", metavar="FRACTION", type=_argument(_fraction),
+        "--rel-error",
+        metavar="FRACTION",
+        type=_argument(_fraction),
         help="the same as a fraction of the diagonal of the bounding box over all frames "
         f"(default {DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g})",
     )
     bound.add_argument(
-        "--target-size", metavar="SIZE", type=_argument(parse_size),
+        "--target-size",
+        metavar="SIZE",
+        type=_argument(parse_size),
         help="the smallest error whose file is not larger: bytes, 50kB, 1.5MB (1 kB = 1,000 bytes), 48KiB",
     )
     verb.add_argument(
-        "--segment-frames", metavar="FRAMES", type=_argument(_segment_frames),
+        "--segment-frames",
+        metavar="FRAMES",
+        type=_argument(_segment_frames),
         help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}); what is "
         "decoded at once, so shorter ones seek faster and make larger files",
     )
     verb.add_argument(
-        "--tam", metavar="EPS,ETA,XI,LAMBDA", type=_argument(_tam),
+        "--tam",
+        metavar="EPS,ETA,XI,LAMBDA",
+        type=_argument(_tam),
         help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI "
         "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument(
-        "--hierarchy", metavar="FILE|METHOD", help="branches from a file of `athcodec hierarchy --save` or a .mtg, or "
+        "--hierarchy",
+        metavar="FILE|METHOD",
+        help="branches from a file of `athcodec hierarchy --save` or a .mtg, or "
         f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, "
         "else those of several candidates that make the smallest file)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
-    verb.add_argument("--lossless", action="store_true",
-                      help="one more level gives positions and rest pose bit for bit; the bound is for the one before")
-    verb.add_argument("--weights", metavar="NAME", help="attribute with a factor on the bound for each vertex: 4 where "
-                      "it may be four times as far off")
     verb.add_argument(
-        "--attributes", choices=("all", "none"), default="all",
+        "--lossless",
+        action="store_true",
+        help="one more level gives positions and rest pose bit for bit; the bound is for the one before",
+    )
+    verb.add_argument(
+        "--weights",
+        metavar="NAME",
+        help="attribute with a factor on the bound for each vertex: 4 where it may be four times as far off",
+    )
+    verb.add_argument(
+        "--attributes",
+        choices=("all", "none"),
+        default="all",
         help="keep edges, faces, metadata and all named arrays, or only unit and up axis (default all)",
     )
     verb.add_argument(
-        "--effort", choices=EFFORTS, default="default",
-        help="how long to look for a smaller file (default: default)",
+        "--effort", choices=EFFORTS, default="default", help="how long to look for a smaller file (default: default)"
     )
     verb.add_argument(
-        "--rest", choices=("auto", "first", "mean"), default="auto",
+        "--rest",
+        choices=("auto", "first", "mean"),
+        default="auto",
         help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all "
         "(default auto)",
     )
@@ -187,18 +288,33 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source = verb.add_argument_group("reading the source")
-    source.add_argument("--source-format", metavar="NAME",
-                        help="of `athcodec formats` (default: known by the file's content and suffix)")
-    source.add_argument("--fps", metavar="RATE", type=_argument(_rate),
-                        help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves "
-                        "are sampled, or that of a source that does not say its own")
+    source.add_argument(
+        "--source-format",
+        metavar="NAME",
+        help="of `athcodec formats` (default: known by the file's content and suffix)",
+    )
+    source.add_argument(
+        "--fps",
+        metavar="RATE",
+        type=_argument(_rate),
+        help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves "
+        "are sampled, or that of a source that does not say its own",
+    )
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
     source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
-    source.add_argument("--only", metavar="PATTERN", action="append",
-                        help="read the prims, objects or meshes of these names only; may be repeated")
-    source.add_argument("--takes", metavar="NAME,...", type=_argument(_names),
-                        help="read these animations of a glTF file, each as a clip of its own; all: every one "
-                        "(default: the one that players begin with)")
+    source.add_argument(
+        "--only",
+        metavar="PATTERN",
+        action="append",
+        help="read the prims, objects or meshes of these names only; may be repeated",
+    )
+    source.add_argument(
+        "--takes",
+        metavar="NAME,...",
+        type=_argument(_names),
+        help="read these animations of a glTF file, each as a clip of its own; all: every one "
+        "(default: the one that players begin with)",
+    )
     source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
     source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
 
@@ -207,22 +323,36 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
     verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
-    verb.add_argument("--clip", metavar="NAME", help="the clip to decode; without it glTF holds all of a file that "
-                      "has several, as animations of their names")
+    verb.add_argument(
+        "--clip",
+        metavar="NAME",
+        help="the clip to decode; without it glTF holds all of a file that has several, as animations of their names",
+    )
     _stats_argument(verb)
     verb.add_argument(
-        "--level", "--depth", metavar="LEVEL", type=_argument(_whole),
+        "--level",
+        "--depth",
+        metavar="LEVEL",
+        type=_argument(_whole),
         help="level of detail, from 0, the whole plant as one piece (default: the deepest complete one)",
     )
     verb.add_argument(
-        "--frames", metavar="A:B", type=_argument(_frame_bounds), default=(None, None),
+        "--frames",
+        metavar="A:B",
+        type=_argument(_frame_bounds),
+        default=(None, None),
         help="frames A to B - 1, counted from 0; A: to the end, :B from the start (default: all)",
     )
     verb.add_argument("--gzip", action="store_true", help="compress where the format can: smaller, slower, no loss")
-    verb.add_argument("--animation", choices=("auto", "joints", "morphs"), default="auto",
-                      help="how glTF moves (default auto: joints where they keep within the file's error)")
     verb.add_argument(
-        "--allow-partial", action="store_true",
+        "--animation",
+        choices=("auto", "joints", "morphs"),
+        default="auto",
+        help="how glTF moves (default auto: joints where they keep within the file's error)",
+    )
+    verb.add_argument(
+        "--allow-partial",
+        action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",
     )
 
@@ -233,11 +363,19 @@ def _stats_argument(verb: argparse.ArgumentParser) -> None:
 
 def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
-    verb.add_argument("--method", choices=("auto", *discovery.METHODS), default="auto",
-                      help="by attributes named like branch ids, the joints of a skin, an edge graph, the pieces of a "
-                      "mesh, or motion (default auto: the first of them that applies)")
-    verb.add_argument("--root", metavar="VERTEX", type=_argument(_whole),
-                      help="a vertex of the trunk (default: of a large branch that moves least)")
+    verb.add_argument(
+        "--method",
+        choices=("auto", *discovery.METHODS),
+        default="auto",
+        help="by attributes named like branch ids, the joints of a skin, an edge graph, the pieces of a "
+        "mesh, or motion (default auto: the first of them that applies)",
+    )
+    verb.add_argument(
+        "--root",
+        metavar="VERTEX",
+        type=_argument(_whole),
+        help="a vertex of the trunk (default: of a large branch that moves least)",
+    )
     verb.add_argument("--save", metavar="FILE.json", help="write the branches there, for encode --hierarchy")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print as JSON")
@@ -252,8 +390,12 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
-    verb.add_argument("--against", metavar="SOURCE", action="append",
-                      help="the source: measure the error of every level; of several clips all, in the file's order")
+    verb.add_argument(
+        "--against",
+        metavar="SOURCE",
+        action="append",
+        help="the source: measure the error of every level; of several clips all, in the file's order",
+    )
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -269,12 +411,14 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
-    verb.add_argument("--port", metavar="PORT", type=_argument(_whole), default=0,
-                      help="of the address (default: a free one)")
+    verb.add_argument(
+        "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
+    )
     verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    verb.add_argument("--export", metavar="PAGE.html",
-                      help="write one page with the file and the viewer inside, and serve nothing")
+    verb.add_argument(
+        "--export", metavar="PAGE.html", help="write one page with the file and the viewer inside, and serve nothing"
+    )
 
 
 def _demo_arguments(verb: argparse.ArgumentParser) -> None:

@@ -63,8 +63,11 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
 def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
     played, others = (clip.metadata.get(name) for name in ("animations", "other_animations"))
     if others and not args.only:
-        say("takes", f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
-                      "--takes all makes a clip of each")
+        say(
+            "takes",
+            f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
+            "--takes all makes a clip of each",
+        )
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
@@ -77,14 +80,18 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     return ClipView(decoder, args.level, all_clips=True)
 
 
-def with_sources(decoder: Decoder, args: argparse.Namespace,
-                 opened: ExitStack) -> list[tuple[Decoder, str, MotionClip]]:
+def with_sources(
+    decoder: Decoder, args: argparse.Namespace, opened: ExitStack
+) -> list[tuple[Decoder, str, MotionClip]]:
     """The clips to verify, and what to compare each with: a clip of a file."""
     if not args.against:
         return []
     played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.clips]
-    sources = [(path, clip) for path in args.against
-               for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()]
+    sources = [
+        (path, clip)
+        for path in args.against
+        for clip in athcodec.split(opened.enter_context(read_clip(args, path))).values()
+    ]
     if len(sources) != len(played):
         raise ClipError(f"--against: got {len(sources)} sources, expected {len(played)}, one for each clip")
     return [(decoder, path, clip) for decoder, (path, clip) in zip(played, sources)]
@@ -92,9 +99,18 @@ def with_sources(decoder: Decoder, args: argparse.Namespace,
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
-    return athcodec.read(path, args.source_format, rest=getattr(args, "rest", "auto"), fps=args.fps, mesh=args.mesh,
-                         field=args.field, only=args.only or (), takes=args.takes or (), unit=args.unit,
-                         up_axis=args.up_axis)
+    return athcodec.read(
+        path,
+        args.source_format,
+        rest=getattr(args, "rest", "auto"),
+        fps=args.fps,
+        mesh=args.mesh,
+        field=args.field,
+        only=args.only or (),
+        takes=args.takes or (),
+        unit=args.unit,
+        up_axis=args.up_axis,
+    )
 
 
 @contextmanager
@@ -218,7 +234,9 @@ def _stats(decoder: Decoder) -> str:
     requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
         return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"
-    return f"{counted(requests, 'request')}, {decoder.file.source.bytes:,} bytes fetched of {decoder.file.file_length:,}"
+    return (
+        f"{counted(requests, 'request')}, {decoder.file.source.bytes:,} bytes fetched of {decoder.file.file_length:,}"
+    )
 
 
 def what_is_missing(decoder: Decoder) -> str:

@@ -14,13 +14,7 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -86,9 +80,17 @@ def _print_facts(facts: dict[str, Any]) -> None:
 
 def _print_clips(facts: dict[str, Any]) -> None:
     """Errors at the seam are those of the deepest stored level."""
-    rows = [[clip["name"], f"{clip['frames']:,}", f"{clip['seconds']:.4g}", f"{clip['segments']:,}",
-             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
-             *(f"{error:.3g}" for error in clip["max_errors"])] for clip in facts["clips"]]
+    rows = [
+        [
+            clip["name"],
+            f"{clip['frames']:,}",
+            f"{clip['seconds']:.4g}",
+            f"{clip['segments']:,}",
+            f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
+            *(f"{error:.3g}" for error in clip["max_errors"]),
+        ]
+        for clip in facts["clips"]
+    ]
     levels = [f"max at {level}" for level in range(len(facts["levels"]))]
     print_table(["clip", "frames", "seconds", "segments", _head("loop's seam", facts["unit"]), *levels], rows)
 
@@ -96,8 +98,7 @@ def _print_clips(facts: dict[str, Any]) -> None:
 def _print_levels(facts: dict[str, Any]) -> None:
     columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
     cells = [
-        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"]
-        for level in facts["levels"]
+        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"] for level in facts["levels"]
     ]
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
 
@@ -151,11 +152,29 @@ def print_verdict(result: dict[str, Any]) -> None:
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:
     if as_json:
-        print_json({"clips": [{"input": task.item.shown, "output": task.item.output, "settings": task.item.settings,
-                                "reason": task.reason or None} for task in todo]})
+        print_json(
+            {
+                "clips": [
+                    {
+                        "input": task.item.shown,
+                        "output": task.item.output,
+                        "settings": task.item.settings,
+                        "reason": task.reason or None,
+                    }
+                    for task in todo
+                ]
+            }
+        )
         return
-    rows = [[task.item.name, task.reason or "kept", task.item.output,
-             ", ".join(f"{name}={value}" for name, value in task.item.settings.items()) or "default"] for task in todo]
+    rows = [
+        [
+            task.item.name,
+            task.reason or "kept",
+            task.item.output,
+            ", ".join(f"{name}={value}" for name, value in task.item.settings.items()) or "default",
+        ]
+        for task in todo
+    ]
     print_table(["clip", "why", "output", "settings"], rows, "left")
     print(f"{counted(sum(bool(task.reason) for task in todo), 'clip')} of {len(todo):,} to do.")
 
@@ -163,12 +182,22 @@ def print_preview(todo: Sequence[Any], as_json: bool) -> None:
 def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
     if args.json:
         failed = [{name: record[name] for name in ("input", "output", "reason")} for record in outcome.failed]
-        print_json({"done": len(outcome.done), "kept": len(outcome.kept), "failed": failed, "bytes": outcome.bytes,
-                     "raw_bytes": outcome.raw_bytes, "seconds": outcome.seconds})
+        print_json(
+            {
+                "done": len(outcome.done),
+                "kept": len(outcome.kept),
+                "failed": failed,
+                "bytes": outcome.bytes,
+                "raw_bytes": outcome.raw_bytes,
+                "seconds": outcome.seconds,
+            }
+        )
     else:
         ratio = f", {outcome.raw_bytes / outcome.bytes:.1f} to 1" if outcome.bytes else ""
-        print(f"{args.out}: {counted(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
-              f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s")
+        print(
+            f"{args.out}: {counted(len(outcome.done), 'clip')} done, {len(outcome.kept):,} kept, "
+            f"{len(outcome.failed):,} failed; {outcome.bytes:,} bytes{ratio}, {outcome.seconds:.1f} s"
+        )
     for record in outcome.failed:
         say("failed", f"{record['output']}: {record['reason']}")
 
@@ -204,10 +233,7 @@ def _head(name: str, unit: Any) -> str:
 
 
 def _size(facts: dict[str, Any]) -> str:
-    return (
-        f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: "
-        f"{facts['ratio']:.1f} to 1."
-    )
+    return f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: {facts['ratio']:.1f} to 1."
 
 
 def say(kind: str, message: str) -> None:
@@ -216,9 +242,12 @@ def say(kind: str, message: str) -> None:
 
 def say_seam(seam: Seam, path: str) -> None:
     jumps = seam.step > JUMP * seam.step_beside + seam.error
-    say("loop", f"{seam.clip or path}: vertices go up to {seam.step:.3g} from the last frame to the first, "
-                 f"{seam.step_beside:.3g} from frame to frame beside that; the file is off by {seam.error:.3g} there"
-                 + ("; it jumps, --loop-blend smooths it" if jumps else ""))
+    say(
+        "loop",
+        f"{seam.clip or path}: vertices go up to {seam.step:.3g} from the last frame to the first, "
+        f"{seam.step_beside:.3g} from frame to frame beside that; the file is off by {seam.error:.3g} there"
+        + ("; it jumps, --loop-blend smooths it" if jumps else ""),
+    )
 
 
 def one_line(error: Exception) -> str:

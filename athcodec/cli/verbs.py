@@ -63,7 +63,9 @@ def encode(args: argparse.Namespace) -> int:
             output,
             segment_frames=args.segment_frames,
             tam=thresholds(args.tam, unit),
-            exact_rest=args.exact_rest, lossless=args.lossless, weights=args.weights,
+            exact_rest=args.exact_rest,
+            lossless=args.lossless,
+            weights=args.weights,
             attributes=args.attributes,
             effort=args.effort,
             jobs=args.jobs,
@@ -84,8 +86,12 @@ def batch(args: argparse.Namespace) -> int:
     from athcodec.batch.show import show_of_terminal
 
     inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
-    items = batch.find(inputs, args.out, settings=_batch_settings(args),
-                       patterns=batch.load_settings(args.settings) if args.settings else None)
+    items = batch.find(
+        inputs,
+        args.out,
+        settings=_batch_settings(args),
+        patterns=batch.load_settings(args.settings) if args.settings else None,
+    )
     where = {"manifest": args.manifest, "redo": args.redo}
     how = {"workers": args.workers, "scheduler": args.scheduler, "verify": args.verify}
     if args.split:
@@ -111,8 +117,11 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
-    given |= {name: getattr(args, name) for name, usual in (("attributes", "all"), ("effort", "default"))
-              if getattr(args, name) != usual}
+    given |= {
+        name: getattr(args, name)
+        for name, usual in (("attributes", "all"), ("effort", "default"))
+        if getattr(args, name) != usual
+    }
     if given.get("rest") == "auto":
         del given["rest"]
     if args.max_error is not None:
@@ -135,14 +144,24 @@ def hierarchy(args: argparse.Namespace) -> int:
     sizes = np.bincount(found.vertex_branch)
     orders = branch_orders(found.branch_parent)
     if args.json:
-        print_json({"file": args.input, "method": found.method, "vertices": len(found.vertex_branch),
-                     "branches": len(sizes), "roots": int((found.branch_parent < 0).sum()),
-                     "branches_per_order": np.bincount(orders).tolist(),
-                     "vertices_per_order": np.bincount(orders, sizes).astype(int).tolist(), "saved": args.save})
+        print_json(
+            {
+                "file": args.input,
+                "method": found.method,
+                "vertices": len(found.vertex_branch),
+                "branches": len(sizes),
+                "roots": int((found.branch_parent < 0).sum()),
+                "branches_per_order": np.bincount(orders).tolist(),
+                "vertices_per_order": np.bincount(orders, sizes).astype(int).tolist(),
+                "saved": args.save,
+            }
+        )
         return 0
     print(f"{args.input}: {found}")
-    rows = [[f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
-            for order in range(orders.max() + 1)]
+    rows = [
+        [f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
+        for order in range(orders.max() + 1)
+    ]
     print_table(["order", "branches", "vertices"], rows)
     if args.save:
         print(f"{args.save}: edit it, and use it with athcodec encode --hierarchy")
@@ -157,8 +176,7 @@ def decode(args: argparse.Namespace) -> int:
             athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
             say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-        print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
-              f"level {motion.level}")
+        print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, level {motion.level}")
     return 0
 
 
@@ -204,14 +222,23 @@ def formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
     read, written = ({kind.name: kind for kind in module.FORMATS} for module in (sources, exporters))
-    rows = [{"format": name, "reads": _suffixes(read.get(name)), "writes": _suffixes(written.get(name)),
-             "title": kind.title, "extra": kind.extra, "installed": kind.is_installed}
-            for name, kind in (written | read).items()]
+    rows = [
+        {
+            "format": name,
+            "reads": _suffixes(read.get(name)),
+            "writes": _suffixes(written.get(name)),
+            "title": kind.title,
+            "extra": kind.extra,
+            "installed": kind.is_installed,
+        }
+        for name, kind in (written | read).items()
+    ]
     if args.json:
         print_json({"formats": rows})
         return 0
-    cells = [[row["format"], " ".join(row["reads"]), " ".join(row["writes"]), row["title"], _needs(row)]
-             for row in rows]
+    cells = [
+        [row["format"], " ".join(row["reads"]), " ".join(row["writes"]), row["title"], _needs(row)] for row in rows
+    ]
     print_table(["format", "reads", "writes", "what", "needs"], cells, justify="left")
     return 0
 

@@ -164,8 +164,7 @@ static void to_shapes(int32_t T, const ath_piece *piece, int32_t shape_count, co
     memcpy(scratch->rows, tracks, rows * frames * sizeof *tracks);
 }
 
-static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at,
-                     const double *source, double *local)
+static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at, const double *source, double *local)
 {
     for (int32_t i = 0; i < piece->count; i++)
         into_rest_space(T, at, source + (size_t)(piece->first + i) * 3 * (size_t)T, local + (size_t)i * 3 * (size_t)T);
@@ -195,8 +194,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     if (ath_has_shift(piece)) {
         const double *x = source + (size_t)piece->first * 3 * (size_t)T;
         const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
-        for (int32_t i = 0; i < 3 * T; i++)
-            scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
+        for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
         code_track(base, T, ath_shift_step(piece, base), dead_zone, scratch->track, rows->shift);
         ath_move_point(T, scratch->track, scratch->at.point);
     }
@@ -230,8 +228,7 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
                  int32_t stop, const double *source, double dead_zone)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
-    for (int32_t p = first; p < stop; p++)
-        analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+    for (int32_t p = first; p < stop; p++) analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
 }
 
 void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])
@@ -292,8 +289,8 @@ static int32_t half_octaves(double step)
 }
 
 static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
-                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source,
-                         double level_step, double dead_zone)
+                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double level_step,
+                         double dead_zone)
 {
     const ath_piece *piece = plan->pieces + node->piece;
     int32_t T = motion->frames;

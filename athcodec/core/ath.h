@@ -113,12 +113,12 @@ enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512 };
 /* What a fault is about; most are fields of FORMAT.md: ATH_FIELD_VERTEX_COUNT is Vertex_Count. */
 typedef enum ath_field {
     ATH_FIELD_NONE,
-    ATH_FIELD_MAGIC,            /* the four bytes of which one is wrong, as a number whose high byte comes first */
-    ATH_FIELD_VERSION,          /* major << 16 | minor */
-    ATH_FIELD_FILE_SIZE,        /* bytes that are there: for a caller who knows that no more will come */
-    ATH_FIELD_HEADER_SIZE,      /* bytes that are there */
-    ATH_FIELD_TABLE_SIZE,       /* bytes that are there of chunk table and error table, or their size against the limit */
-    ATH_FIELD_PRELUDE_SIZE,     /* bytes that are there */
+    ATH_FIELD_MAGIC,        /* the four bytes of which one is wrong, as a number whose high byte comes first */
+    ATH_FIELD_VERSION,      /* major << 16 | minor */
+    ATH_FIELD_FILE_SIZE,    /* bytes that are there: for a caller who knows that no more will come */
+    ATH_FIELD_HEADER_SIZE,  /* bytes that are there */
+    ATH_FIELD_TABLE_SIZE,   /* bytes that are there of chunk table and error table, or their size against the limit */
+    ATH_FIELD_PRELUDE_SIZE, /* bytes that are there */
     ATH_FIELD_VERTEX_COUNT,
     ATH_FIELD_BRANCH_COUNT,
     ATH_FIELD_FRAME_COUNT,
@@ -131,16 +131,16 @@ typedef enum ath_field {
     ATH_FIELD_RESERVED,
     ATH_FIELD_MAX_ERROR,
     ATH_FIELD_FRONT_CHECKSUM,
-    ATH_FIELD_ERROR,            /* an entry of the error table, of this level and segment */
-    ATH_FIELD_FILE_LENGTH,      /* where the chunks end */
-    ATH_FIELD_MEMORY,           /* bytes that a segment may take */
-    ATH_FIELD_MISSING_CHUNK,    /* a chunk that the table lacks: kind, level and segment say which */
-    ATH_FIELD_CHUNK_KIND,       /* from here on: of the chunk */
-    ATH_FIELD_CHUNK_SIZE,       /* bytes that are there, or against the limit */
+    ATH_FIELD_ERROR,         /* an entry of the error table, of this level and segment */
+    ATH_FIELD_FILE_LENGTH,   /* where the chunks end */
+    ATH_FIELD_MEMORY,        /* bytes that a segment may take */
+    ATH_FIELD_MISSING_CHUNK, /* a chunk that the table lacks: kind, level and segment say which */
+    ATH_FIELD_CHUNK_KIND,    /* from here on: of the chunk */
+    ATH_FIELD_CHUNK_SIZE,    /* bytes that are there, or against the limit */
     ATH_FIELD_CHUNK_RESERVED,
     ATH_FIELD_CHUNK_LEVEL,
     ATH_FIELD_CHUNK_SEGMENT,
-    ATH_FIELD_CHUNK_PLACE,      /* its index in the chunk table */
+    ATH_FIELD_CHUNK_PLACE, /* its index in the chunk table */
     ATH_FIELD_UNEXPECTED_CHUNK,
     ATH_FIELD_CHUNK_CHECKSUM,
     ATH_FIELD_HIERARCHY_DEPTH,
@@ -149,15 +149,15 @@ typedef enum ath_field {
 
 /* Why a file was refused, or what is missing of it (ATH_MISSING). */
 typedef struct ath_fault_info {
-    int32_t code;               /* ath_result; ATH_OK: no fault, and the rest says nothing */
-    int32_t field;              /* ath_field */
-    int32_t chunk;              /* index in ath_chunks; -1: none */
-    uint16_t kind;              /* of that chunk, or of the one that is missing */
+    int32_t code;  /* ath_result; ATH_OK: no fault, and the rest says nothing */
+    int32_t field; /* ath_field */
+    int32_t chunk; /* index in ath_chunks; -1: none */
+    uint16_t kind; /* of that chunk, or of the one that is missing */
     uint8_t level;
     uint8_t reserved;
     uint32_t segment;
-    uint64_t offset;            /* of the chunk in the file */
-    double found, least, most;  /* the value found, the values allowed: integers below 2^53 are exact */
+    uint64_t offset;           /* of the chunk in the file */
+    double found, least, most; /* the value found, the values allowed: integers below 2^53 are exact */
 } ath_fault_info;
 
 /* Writes the fault as one line of English, "where: got this; expected that", with a zero behind it, into at most
@@ -191,8 +191,8 @@ ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *
 /* Opens a file in `memory`, from at least its prelude; feeds it all of `bytes`. The ath_file is the memory: cast it.
  * Checks what FORMAT.md, "Opening", lists for a stream, in its order. Errors of the file; ATH_MISSING, ATH_NO_MEMORY.
  * limits, fault: as for ath_front. */
-ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
-                     ath_fault_info *fault);
+ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                     const ath_limits *limits, ath_fault_info *fault);
 
 /* Computes the bases that all segments share, in memory of their own, whose size depends on the plant. Once, before
  * anything is prepared. ATH_NO_MEMORY. */
@@ -203,29 +203,29 @@ ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
 typedef struct ath_info {
     uint64_t file_length, prelude_length;
-    double max_error;        /* of the deepest stored level, promised */
+    double max_error; /* of the deepest stored level, promised */
     double origin[3];
     int32_t vertex_count, branch_count;
     int32_t frame_count, segment_count; /* of all clips */
     int32_t clip_count;
-    int32_t level_count;     /* stored levels: 0 to level_count - 1 */
+    int32_t level_count; /* stored levels: 0 to level_count - 1 */
     int32_t full_level_count;
     int32_t node_count, chunk_count;
-    int32_t is_float64;            /* 1: positions are double in the file's own arithmetic, else float */
-    float epsilon, xi;       /* the thresholds by which nodes were accepted */
+    int32_t is_float64; /* 1: positions are double in the file's own arithmetic, else float */
+    float epsilon, xi;  /* the thresholds by which nodes were accepted */
     uint32_t eta, lambda;
-    int32_t rest_is_float64;       /* 1: the rest pose is double, else float */
+    int32_t rest_is_float64; /* 1: the rest pose is double, else float */
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);
 
 /* A clip. Frames and segments are numbered over the whole file, one clip after the other. */
 typedef struct ath_clip {
-    const char *name;      /* UTF-8, ends with a zero; empty where the only clip of a file has none */
-    double duration;       /* seconds from its first frame to its last */
+    const char *name; /* UTF-8, ends with a zero; empty where the only clip of a file has none */
+    double duration;  /* seconds from its first frame to its last */
     int32_t first_frame, frame_count;
     int32_t first_segment, segment_count;
-    int32_t loop;          /* 1: its first frame follows its last */
+    int32_t loop; /* 1: its first frame follows its last */
     int32_t reserved;
 } ath_clip;
 
@@ -241,13 +241,13 @@ enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4 };
 
 /* A branch; parents come before children, a subtree is the branches b to b + subtree - 1. */
 typedef struct ath_branch {
-    int32_t parent;       /* branch, below its own index; -1 for a root */
-    int32_t count;        /* vertices of its stem, at least 1 */
-    int32_t attach;       /* vertex of the parent's stem that it hangs on, -1 for a root */
-    int32_t flags;        /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one */
-    int32_t lag;          /* of the rest pose's predictor; 0: a beam */
-    int32_t first;        /* its first vertex */
-    int32_t subtree;      /* branches in its subtree, itself included */
+    int32_t parent;  /* branch, below its own index; -1 for a root */
+    int32_t count;   /* vertices of its stem, at least 1 */
+    int32_t attach;  /* vertex of the parent's stem that it hangs on, -1 for a root */
+    int32_t flags;   /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one */
+    int32_t lag;     /* of the rest pose's predictor; 0: a beam */
+    int32_t first;   /* its first vertex */
+    int32_t subtree; /* branches in its subtree, itself included */
     int32_t depth;
 } ath_branch;
 
@@ -285,7 +285,7 @@ typedef struct ath_chunk {
     uint32_t length, checksum;
     uint32_t segment;
     uint16_t kind;
-    uint8_t level;        /* ATH_NO_LEVEL: not of a level */
+    uint8_t level; /* ATH_NO_LEVEL: not of a level */
     uint8_t reserved;
 } ath_chunk;
 
@@ -301,7 +301,9 @@ ATH_API void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, siz
 /* Forgets chunks that touch this range, so that their bytes can go: not those that a preparation has begun to read. */
 ATH_API void ath_drop(ath_file *file, uint64_t offset, uint64_t size);
 
-typedef struct ath_range { uint64_t offset, size; } ath_range;
+typedef struct ath_range {
+    uint64_t offset, size;
+} ath_range;
 
 /* Bytes that the segments first to last need for `level` and that have not been fed; with `all` those that have been,
  * too. Ascending, neighbours joined. Returns their number, of which at most `capacity` are written. */
@@ -322,8 +324,7 @@ typedef struct ath_part {
 } ath_part;
 
 /* Numbers of parts, of nodes (matrices) and of exact vertices at a level. Any result may be null. */
-ATH_API void ath_cut_size(const ath_file *file, int32_t level, int32_t *parts, int32_t *nodes,
-                          int32_t *exact_vertices);
+ATH_API void ath_cut_size(const ath_file *file, int32_t level, int32_t *parts, int32_t *nodes, int32_t *exact_vertices);
 /* Fills ath_cut_size's number of parts. */
 ATH_API void ath_cut(const ath_file *file, int32_t level, ath_part *parts);
 
@@ -382,7 +383,7 @@ ATH_API ath_blend ath_blend_at(const ath_file *file, double frame);
 ATH_API int ath_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                           ath_order order, float *xyz, size_t stride);
 ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
-                               double frame, ath_order order, double *xyz, size_t stride);
+                                  double frame, ath_order order, double *xyz, size_t stride);
 
 /* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
  * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level
@@ -390,11 +391,11 @@ ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const
 ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                          float *matrices, size_t stride);
 ATH_API int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
-                              double frame, double *matrices, size_t stride);
+                                 double frame, double *matrices, size_t stride);
 ATH_API int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                       float *xyz, size_t stride);
 ATH_API int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
-                           double frame, double *xyz, size_t stride);
+                              double frame, double *xyz, size_t stride);
 /* The level that these show, which tells how many matrices and exact vertices there are; -1: none has the frame. */
 ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                                 double frame);

@@ -20,7 +20,7 @@ static void tridiagonalise(int32_t n, double *a, double *q, double *d, double *e
         if (!(below2 > norm2 * 1e-30)) continue;
         double norm = ath_sqrt(norm2), head = a[(k + 1) * n + k];
         double alpha = head > 0.0 ? -norm : norm;
-        double scale = 1.0 / (norm2 - head * alpha);  /* 2 / v.v, halved: v.v = 2 (norm2 - head alpha) */
+        double scale = 1.0 / (norm2 - head * alpha); /* 2 / v.v, halved: v.v = 2 (norm2 - head alpha) */
         v[k + 1] = head - alpha;
         for (int32_t i = k + 2; i < n; i++) v[i] = a[i * n + k];
         double vp = 0.0;
@@ -333,8 +333,8 @@ static double cos_of_fraction(int64_t j, int64_t T)
         j = 2 * T - j;
         sign = -1.0;
     }
-    double value = 2 * j <= T ? cos_series(PI * (double)j / (double)(2 * T))
-                              : sin_series(PI * (double)(T - j) / (double)(2 * T));
+    double value =
+        2 * j <= T ? cos_series(PI * (double)j / (double)(2 * T)) : sin_series(PI * (double)(T - j) / (double)(2 * T));
     return sign * value;
 }
 

@@ -10,11 +10,7 @@
 #include "motion.h"
 #include "number_model.h"
 
-enum {
-    COUNT_CLASSES = 6,
-    COUNT_BINS = 10,
-    SUMS_BEFORE = 2
-};
+enum { COUNT_CLASSES = 6, COUNT_BINS = 10, SUMS_BEFORE = 2 };
 
 typedef struct {
     number_model number;
@@ -93,7 +89,8 @@ static int32_t code_row(ath_coder *coder, coefficient_model *model, int32_t fram
 {
     const uint32_t *history = model->history + (size_t)slot * (size_t)frames;
     const uint32_t *above = model->sums[model->turn] + SUMS_BEFORE;
-    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE, last[3][3] = {{0}}; /* the last magnitudes of each axis */
+    uint32_t *sums = model->sums[model->turn ^= 1] + SUMS_BEFORE,
+             last[3][3] = {{0}}; /* the last magnitudes of each axis */
     int32_t count = code_count(coder, model, model->history_count[slot], ath_max(above_count, 0), rank,
                                ENCODING ? used_frequencies(row, frames) : 0);
     for (int32_t k = 0; k < count; k++) {

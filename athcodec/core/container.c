@@ -1,12 +1,7 @@
 /* Header, chunk table, error table, heads of chunks: read with every check that FORMAT.md asks for, in its order. */
 #include "container.h"
 
-enum {
-    HEADER_SIZE = 64,
-    CHUNK_SIZE = 16,
-    ERRORS_SIZE = 8,
-    CHECKSUM_AT = 12
-};
+enum { HEADER_SIZE = 64, CHUNK_SIZE = 16, ERRORS_SIZE = 8, CHECKSUM_AT = 12 };
 
 static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
 
@@ -34,10 +29,7 @@ static double f64_at(const uint8_t *at)
     return value;
 }
 
-static uint64_t error_count(const ath_header *header)
-{
-    return (uint64_t)header->level_count * header->segment_count;
-}
+static uint64_t error_count(const ath_header *header) { return (uint64_t)header->level_count * header->segment_count; }
 
 int ath_is_finite(double value) { return value - value == 0.0; }
 
@@ -45,8 +37,8 @@ static int is_step(double value) { return ath_is_finite(value) && value > 0.0; }
 
 void ath_default_limits(ath_limits *limits)
 {
-    static const ath_limits defaults = {1u << 20, 16u << 20, 1u << 26, 1u << 20, 1u << 20, 4096, 256u << 20, 0,
-                                        (uint64_t)2 << 30};
+    static const ath_limits defaults = {1u << 20, 16u << 20,  1u << 26, 1u << 20,         1u << 20,
+                                        4096,     256u << 20, 0,        (uint64_t)2 << 30};
     *limits = defaults;
 }
 
@@ -69,7 +61,8 @@ static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *f
                               (double)word_at(bytes, available, i & ~(size_t)3), expected, expected);
     }
     if (available < CHECKSUM_AT) return ATH_OK;
-    uint32_t version = u16_at(bytes + 8) << 16 | u16_at(bytes + 10), expected = ATH_FORMAT_MAJOR << 16 | ATH_FORMAT_MINOR;
+    uint32_t version = u16_at(bytes + 8) << 16 | u16_at(bytes + 10),
+             expected = ATH_FORMAT_MAJOR << 16 | ATH_FORMAT_MINOR;
     if (version == expected) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, (double)version, (double)expected,
                       (double)expected);
@@ -104,7 +97,8 @@ static int is_bad_count(ath_fault_info *fault, ath_field field, uint32_t count, 
     return is_outside(fault, ATH_LIMIT_EXCEEDED, field, count, 1, most);
 }
 
-static int is_bad_header(const uint8_t *bytes, const ath_limits *limits, const ath_header *header, ath_fault_info *fault)
+static int is_bad_header(const uint8_t *bytes, const ath_limits *limits, const ath_header *header,
+                         ath_fault_info *fault)
 {
     uint32_t least_segments = (header->frame_count + ATH_SEGMENT_FRAMES - 1) / ATH_SEGMENT_FRAMES;
     return is_bad_count(fault, ATH_FIELD_VERTEX_COUNT, header->vertex_count, limits->vertices)
@@ -129,8 +123,8 @@ static int check_size(size_t available, uint64_t needed, ath_field field, ath_fa
     return ath_refuse(fault, ATH_MISSING, field, (double)available, (double)needed, (double)needed);
 }
 
-int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
-                    ath_fault_info *fault)
+int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
+                    uint64_t *needed, ath_fault_info *fault)
 {
     int result = check_magic(bytes, available, fault);
     *needed = HEADER_SIZE;
@@ -249,8 +243,9 @@ int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *li
 {
     const uint8_t *table = bytes + HEADER_SIZE;
     *needed = header->chunks_at;
-    int result = available >= *needed ? check_front(bytes, header, fault)
-                                      : check_size(available - HEADER_SIZE, *needed - HEADER_SIZE, ATH_FIELD_TABLE_SIZE, fault);
+    int result = available >= *needed
+                     ? check_front(bytes, header, fault)
+                     : check_size(available - HEADER_SIZE, *needed - HEADER_SIZE, ATH_FIELD_TABLE_SIZE, fault);
     if (result != ATH_OK) return result;
     result = check_errors(table + (size_t)CHUNK_SIZE * header->chunk_count, header, errors, fault);
     if (result != ATH_OK) return result;
@@ -310,7 +305,8 @@ int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
-    if (chunk.size < 36 || chunk.bytes[0] > 1 || chunk.bytes[1] > 1 || u16_at(chunk.bytes + 2) != 0) return ATH_BAD_CHUNK;
+    if (chunk.size < 36 || chunk.bytes[0] > 1 || chunk.bytes[1] > 1 || u16_at(chunk.bytes + 2) != 0)
+        return ATH_BAD_CHUNK;
     head->exact = chunk.bytes[0];
     head->is_float64 = chunk.bytes[1];
     head->step = f64_at(chunk.bytes + 28);
@@ -335,7 +331,8 @@ static size_t character_size(ath_bytes text)
             if (text.bytes[i] >> 6 != 2) return 0;
         uint8_t second = more > 0 ? text.bytes[1] : 0;
         int overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
-        int beyond = (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates, no character */
+        int beyond =
+            (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f); /* surrogates, no character */
         return overlong || beyond ? 0 : more + 1;
     }
     return 0;
@@ -400,7 +397,8 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->basis = *body = rest_of(chunk, 8);
     if (!is_step(head->step)) return ATH_BAD_CHUNK;
     if (head->bits == 0) return head->rank == 0 ? ATH_OK : ATH_BAD_CHUNK;
-    if (head->bits < 8 || head->bits > 16 || head->rank < 1 || head->rank > frames || body->size < 4) return ATH_BAD_CHUNK;
+    if (head->bits < 8 || head->bits > 16 || head->rank < 1 || head->rank > frames || body->size < 4)
+        return ATH_BAD_CHUNK;
     size_t length = u32_at(body->bytes);
     if (length > body->size - 4) return ATH_BAD_CHUNK;
     head->basis = rest_of(*body, 4);

@@ -7,7 +7,7 @@
 
 typedef struct {
     uint64_t file_length;
-    uint64_t chunks_at;  /* where the first chunk begins */
+    uint64_t chunks_at; /* where the first chunk begins */
     double max_error;
     uint32_t checksum;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
@@ -20,8 +20,8 @@ int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
 
 /* Both fill *needed: bytes wanted from the front on ATH_MISSING, on ATH_OK those up to the first chunk, or the
  * prelude. */
-int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header, uint64_t *needed,
-                    ath_fault_info *fault);
+int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
+                    uint64_t *needed, ath_fault_info *fault);
 /* What is between a valid header and the first chunk: fills, unless null, chunk_count chunks and level_count x
  * segment_count pairs of errors. */
 int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
@@ -54,8 +54,8 @@ typedef struct {
 typedef struct {
     uint32_t frames, segments;
     int32_t loop;
-    ath_bytes name;        /* UTF-8 */
-    const uint8_t *seams;  /* of a loop: full_level_count floats, see ath_seam */
+    ath_bytes name;       /* UTF-8 */
+    const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
 /* 0: first + i * step; 1: first + i / step, with a pair for each clip; 2: stream */

@@ -15,7 +15,8 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
     coder_start(&coder, bytes, capacity);
     int valid = code_hierarchy(&coder, (hierarchy_model *)model, branch_count, vertex_count, (ath_branch *)branches,
                                (int32_t *)branch_source, (int32_t *)vertex_source);
-    ath_count_pieces((ath_branch *)branches, branch_count, vertex_count); /* restores `subtree`, which served as scratch memory */
+    ath_count_pieces((ath_branch *)branches, branch_count,
+                     vertex_count); /* restores `subtree`, which served as scratch memory */
     return written(&coder, valid);
 }
 
@@ -32,7 +33,8 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, (double *)rest));
+    return written(&coder,
+                   code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, (double *)rest));
 }
 
 int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count, const double *times)
@@ -42,8 +44,8 @@ int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t f
     return written(&coder, code_times(&coder, (exact_model *)model, frame_count, (double *)times));
 }
 
-int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                            int32_t limit, const int32_t *basis)
+int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames, int32_t limit,
+                            const int32_t *basis)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
@@ -60,7 +62,8 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     shape_model_init(model);
     for (int32_t p = 0; p < plan->piece_count && valid; p++)
         valid = code_shapes(&coder, model, plan->pieces + p, level, shape_counts[p],
-                            integers + shape_first[p] * ATH_SHAPE_NUMBERS) >= 0;
+                            integers + shape_first[p] * ATH_SHAPE_NUMBERS)
+                >= 0;
     return written(&coder, valid);
 }
 
@@ -69,8 +72,8 @@ static double number_at(const void *numbers, int is_float64, size_t at)
     return is_float64 ? ((const double *)numbers)[at] : (double)((const float *)numbers)[at];
 }
 
-int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames, int is_float64,
-                         const void *positions, const void *source)
+int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t vertex_count, int32_t frames,
+                         int is_float64, const void *positions, const void *source)
 {
     ath_coder coder;
     exact_model *model = (exact_model *)memory;
@@ -105,8 +108,8 @@ int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath
     return written(&coder, !rows->invalid);
 }
 
-int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                           const ath_motion *motion, const ath_integers *integers, int32_t level)
+int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan, const ath_motion *motion,
+                           const ath_integers *integers, int32_t level)
 {
     ath_coder coder;
     affine_model *maps = (affine_model *)model;

@@ -10,10 +10,10 @@
 
 /* The integers of one segment; with them come ath_motion's streams. */
 typedef struct ath_integers {
-    int32_t *coefficients; /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
-    int32_t *tracks;       /* piece_count x 2 x 3 x frames: rotation, translation */
-    int32_t *node_tracks;  /* node_count x 4 x 3 x frames: columns of the map, translation */
-    int32_t *node_steps;   /* node_count: exponents of half-octave steps */
+    int32_t *coefficients;       /* vertex_count x 3 x frames: mode m of a piece at slot first + m */
+    int32_t *tracks;             /* piece_count x 2 x 3 x frames: rotation, translation */
+    int32_t *node_tracks;        /* node_count x 4 x 3 x frames: columns of the map, translation */
+    int32_t *node_steps;         /* node_count: exponents of half-octave steps */
     const int32_t *shape_counts; /* piece_count; null: no piece has shapes */
     const int64_t *shape_first;  /* piece_count: where its shapes stand in those below */
     const double *shapes;        /* ATH_SHAPE_NUMBERS of each */
@@ -49,13 +49,15 @@ ATH_ENCODER_API size_t ath_model_size(void);
  * rest: 3 x vertices; positions: 3 x frames x vertices; inverse, offset: 3 x 3 and 3 for each frame and piece, which
  * take a position to its residual. */
 ATH_ENCODER_API void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, const int64_t *first,
-                             const int64_t *stop, const double *inverse, const double *offset, const double *rest,
-                             const double *positions, double xi, double *mean, double *largest, int32_t *most_beyond);
+                                     const int64_t *stop, const double *inverse, const double *offset,
+                                     const double *rest, const double *positions, double xi, double *mean,
+                                     double *largest, int32_t *most_beyond);
 
 /* Some of the source's positions, (frames, source_count, 3) in its order, float or (is_float64) double, to vertex-major
  * doubles less the origin. */
 ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source,
-                        int32_t source_count, int is_float64, const void *source, const double origin[3], double *out);
+                                int32_t source_count, int is_float64, const void *source, const double origin[3],
+                                double *out);
 
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
  * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
@@ -63,58 +65,59 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
  * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
  * each with scratch memory of its own, once the pieces that theirs hang on are done. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                         int32_t first, int32_t stop, const double *source, double dead_zone);
+                                 int32_t first, int32_t stop, const double *source, double dead_zone);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                               int32_t first, int32_t stop, const double *source, const double *level_steps,
-                               double dead_zone);
+                                       int32_t first, int32_t stop, const double *source, const double *level_steps,
+                                       double dead_zone);
 
 /* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
  * double. By ranges of pieces, which keep the rule above, and then of nodes. */
 ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                      int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions);
+                              int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                              void *positions);
 ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                            int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
-                            void *positions);
+                                    int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                                    void *positions);
 
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
 
 /* Largest distance and sum of squared distances between positions and source (plus origin). */
-ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
-                       const double origin[3], double *max_error, double *sum_squares);
+ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
+                               const double *source, const double origin[3], double *max_error, double *sum_squares);
 
 /* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of (vertex, frame, x, y,
  * z). Returns how many there are; -1: the step cannot express them. */
-ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                                     const double *source, const double origin[3], const double *limits, double step,
-                                     int32_t *corrections, int64_t capacity);
+ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
+                                             const void *positions, const double *source, const double origin[3],
+                                             const double *limits, double step, int32_t *corrections, int64_t capacity);
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
-                                   const int32_t *corrections, int64_t count);
+                                           const int32_t *corrections, int64_t count);
 
 /* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                     int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
-                                     const int32_t *vertex_source);
+                                             int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
+                                             const int32_t *vertex_source);
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                int32_t branch_count, double step, const double *source, double *rest);
+                                        int32_t branch_count, double step, const double *source, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                      int32_t branch_count, int is_float64, const double *rest);
+                                              int32_t branch_count, int is_float64, const double *rest);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
-                                 const double *times);
+                                         const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,
-                                    int32_t limit, const int32_t *basis);
+                                            int32_t limit, const int32_t *basis);
 /* integers: as streams hold them, ATH_SHAPE_NUMBERS of each shape. */
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                  const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
-                                  int32_t level);
+                                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
+                                          int32_t level);
 /* positions, source: vertex-major, float or (is_float64) double. */
 ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
-                                 int32_t frames, int is_float64, const void *positions, const void *source);
+                                         int32_t frames, int is_float64, const void *positions, const void *source);
 ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                 const ath_motion *motion, const ath_integers *integers, int32_t level);
+                                         const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                   const ath_motion *motion, const ath_integers *integers, int32_t level);
+                                           const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
-                                       int32_t frames, const int32_t *corrections, int64_t count);
+                                               int32_t frames, const int32_t *corrections, int64_t count);
 
 #endif

@@ -79,7 +79,8 @@ static uint64_t code_difference(ath_coder *coder, exact_model *model, int32_t bi
 }
 
 /* Codes a number by its difference from `expected`; `length`: bits of the difference before. */
-static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length, double *number)
+static int code_exact(ath_coder *coder, exact_model *model, int is_float64, double expected, int32_t *length,
+                      double *number)
 {
     uint64_t sign = (uint64_t)1 << (is_float64 ? 63 : 31), bits = bits_of(expected, is_float64);
     uint64_t from = ordered_of(is_finite(bits, is_float64) ? bits : 0, sign), difference = 0;
@@ -93,8 +94,8 @@ static int code_exact(ath_coder *coder, exact_model *model, int is_float64, doub
 }
 
 /* A point's three numbers. */
-static int code_exact_point(ath_coder *coder, exact_model *model, int is_float64, const double expected[3], int32_t length[3],
-                            double number[3])
+static int code_exact_point(ath_coder *coder, exact_model *model, int is_float64, const double expected[3],
+                            int32_t length[3], double number[3])
 {
     for (int32_t k = 0; k < 3; k++)
         if (!code_exact(coder, model, is_float64, expected[k], &length[k], number + k)) return 0;

@@ -3,9 +3,9 @@
 
 const char *ath_result_name(int result)
 {
-    static const char *const errors[] = {"OK", "INVALID", "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED",
-                                         "BAD_CHECKSUM", "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK", "BAD_CHUNK",
-                                         "LIMIT_EXCEEDED", "TRAILING_BYTES"};
+    static const char *const errors[] = {
+        "OK",         "INVALID",         "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED",      "BAD_CHECKSUM",
+        "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK",   "BAD_CHUNK",           "LIMIT_EXCEEDED", "TRAILING_BYTES"};
     static const char *const calls[] = {"MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"};
     if (result >= 0 && result < (int)(sizeof errors / sizeof *errors)) return errors[result];
     int call = result - ATH_MORE;

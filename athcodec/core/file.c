@@ -54,7 +54,8 @@ static int check_memory(const ath_header *header, const ath_limits *limits, uint
 
 static int check_least_memory(const ath_header *header, const ath_limits *limits, ath_fault_info *fault)
 {
-    return check_memory(header, limits, (header->frame_count + header->segment_count - 1) / header->segment_count, fault);
+    return check_memory(header, limits, (header->frame_count + header->segment_count - 1) / header->segment_count,
+                        fault);
 }
 
 static ath_limits limits_or_default(const ath_limits *limits)
@@ -383,8 +384,8 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
 }
 
 /* Parses header and tables into the file, once these are known to fit into the memory. */
-static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
-                      ath_fault_info *fault)
+static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                      const ath_limits *limits, ath_fault_info *fault)
 {
     ath_header header;
     uint64_t needed;
@@ -563,7 +564,8 @@ int32_t ath_segment_of(const ath_file *file, int32_t frame)
     const ath_clip *clip = ath_file_clip(file, frame);
     int64_t within = frame - clip->first_frame;
     int32_t segment = clip->first_segment + (int32_t)(within * clip->segment_count / clip->frame_count);
-    while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame) segment++;
+    while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame)
+        segment++;
     return segment;
 }
 
@@ -577,7 +579,8 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     uint32_t found = chunk->bytes ? ath_crc32c(0, chunk->bytes, chunk->length) : 0;
     why->code = ATH_OK;
-    if (!chunk->bytes) ath_refuse(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, 0, chunk->length, chunk->length);
+    if (!chunk->bytes)
+        ath_refuse(why, ATH_MISSING, ATH_FIELD_CHUNK_SIZE, 0, chunk->length, chunk->length);
     else if (found != chunk->checksum)
         ath_refuse(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, found, chunk->checksum, chunk->checksum);
     return ath_fault_at(why, chunk, index);
@@ -615,7 +618,8 @@ void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size
 
 void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
 {
-    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count && file->chunks[i].offset < offset + size; i++)
+    for (uint32_t i = chunk_at(file, offset); i < file->header.chunk_count && file->chunks[i].offset < offset + size;
+         i++)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 

@@ -10,7 +10,8 @@
 /* Hot loops are compiled for AVX2 too, where compiler and C library can choose at load time (clang names such clones
  * so that other files do not find them). Lanes are frames: the results are the same. With ThreadSanitizer the choice
  * would run before the sanitizer does, and crash. */
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)                              \
+    && !defined(__SANITIZE_THREAD__)
 #define ATH_HOT __attribute__((target_clones("avx2", "default")))
 #else
 #define ATH_HOT

@@ -43,8 +43,8 @@ void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, 
         }
 }
 
-void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count, int is_float64,
-                const void *source, const double origin[3], double *out)
+void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count,
+                int is_float64, const void *source, const double origin[3], double *out)
 {
     size_t T = (size_t)frames, N = (size_t)source_count;
     for (int32_t start = 0; start < frames; start += TILE)
@@ -82,14 +82,15 @@ static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_
     for (int32_t v = node->first; v < node->first + node->count; v++) {
         const double *x0 = ath_rest_of(plan, v);
         for (int32_t axis = 0; axis < 3; axis++)
-            for (int32_t t = 0; t < motion->frames; t++) scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
+            for (int32_t t = 0; t < motion->frames; t++)
+                scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
         ath_move(motion->frames, &scratch->at, scratch->placed);
         store(scratch->placed, v, 1, motion->frames, origin, is_float64, positions);
     }
 }
 
-void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-              int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions)
+void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first, int32_t stop,
+              int32_t level, const double origin[3], int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
@@ -145,7 +146,8 @@ void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void 
 
 static double rounded(int is_float64, double value) { return is_float64 ? value : ath_single(value); }
 
-static double corrected_error(int is_float64, const double here[3], const double want[3], const int32_t q[3], double step)
+static double corrected_error(int is_float64, const double here[3], const double want[3], const int32_t q[3],
+                              double step)
 {
     double square = 0.0;
     for (int32_t k = 0; k < 3; k++) {
@@ -155,10 +157,7 @@ static double corrected_error(int is_float64, const double here[3], const double
     return square;
 }
 
-static int32_t to_steps(double value)
-{
-    return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5);
-}
+static int32_t to_steps(double value) { return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5); }
 
 /* The correction with fewest non-zero axes, then the smallest error, that comes within the limit. */
 static int choose_correction(int is_float64, const double here[3], const double want[3], double limit, double step,

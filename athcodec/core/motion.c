@@ -13,7 +13,10 @@ size_t ath_motion_work(int32_t longest, int32_t frames)
     return 2 * scratch_rows(longest, frames) + (3 + 9 + 3) * (size_t)frames;
 }
 
-size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames) { return (size_t)attach_cache_rows * 3 * (size_t)frames; }
+size_t ath_attach_cache_size(int64_t attach_cache_rows, int32_t frames)
+{
+    return (size_t)attach_cache_rows * 3 * (size_t)frames;
+}
 
 ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion)
 {
@@ -407,7 +410,8 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
     double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
-        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift, scratch->track);
+        inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift,
+                      scratch->track);
         ath_move_point(T, scratch->track, scratch->at.point);
     }
     if (rotation_step > 0.0) {

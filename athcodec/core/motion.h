@@ -6,9 +6,9 @@
 
 /* How the integers of one level and segment are to be read. */
 typedef struct ath_stream {
-    double step;             /* quantisation step, scene units */
+    double step;                 /* quantisation step, scene units */
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
-    const double *temporal;  /* temporal_rank x frames, orthonormal rows */
+    const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
     int32_t reserved;
 } ath_stream;
@@ -31,16 +31,16 @@ enum { ATH_SHAPE_MODES = 16, ATH_SHAPE_NUMBERS = 3 * ATH_SHAPE_MODES };
 
 /* The integers of one piece. */
 typedef struct {
-    int32_t *modes;        /* rank rows */
+    int32_t *modes; /* rank rows */
     int32_t *rotation, *shift;
-    int32_t *counts;       /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
-    int32_t shape_count;   /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
-    const double *shapes;  /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
+    int32_t *counts;      /* ATH_SLOTS: frequencies that each row holds; null: as many as the stream may */
+    int32_t shape_count;  /* above 0: axis a of row r is the track of shape 3 r + a, where there is one */
+    const double *shapes; /* shape_count x ATH_SHAPE_NUMBERS: axis a of mode m at 3 m + a */
 } ath_piece_rows;
 
 /* The integers of one node: columns of its map, translation; exponent of its half-octave step. */
 typedef struct {
-    int32_t *rows;         /* 4 rows */
+    int32_t *rows; /* 4 rows */
     int32_t *step;
 } ath_node_rows;
 
@@ -54,7 +54,7 @@ typedef struct {
     double *rows;   /* of the longest piece, or of a map, x 3 x frames: coefficients over time */
     double *placed; /* as many: positions */
     ath_frames at;
-    double *track;  /* 3 x frames */
+    double *track; /* 3 x frames */
 } ath_scratch;
 
 ATH_ENCODER_API size_t ath_motion_work(int32_t longest, int32_t frames);
@@ -76,8 +76,8 @@ const double *ath_pose_piece(const ath_plan *plan, const ath_motion *motion, int
 void ath_node_map(const ath_plan *plan, const ath_motion *motion, int32_t n, const ath_piece_rows *piece_rows,
                   const ath_node_rows *rows, const ath_scratch *scratch);
 
-void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step, const int32_t *quantised,
-                          double *row);
+void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t count, double step,
+                          const int32_t *quantised, double *row);
 /* x := c + R x, 3 x frames. */
 void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
@@ -139,9 +139,6 @@ ATH_INLINE int32_t *ath_row(int32_t *rows, int32_t row, int32_t frames)
 }
 
 /* Adds a correction to a position; nothing else does. */
-ATH_INLINE double ath_corrected(double position, int32_t steps, double step)
-{
-    return position + (double)steps * step;
-}
+ATH_INLINE double ath_corrected(double position, int32_t steps, double step) { return position + (double)steps * step; }
 
 #endif

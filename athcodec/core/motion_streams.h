@@ -34,7 +34,8 @@ static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece
         most = 3 * ath_shape_modes(piece);
     }
     int32_t given = ath_min(count, most) - from;
-    int32_t own = (int32_t)code_unsigned(coder, &model->count, (uint32_t)model->count_before[part] * 16, (uint32_t)given);
+    int32_t own =
+        (int32_t)code_unsigned(coder, &model->count, (uint32_t)model->count_before[part] * 16, (uint32_t)given);
     model->count_before[part] = own;
     if (own > most - from) return -1;
     for (int32_t s = from; s < from + own; s++)
@@ -120,7 +121,7 @@ typedef struct {
     number_model size;
     correction_row row[2]; /* of the vertex before and of this one; which is which: `turn` */
     int32_t turn;
-    int32_t before;        /* whether the two vertices before had any */
+    int32_t before; /* whether the two vertices before had any */
 } correction_model;
 
 static void correction_model_init(correction_model *model)
@@ -178,24 +179,27 @@ static void code_correction(ath_coder *coder, correction_model *model, const int
     }
 }
 
-static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames, const correction_row *above,
-                                  correction_row *row)
+static void code_corrected_frames(ath_coder *coder, correction_model *model, int32_t frames,
+                                  const correction_row *above, correction_row *row)
 {
     int any = 0, block_before = 0;
     for (int32_t from = 0, b = 1; from < frames; from += CORRECTION_BLOCK, b++) {
         int32_t to = ath_min(from + CORRECTION_BLOCK, frames);
         const uint8_t *blocks = above->blocks + b;
         int beside = (blocks[0] != 0) + 2 * ((blocks[-1] | blocks[0] | blocks[1]) != 0);
-        int block = to == frames && !any ? 1
-                    : coder_bit(coder, &model->block[block_before][beside], row->blocks[b] != 0);
+        int block =
+            to == frames && !any ? 1 : coder_bit(coder, &model->block[block_before][beside], row->blocks[b] != 0);
         int found = 0;
         block_before = block;
         any |= block;
         for (int32_t t = from; block && t < to; t++) {
             int earlier = has_correction(row, t - 1) ? 2 : has_correction(row, t - 2) ? 1 : 0;
-            int near = has_correction(above, t) ? 2 : has_correction(above, t - 1) | has_correction(above, t + 1) ? 1 : 0;
-            int here = t == to - 1 && !found ? 1
-                       : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
+            int near = has_correction(above, t)                                      ? 2
+                       : has_correction(above, t - 1) | has_correction(above, t + 1) ? 1
+                                                                                     : 0;
+            int here = t == to - 1 && !found
+                           ? 1
+                           : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
             if (!here) continue;
             found = 1;
             code_correction(coder, model, earlier == 2 ? row->q[t - 1] : above->q[t], row->q[t]);

@@ -45,7 +45,8 @@ ATH_INLINE int32_t number_class(uint32_t expected)
 static void number_model_init(number_model *model)
 {
     for (int32_t c = 0; c < NUMBER_CLASSES; c++) {
-        uint32_t mean = c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, mid of c */
+        uint32_t mean =
+            c < 2 ? (uint32_t)(c * 2 + 1) : (uint32_t)(5 + (c & 1) * 2) << (c / 2 - 1); /* in 1/32, mid of c */
         uint32_t more = (uint32_t)(((uint64_t)mean << 16) / (mean + 32));
         for (int32_t bin = 0; bin < NUMBER_BINS; bin++) {
             context_init(&model->size[c][bin], more);
@@ -63,8 +64,8 @@ ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int
     for (int32_t bit = length - 2; bit >= 0; bit--) {
         int given = (int)(value >> bit & 1);
         int32_t taken = length - 2 - bit;
-        int coded = taken < 2 ? coder_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given)
-                              : coder_raw_bit(coder, given);
+        int coded =
+            taken < 2 ? coder_bit(coder, &contexts[taken ? 1 + (built & 1) : 0], given) : coder_raw_bit(coder, given);
         built = built << 1 | (uint64_t)coded;
     }
     return built;

@@ -11,7 +11,8 @@ int32_t ath_count_pieces(ath_branch *branches, int32_t branch_count, int32_t ver
     int32_t total = 0, next = 0;
     for (int32_t b = 0; b < branch_count; b++) {
         ath_branch *branch = branches + b;
-        if (branch->parent >= b || branch->parent < -1 || branch->count < 1 || branch->count > vertex_count - next) return 0;
+        if (branch->parent >= b || branch->parent < -1 || branch->count < 1 || branch->count > vertex_count - next)
+            return 0;
         branch->first = next;
         branch->subtree = 1;
         branch->depth = 0;
@@ -88,7 +89,8 @@ static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stac
     for (int32_t p = 0; p < plan->piece_count; p++)
         if (pieces[p].parent >= 0) pieces[pieces[p].parent].last_attached = p;
     for (int32_t p = 0; p < plan->piece_count; p++) {
-        while (!keep && height > 0 && pieces[stack[height - 1]].last_attached <= p) used = pieces[stack[--height]].attach_cache;
+        while (!keep && height > 0 && pieces[stack[height - 1]].last_attached <= p)
+            used = pieces[stack[--height]].attach_cache;
         if (pieces[p].last_attached < 0) continue;
         stack[height++] = p;
         pieces[p].attach_cache = used;
@@ -158,7 +160,8 @@ static void whiten(const ath_plan *plan, ath_node *node)
             w[axis] = 1.0;
             for (int32_t r = 0; r < node->rank; r++) {
                 const double *earlier = node->whitening + 3 * r;
-                double shared = earlier[0] * moment[axis] + earlier[1] * moment[3 + axis] + earlier[2] * moment[6 + axis];
+                double shared =
+                    earlier[0] * moment[axis] + earlier[1] * moment[3 + axis] + earlier[2] * moment[6 + axis];
                 left = left - shared * shared;
                 for (int32_t k = 0; k < 3; k++) w[k] = w[k] - shared * earlier[k];
             }

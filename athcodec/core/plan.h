@@ -16,8 +16,8 @@ typedef struct ath_piece {
     int32_t branch;
     int32_t flags;
     int32_t rank;
-    int32_t level;        /* whose stream completes it */
-    int32_t low_level;    /* whose stream holds its tracks and first modes, -1 when `level` does */
+    int32_t level;     /* whose stream completes it */
+    int32_t low_level; /* whose stream holds its tracks and first modes, -1 when `level` does */
     int32_t low_modes;
     int32_t last_attached; /* last piece that hangs on it, -1: none */
     int32_t reserved;
@@ -25,23 +25,23 @@ typedef struct ath_piece {
 
 /* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */
 typedef struct ath_node {
-    double whitening[9];  /* rows: functionals that are orthonormal over the subtree's rest vertices */
+    double whitening[9]; /* rows: functionals that are orthonormal over the subtree's rest vertices */
     int32_t branch, piece;
     int32_t first, count; /* vertices of the subtree */
     int32_t level, last;
-    int32_t coded;        /* 1: its map has a stream of its own; 0: it follows from the stem's first modes */
-    int32_t rank;         /* of the rest vertices about the attach point */
+    int32_t coded; /* 1: its map has a stream of its own; 0: it follows from the stem's first modes */
+    int32_t rank;  /* of the rest vertices about the attach point */
 } ath_node;
 
 typedef struct ath_plan {
     int32_t vertex_count, branch_count, piece_count, node_count;
     int64_t attach_cache_rows; /* memory of all attach caches, in vertices */
-    int32_t height;       /* deepest node: levels run from 0 to height + 1 */
-    int32_t longest;      /* vertices of the longest piece */
+    int32_t height;            /* deepest node: levels run from 0 to height + 1 */
+    int32_t longest;           /* vertices of the longest piece */
     const ath_branch *branches;
     const ath_piece *pieces;
     const ath_node *nodes;
-    const double *rest;   /* vertex_count x 3, relative to the origin */
+    const double *rest; /* vertex_count x 3, relative to the origin */
     const double *bases;
 } ath_plan;
 
@@ -60,16 +60,16 @@ ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node 
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
-                                 int32_t *table);
+                                         int32_t *table);
 /* work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases);
 /* The same by ranges of pieces, in two passes: the sheets of one need the modes of any. */
 ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps,
-                             double *work, double *bases);
+                                     double *work, double *bases);
 ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
-                              double *bases);
+                                      double *bases);
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
 void ath_rest_basis(int32_t n, double *basis, double *work);
 /* Eigenvalues, in descending order, and eigenvectors, a row each, of symmetric n x n matrices, which are destroyed;
@@ -84,10 +84,7 @@ ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
 /* tan(x / 2) for 0 <= x < pi, by the series of the cosines. */
 double ath_tan_of_half(double x);
 
-ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex)
-{
-    return plan->rest + 3 * (size_t)vertex;
-}
+ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex) { return plan->rest + 3 * (size_t)vertex; }
 
 /* Rest position of the point that a piece hangs on. */
 ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *piece)
@@ -95,10 +92,7 @@ ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *
     return ath_rest_of(plan, piece->attach >= 0 ? piece->attach : piece->first);
 }
 
-ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level)
-{
-    return node->level <= level && level <= node->last;
-}
+ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level) { return node->level <= level && level <= node->last; }
 
 ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
 {

@@ -144,7 +144,7 @@ static void matrix_of(const ath_file *file, const ath_part *part, const double m
         const double *R = map + 3 * i;
         for (int32_t k = 0; k < 3; k++) matrix[4 * i + k] = R[k];
         matrix[4 * i + 3] = (map[9 + i] + origin[i])
-            - (R[0] * (a[0] + origin[0]) + R[1] * (a[1] + origin[1]) + R[2] * (a[2] + origin[2]));
+                            - (R[0] * (a[0] + origin[0]) + R[1] * (a[1] + origin[1]) + R[2] * (a[2] + origin[2]));
     }
 }
 
@@ -305,7 +305,7 @@ int ath_positions(const ath_file *file, const ath_segment *const *segments, int3
 }
 
 int ath_positions_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
-                       ath_order order, double *xyz, size_t stride)
+                          ath_order order, double *xyz, size_t stride)
 {
     return positions(file, segments, segment_count, frame, target_of(file, order, xyz, stride, 1));
 }
@@ -325,7 +325,7 @@ int ath_exact(const ath_file *file, const ath_segment *const *segments, int32_t 
 }
 
 int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
-                   double *xyz, size_t stride)
+                      double *xyz, size_t stride)
 {
     return exact(file, segments, segment_count, frame, target_of(file, ATH_FILE_ORDER, xyz, stride, 1));
 }
@@ -364,7 +364,7 @@ int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32
 }
 
 int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
-                      double *out, size_t stride)
+                         double *out, size_t stride)
 {
     return matrices(file, segments, segment_count, frame, out, stride, 1);
 }

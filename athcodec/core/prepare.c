@@ -59,9 +59,9 @@ struct ath_work {
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
-    int32_t index, level;    /* of the segment in preparation */
-    int32_t next;            /* level of CHECKSUMS and HEADS, piece of PIECES */
-    int32_t next_kind;       /* of CHECKSUMS */
+    int32_t index, level; /* of the segment in preparation */
+    int32_t next;         /* level of CHECKSUMS and HEADS, piece of PIECES */
+    int32_t next_kind;    /* of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
@@ -109,7 +109,8 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     work->piece.shift = (int32_t *)ath_take(&arena, row);
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
     work->motion.work = (double *)ath_take(&arena, ath_motion_work(file->plan.longest, frames) * sizeof(double));
-    work->motion.attach_caches = (double *)ath_take(&arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
+    work->motion.attach_caches =
+        (double *)ath_take(&arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
     return arena.used;
 }
 
@@ -193,8 +194,8 @@ static int find_chunks(ath_work *work)
         if (result == ATH_OK) result = check_fed(work, affines);
         if (result == ATH_OK) result = check_fed(work, shapes);
     }
-    work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
-                                           work->file->plan.height + 1);
+    work->corrections.chunk =
+        wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS, work->file->plan.height + 1);
     work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
@@ -280,7 +281,8 @@ static int check_some(ath_work *work)
 {
     const ath_chunk *chunk = chunk_to_check(work);
     if (chunk && work->crc_at < chunk->length) {
-        uint32_t left = chunk->length - work->crc_at, size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
+        uint32_t left = chunk->length - work->crc_at,
+                 size = left < (uint32_t)CHECKSUM_STEP ? left : (uint32_t)CHECKSUM_STEP;
         work->crc = ath_crc32c(work->crc, chunk->bytes + work->crc_at, size);
         work->crc_at += size;
     }
@@ -297,8 +299,8 @@ static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reade
     int32_t frames = work->motion.frames, limit = 1 << (head->bits - 1);
     size_t count = (size_t)head->rank * (size_t)frames;
     int32_t *integers = (int32_t *)(void *)reader->temporal + count;
-    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames, limit,
-                                     integers);
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames,
+                                     limit, integers);
     double unit = 1.0 / (double)limit;
     for (size_t i = 0; result == ATH_OK && i < count; i++) reader->temporal[i] = (double)integers[i] * unit;
     stream->temporal = reader->temporal;
@@ -361,8 +363,7 @@ static int open_level(ath_work *work)
 
 static void clear_row(int32_t *row, int32_t frames, int32_t *count)
 {
-    for (int32_t axis = 0; axis < 3 && *count > 0; axis++)
-        memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
+    for (int32_t axis = 0; axis < 3 && *count > 0; axis++) memset(row + axis * frames, 0, (size_t)*count * sizeof *row);
     *count = 0;
 }
 
@@ -469,8 +470,9 @@ static int read_exact_point(ath_work *work, size_t at)
     double known[3], number[3];
     for (size_t k = 0; k < 3; k++)
         known[k] = work->segment->is_float64 ? ((const double *)work->segment->positions)[at + k]
-                                       : (double)((const float *)work->segment->positions)[at + k];
-    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number)) return 0;
+                                             : (double)((const float *)work->segment->positions)[at + k];
+    if (!code_exact_point(&reader->coder, reader->model, work->segment->is_float64, known, reader->length, number))
+        return 0;
     for (size_t k = 0; k < 3; k++) {
         if (work->segment->is_float64)
             ((double *)work->segment->positions)[at + k] = number[k];

@@ -9,18 +9,18 @@
 #include "internal.h"
 
 typedef struct {
-    uint16_t one;         /* probability of a 1, in 1/65536 */
-    uint16_t experience;  /* bits seen, up to RATE_LIMIT */
+    uint16_t one;        /* probability of a 1, in 1/65536 */
+    uint16_t experience; /* bits seen, up to RATE_LIMIT */
 } ath_context;
 
 enum { RATE_LIMIT = 60, PROBABILITY_MIN = 48 };
 
 /* 65536 / (experience + 2.5) and at last 65536 / 95, rounded down */
 static const uint16_t ath_rate[RATE_LIMIT + 1] = {
-    26214, 18724, 14563, 11915, 10082, 8738, 7710, 6898, 6241, 5698, 5242, 4854, 4519, 4228, 3971, 3744, 3542, 3360,
-    3196, 3048, 2912, 2788, 2674, 2570, 2473, 2383, 2299, 2221, 2148, 2080, 2016, 1956, 1899, 1846, 1795, 1747,
-    1702, 1659, 1618, 1579, 1542, 1506, 1472, 1440, 1409, 1379, 1351, 1323, 1297, 1272, 1248, 1224, 1202, 1180,
-    1159, 1139, 1120, 1101, 1083, 1065, 690};
+    26214, 18724, 14563, 11915, 10082, 8738, 7710, 6898, 6241, 5698, 5242, 4854, 4519, 4228, 3971, 3744,
+    3542,  3360,  3196,  3048,  2912,  2788, 2674, 2570, 2473, 2383, 2299, 2221, 2148, 2080, 2016, 1956,
+    1899,  1846,  1795,  1747,  1702,  1659, 1618, 1579, 1542, 1506, 1472, 1440, 1409, 1379, 1351, 1323,
+    1297,  1272,  1248,  1224,  1202,  1180, 1159, 1139, 1120, 1101, 1083, 1065, 690};
 
 ATH_INLINE void context_learn(ath_context *context, int bit)
 {
@@ -68,7 +68,8 @@ static void coder_start(ath_coder *coder, uint8_t *bytes, size_t capacity)
 static void coder_carry(ath_coder *coder)
 {
     size_t at = coder->size;
-    while (at > 0 && ++coder->bytes[--at] == 0) {}
+    while (at > 0 && ++coder->bytes[--at] == 0) {
+    }
 }
 
 static void coder_shift(ath_coder *coder)

@@ -29,8 +29,7 @@ static void hierarchy_model_init(hierarchy_model *model)
 static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
 {
     int32_t coded = 0;
-    for (int32_t i = 0; i < 3; i++)
-        coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
+    for (int32_t i = 0; i < 3; i++) coded |= coder_bit(coder, &model->flag[i][before >> i & 1], flags >> i & 1) << i;
     return coded;
 }
 
@@ -271,7 +270,8 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const ath_branch
     int32_t from = branch->attach < 0, left = branch->count - from, runs = (left + REST_RUN - 1) / REST_RUN;
     if (from) code_rest_vertex(coder, model, branch, 0, step, source, rest);
     for (int32_t r = 0; r < runs; r++) {
-        int32_t start = from + (int32_t)((int64_t)left * r / runs), end = from + (int32_t)((int64_t)left * (r + 1) / runs);
+        int32_t start = from + (int32_t)((int64_t)left * r / runs),
+                end = from + (int32_t)((int64_t)left * (r + 1) / runs);
         size_t before = start > 0 ? (size_t)(branch->first + start - 1) : (size_t)branch->attach;
         double base[3] = {rest[3 * before], rest[3 * before + 1], rest[3 * before + 2]};
         code_rest_run(coder, model, branch->first + start, end - start, base, step, source, rest);

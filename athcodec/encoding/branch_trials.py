@@ -74,5 +74,7 @@ class _Trial:
                 entries = job.encode(bound, ct.ChunkStore(spool)).store.entries
             except BoundError:
                 return math.inf
-        return sum(chunk.length * (self._frames_ratio if chunk.is_motion and chunk.kind != ct.SHAPES else 1)
-                   for chunk, _ in entries)
+        return sum(
+            chunk.length * (self._frames_ratio if chunk.is_motion and chunk.kind != ct.SHAPES else 1)
+            for chunk, _ in entries
+        )

@@ -101,8 +101,16 @@ def encode(
         Where the file cannot be written.
     """
     option = BoundOption(max_error, rel_error, target_size, lossless)
-    options = EncodingOptions.of(segment_frames=segment_frames, tam=tam, exact_rest=exact_rest, lossless=lossless,
-                                 weights=weights, attributes=attributes, effort=effort, jobs=jobs)
+    options = EncodingOptions.of(
+        segment_frames=segment_frames,
+        tam=tam,
+        exact_rest=exact_rest,
+        lossless=lossless,
+        weights=weights,
+        attributes=attributes,
+        effort=effort,
+        jobs=jobs,
+    )
     check_target(path)  # before any work
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
@@ -226,6 +234,15 @@ def _weighted_progress(
     clip: MotionClip, progress: Progress | None, option: BoundOption, options: EncodingOptions, draft: bool = False
 ) -> WeightedProgress:
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
-    return WeightedProgress(progress, stage_weights(
-        clip.vertex_count, segments, options.effort, samples=min(SAMPLES, len(clip.clip_range_frames)),
-        branches=not clip.has_branches, sizes=option.target_size is not None, motion=not draft))
+    return WeightedProgress(
+        progress,
+        stage_weights(
+            clip.vertex_count,
+            segments,
+            options.effort,
+            samples=min(SAMPLES, len(clip.clip_range_frames)),
+            branches=not clip.has_branches,
+            sizes=option.target_size is not None,
+            motion=not draft,
+        ),
+    )

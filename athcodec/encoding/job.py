@@ -100,16 +100,19 @@ class CodedSegment:
 def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
     """Raises ClipError for counts that decoders refuse."""
     limits = ct.Limits()
-    for name, value, limit in (("vertices", clip.vertex_count, limits.vertices),
-                               ("branches", clip.branch_count, limits.branches),
-                               ("frames", clip.frame_count, limits.frames),
-                               ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth)):
+    for name, value, limit in (
+        ("vertices", clip.vertex_count, limits.vertices),
+        ("branches", clip.branch_count, limits.branches),
+        ("frames", clip.frame_count, limits.frames),
+        ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth),
+    ):
         if value > limit:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _completed(clip: MotionClip, found: Found | None,
-               weights: str | np.ndarray | None) -> tuple[MotionClip, np.ndarray | None]:
+def _completed(
+    clip: MotionClip, found: Found | None, weights: str | np.ndarray | None
+) -> tuple[MotionClip, np.ndarray | None]:
     """The clip on branches that were found for it, and its weights, which it then names."""
     if found is not None:
         clip = with_branches(clip, found)
@@ -124,8 +127,10 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
         raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
     array = attributes[name]
     if array.size != clip.vertex_count or array.dtype.kind not in "biuf":
-        raise ClipError(f"weights: got {array.dtype} of shape {array.shape} in {name!r}, expected a number for each of "
-                        f"{clip.vertex_count} vertices")
+        raise ClipError(
+            f"weights: got {array.dtype} of shape {array.shape} in {name!r}, expected a number for each of "
+            f"{clip.vertex_count} vertices"
+        )
     values = array.reshape(-1).astype(np.float64)
     bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
     if bad.size:
@@ -194,10 +199,18 @@ class EncodingJob:
         return cls(source, options, report, draft.found)
 
     @staticmethod
-    def _source(clip: MotionClip, seen: Survey, factors: np.ndarray | None, options: EncodingOptions,
-                pool: ThreadPool) -> Source:
-        return Source(clip, seen.hierarchy, seen, options.segment_frames, options.exact_rest or options.lossless,
-                      None if factors is None else factors[seen.hierarchy.vertex_source], pool)
+    def _source(
+        clip: MotionClip, seen: Survey, factors: np.ndarray | None, options: EncodingOptions, pool: ThreadPool
+    ) -> Source:
+        return Source(
+            clip,
+            seen.hierarchy,
+            seen,
+            options.segment_frames,
+            options.exact_rest or options.lossless,
+            None if factors is None else factors[seen.hierarchy.vertex_source],
+            pool,
+        )
 
     @property
     def clip(self) -> MotionClip:
@@ -220,22 +233,32 @@ class EncodingJob:
 
     def decide(self, bound: float) -> _Decided:
         """Searches for settings."""
-        qz.check_bound(self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype,
-                       self.source.extent)
+        qz.check_bound(
+            self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
+        )
         ath = self.seen.ath(self.thresholds(bound))
         return _Decided(ath, *decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs))
 
     def draft(self, decided: _Decided) -> Draft:
-        return Draft(decided.settings, decided.learned_modes, self.seen, self.segment_count, self.found, self.options,
-                     decided.fingerprint)
+        return Draft(
+            decided.settings,
+            decided.learned_modes,
+            self.seen,
+            self.segment_count,
+            self.found,
+            self.options,
+            decided.fingerprint,
+        )
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         ath = self.seen.ath(self.thresholds(draft.settings.bound))
         decided = _Decided(ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes)
         if decided.fingerprint != draft.fingerprint:
-            raise ClipError("clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
-                            "on machines that calculate alike")
+            raise ClipError(
+                "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
+                "on machines that calculate alike"
+            )
         return decided
 
     def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
@@ -251,8 +274,14 @@ class EncodingJob:
                 return math.inf
         return result.store.size(result.header)
 
-    def write(self, path: str | PathLike[str], out: BinaryIO, spool: IO[bytes], decided: _Decided,
-              coded: Iterable[CodedSegment]) -> Summary:
+    def write(
+        self,
+        path: str | PathLike[str],
+        out: BinaryIO,
+        spool: IO[bytes],
+        decided: _Decided,
+        coded: Iterable[CodedSegment],
+    ) -> Summary:
         """The whole file into `out`, which is to become `path`."""
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
@@ -276,10 +305,17 @@ class EncodingJob:
         self._add_static(store)
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
-        header = ct.Header(self.clip.vertex_count, self.clip.branch_count, self.clip.frame_count,
-                           self.segment_count, len(errors), len(errors),
-                           0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
-                           self.clip.dtype == np.float64, len(self.clip.clip_range_frames))
+        header = ct.Header(
+            self.clip.vertex_count,
+            self.clip.branch_count,
+            self.clip.frame_count,
+            self.segment_count,
+            len(errors),
+            len(errors),
+            0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
+            self.clip.dtype == np.float64,
+            len(self.clip.clip_range_frames),
+        )
         return _Result(store, header, errors)
 
     def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
@@ -288,8 +324,10 @@ class EncodingJob:
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
-        return [self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-                for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)]
+        return [
+            self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
+            for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames)
+        ]
 
     @staticmethod
     def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
@@ -310,19 +348,25 @@ class EncodingJob:
         for clip, (start, stop) in zip(decoder.clips, self.clip.clip_range_frames):
             if clip.loop:
                 beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
-                step, *steps = (np.linalg.norm(self._step(*frames), axis=1).max()
-                                for frames in [(stop - 1, start), *beside])
+                step, *steps = (
+                    np.linalg.norm(self._step(*frames), axis=1).max() for frames in [(stop - 1, start), *beside]
+                )
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
     def _add_prelude(self, store: ct.ChunkStore, prelude: CodedPrelude, ath: Ath) -> None:
         limits = ath.thresholds
-        store.add(ct.HIERARCHY, ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam),
-                                                  prelude.hierarchy_stream))
+        store.add(
+            ct.HIERARCHY,
+            ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam), prelude.hierarchy_stream),
+        )
         store.add(ct.REST, ct.pack_rest(prelude.rest_chunk))
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
-        metadata = self.clip.metadata if self._keeps_static else {
-            key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
+        metadata = (
+            self.clip.metadata
+            if self._keeps_static
+            else {key: self.clip.metadata[key] for key in STATIC_METADATA if key in self.clip.metadata}
+        )
         if metadata:
             store.add(ct.METADATA, ct.pack_metadata(metadata))
         if self._keeps_static and self.clip.faces is not None:
@@ -345,11 +389,13 @@ class EncodingJob:
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Some segments, coded a few at a time, while the next one is read."""
+
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
-            return CodedSegment(index, *code_segment(
-                decided.prelude, decided.settings, positions, decided.learned_modes, exact))
+            return CodedSegment(
+                index, *code_segment(decided.prelude, decided.settings, positions, decided.learned_modes, exact)
+            )
 
         at_once = thread_count(self.options.jobs, self.source)
         pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)
@@ -376,19 +422,34 @@ class EncodingJob:
         return errors
 
 
-def _summary(path: Path, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk],
-             decoder: Decoder) -> Summary:
+def _summary(
+    path: Path, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
+) -> Summary:
     sizes: dict[str, int] = {}
     for chunk in chunks:
         name = ct.KIND_NAMES[chunk.kind]
         sizes[name] = sizes.get(name, 0) + chunk.length
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
     settings, bound = decided.settings, decided.settings.bound
-    choices = {"step_ratio": settings.step / bound, "rest_step_ratio": settings.rest_step / bound,
-               "rotations": list(settings.rotation_step_factors), "learned": list(settings.learned_bases),
-               "sheets": int(settings.sheet.sum()),
-               "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum())}
+    choices = {
+        "step_ratio": settings.step / bound,
+        "rest_step_ratio": settings.rest_step / bound,
+        "rotations": list(settings.rotation_step_factors),
+        "learned": list(settings.learned_bases),
+        "sheets": int(settings.sheet.sum()),
+        "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
+    }
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
-    return Summary(path, result.header.file_length, raw, settings.largest_bound,
-                   bound / diagonal if diagonal > 0 else 0.0, decoder.file.table1(), decoder.file.levels, sizes, choices,
-                   job.seams(decoder), None if job.found is None else str(job.found))
+    return Summary(
+        path,
+        result.header.file_length,
+        raw,
+        settings.largest_bound,
+        bound / diagonal if diagonal > 0 else 0.0,
+        decoder.file.table1(),
+        decoder.file.levels,
+        sizes,
+        choices,
+        job.seams(decoder),
+        None if job.found is None else str(job.found),
+    )

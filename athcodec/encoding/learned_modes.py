@@ -52,8 +52,11 @@ class Components:
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     """Of segments that were analysed with a fine step, without learned modes and in cosines."""
     sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
-    groups = [(pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
-              for size in np.unique(sizes) for pieces in [np.flatnonzero(sizes == size)]]
+    groups = [
+        (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
+        for size in np.unique(sizes)
+        for pieces in [np.flatnonzero(sizes == size)]
+    ]
     frames = 0
     for segment in segments:
         frames += segment.frames
@@ -115,14 +118,14 @@ def _packed(counts: np.ndarray, rows: list[np.ndarray]) -> LearnedModes:
     at = 0
     for numbers in rows:
         count, size = len(numbers), numbers.shape[1] // 3
-        integers[at: at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
+        integers[at : at + count, :, :size] = numbers.reshape(count, size, 3).transpose(0, 2, 1)
         at += count
     integers = integers.reshape(-1, NUMBERS)
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     at = 0
     for numbers in rows:
-        own = units[at: at + len(numbers)]
-        duals[at: at + len(own)] = np.linalg.solve(own @ own.T + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
+        own = units[at : at + len(numbers)]
+        duals[at : at + len(own)] = np.linalg.solve(own @ own.T + 1e-4 * np.eye(len(own)), own)  # few are nearly alike
         at += len(own)
     return LearnedModes(counts, first, integers, units, duals)
 

@@ -63,9 +63,15 @@ class Plan:
         node_count = lib.ath_count_nodes(address(branches, BRANCH, 1), len(branches))
         self.pieces = np.zeros(piece_count, PIECE)
         self.nodes = np.zeros(node_count, NODE)
-        self.core = CorePlan(vertex_count=vertex_count, branch_count=len(branches), piece_count=piece_count,
-                           node_count=node_count, branches=branches.ctypes.data, pieces=self.pieces.ctypes.data,
-                           nodes=self.nodes.ctypes.data)
+        self.core = CorePlan(
+            vertex_count=vertex_count,
+            branch_count=len(branches),
+            piece_count=piece_count,
+            node_count=node_count,
+            branches=branches.ctypes.data,
+            pieces=self.pieces.ctypes.data,
+            nodes=self.nodes.ctypes.data,
+        )
         memory = np.empty(vertex_count, np.int32)
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         self.rest = self.bases = None
@@ -90,9 +96,10 @@ class Plan:
         self.bases = np.empty(size)
 
         def fill_modes(first: int, stop: int) -> None:
-            work = np.empty(2 * PIECE_VERTICES ** 2)
-            lib.ath_basis_modes(self.pieces.ctypes.data, first, stop, gaps.ctypes.data, work.ctypes.data,
-                                self.bases.ctypes.data)
+            work = np.empty(2 * PIECE_VERTICES**2)
+            lib.ath_basis_modes(
+                self.pieces.ctypes.data, first, stop, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
+            )
 
         def fill_sheets(first: int, stop: int) -> None:
             lib.ath_basis_sheets(self.pieces.ctypes.data, first, stop, at, self.bases.ctypes.data)
@@ -162,8 +169,10 @@ class SegmentMotion:
 
     def __init__(self, plan: Plan, frames: int, streams: list[LevelStream], learned_modes: LearnedModes | None = None):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
-            raise ValueError(f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
-                             f"frames, {plan.level_count} streams")
+            raise ValueError(
+                f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
+                f"frames, {plan.level_count} streams"
+            )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
         self.coefficients = np.zeros((plan.vertex_count, 3, frames), np.int32)
@@ -182,20 +191,35 @@ class SegmentMotion:
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
-        self.motion = Motion(streams=addressof(self._c_streams), cosines=self.cosines.ctypes.data,
-                             attach_caches=self._attach_caches.ctypes.data, frames=self.frames)
-        self.integers = Integers(self.coefficients.ctypes.data, self.tracks.ctypes.data, self.node_tracks.ctypes.data,
-                                 self.node_steps.ctypes.data)
+        self.motion = Motion(
+            streams=addressof(self._c_streams),
+            cosines=self.cosines.ctypes.data,
+            attach_caches=self._attach_caches.ctypes.data,
+            frames=self.frames,
+        )
+        self.integers = Integers(
+            self.coefficients.ctypes.data,
+            self.tracks.ctypes.data,
+            self.node_tracks.ctypes.data,
+            self.node_steps.ctypes.data,
+        )
         if self.learned_modes is not None:
-            for name, array in (("shape_counts", self.learned_modes.counts), ("shape_first", self.learned_modes.first),
-                                ("shapes", self.learned_modes.units), ("duals", self.learned_modes.duals)):
+            for name, array in (
+                ("shape_counts", self.learned_modes.counts),
+                ("shape_first", self.learned_modes.first),
+                ("shapes", self.learned_modes.units),
+                ("duals", self.learned_modes.duals),
+            ):
                 setattr(self.integers, name, array.ctypes.data)
 
     def analyse(self, source: np.ndarray, dead_zone: float) -> None:
         """Fills coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop."""
         at = self._source(source)
-        self._piecewise(lambda motion, first, stop: lib.ath_analyse(
-            self.plan.core, motion, self.integers, first, stop, at, dead_zone))
+        self._piecewise(
+            lambda motion, first, stop: lib.ath_analyse(
+                self.plan.core, motion, self.integers, first, stop, at, dead_zone
+            )
+        )
 
     def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
         """Fills the maps of the nodes, after `analyse` or `pose`.
@@ -203,8 +227,11 @@ class SegmentMotion:
         A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
         at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
-        self._nodewise(lambda motion, first, stop: lib.ath_analyse_nodes(
-            self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone))
+        self._nodewise(
+            lambda motion, first, stop: lib.ath_analyse_nodes(
+                self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone
+            )
+        )
 
     def clear_nodes(self) -> None:
         """Sets the maps of the nodes to zero."""
@@ -223,6 +250,7 @@ class SegmentMotion:
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
         """The call with scratch memory of its own."""
+
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
             work = np.empty(lib.ath_motion_work(self.plan.core.longest, self.frames))
@@ -238,10 +266,12 @@ class SegmentMotion:
         """Positions at `level`, corrections not included: (N, 3, frames) float32 or float64, origin added."""
         positions = np.empty((self.plan.vertex_count, 3, self.frames), dtype)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
-        self._piecewise(lambda motion, first, stop: lib.ath_pose(
-            self.plan.core, motion, self.integers, first, stop, *into))
-        self._nodewise(lambda motion, first, stop: lib.ath_pose_nodes(
-            self.plan.core, motion, self.integers, first, stop, *into))
+        self._piecewise(
+            lambda motion, first, stop: lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
+        )
+        self._nodewise(
+            lambda motion, first, stop: lib.ath_pose_nodes(self.plan.core, motion, self.integers, first, stop, *into)
+        )
         return positions
 
 
@@ -253,24 +283,39 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     out = np.empty((vertices, 3, frames))
 
     def fill(start: int, stop: int) -> None:
-        lib.ath_gather(stop - start, frames, address(vertex_source[start:stop], np.int32, stop - start),
-                       block.shape[1], block.dtype == np.float64, block.ctypes.data, address(origin, np.float64, 3),
-                       out[start:stop].ctypes.data)
+        lib.ath_gather(
+            stop - start,
+            frames,
+            address(vertex_source[start:stop], np.int32, stop - start),
+            block.shape[1],
+            block.dtype == np.float64,
+            block.ctypes.data,
+            address(origin, np.float64, 3),
+            out[start:stop].ctypes.data,
+        )
 
     pool.map(fill, ranges(vertices, 3 * frames))
     return out
 
 
-def position_error(positions: np.ndarray, source: np.ndarray, origin: np.ndarray,
-                   pool: ThreadPool = SERIAL) -> tuple[float, float]:
+def position_error(
+    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL
+) -> tuple[float, float]:
     """Largest distance, and sum of squared distances, of decoded positions from the source."""
     vertices, _, frames = positions.shape
 
     def measured(start: int, stop: int) -> np.ndarray:
         result, part = np.empty(2), positions[start:stop]
-        lib.ath_error(stop - start, frames, part.dtype == np.float64, address(part, part.dtype, 0),
-                      address(source[start:stop], np.float64, part.size), address(origin, np.float64, 3),
-                      result[:1].ctypes.data, result[1:].ctypes.data)
+        lib.ath_error(
+            stop - start,
+            frames,
+            part.dtype == np.float64,
+            address(part, part.dtype, 0),
+            address(source[start:stop], np.float64, part.size),
+            address(origin, np.float64, 3),
+            result[:1].ctypes.data,
+            result[1:].ctypes.data,
+        )
         return result
 
     largest, squares = np.transpose(pool.map(measured, ranges(vertices, 3 * frames)))

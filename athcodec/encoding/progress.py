@@ -40,14 +40,25 @@ class WeightedProgress:
             self._progress(stage, self._reached)
 
 
-def stage_weights(vertices: int, segments: list[tuple[int, int]], effort: str, *, samples: int, branches: bool,
-            sizes: bool, motion: bool) -> dict[str, float]:
+def stage_weights(
+    vertices: int,
+    segments: list[tuple[int, int]],
+    effort: str,
+    *,
+    samples: int,
+    branches: bool,
+    sizes: bool,
+    motion: bool,
+) -> dict[str, float]:
     """The estimated work of each stage. samples: segments that each trial codes; branches: they have to be found first;
     sizes: a target is to be met; motion: it is coded too, after the search."""
     longest = max(stop - start for start, stop in segments)
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
-    work = {"survey": SURVEY * vertices * segments[-1][1], "search": TRIAL * TRIALS[effort] * samples * some * longest,
-            "motion": MOTION * vertices * segments[-1][1]}
+    work = {
+        "survey": SURVEY * vertices * segments[-1][1],
+        "search": TRIAL * TRIALS[effort] * samples * some * longest,
+        "motion": MOTION * vertices * segments[-1][1],
+    }
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}
     tries = {"size": SIZES * (work["search"] + work["motion"])} if sizes else {}
     after = work if motion else {"survey": work["survey"], "search": work["search"]}

@@ -47,12 +47,17 @@ def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype
     """Raises BoundError for a bound not above least_bound, or too small for the file's integers to span `extent`."""
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound > least):
-        reason = ("the smallest that a file can hold" if least == SMALLEST_BOUND else
-                  f"twice the spacing of the source's {np.dtype(dtype).name} coordinates")
+        reason = (
+            "the smallest that a file can hold"
+            if least == SMALLEST_BOUND
+            else f"twice the spacing of the source's {np.dtype(dtype).name} coordinates"
+        )
         raise BoundError(f"max error: got {bound:.3g}; expected more than {least:.3g}, {reason}")
     if extent > LARGEST_EXTENT * bound:
-        raise BoundError(f"max error: got {bound:.3g}; expected at least {extent / LARGEST_EXTENT:.3g} for positions "
-                         f"and a rest pose that are up to {extent:.3g} apart")
+        raise BoundError(
+            f"max error: got {bound:.3g}; expected at least {extent / LARGEST_EXTENT:.3g} for positions "
+            f"and a rest pose that are up to {extent:.3g} apart"
+        )
 
 
 def single(value: float) -> float:

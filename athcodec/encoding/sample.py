@@ -46,11 +46,18 @@ class PlantSample:
     def _source(self, source: Source) -> Source:
         clip, places = source.clip, source.hierarchy.vertex_source[self.vertices]
         chosen = np.sort(places)
-        some = MotionClip(Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen),
-                                 clip.dtype), clip.time, rest=clip.source_rest[chosen],
-                          clip_ranges=clip.clip_ranges)
-        sample = replace(source, clip=some, hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
-                       weights=None if source.weights is None else source.weights[self.vertices])
+        some = MotionClip(
+            Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen), clip.dtype),
+            clip.time,
+            rest=clip.source_rest[chosen],
+            clip_ranges=clip.clip_ranges,
+        )
+        sample = replace(
+            source,
+            clip=some,
+            hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
+            weights=None if source.weights is None else source.weights[self.vertices],
+        )
         sample.segments = source.segments
         return sample
 
@@ -58,17 +65,26 @@ class PlantSample:
         parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]
         number_of_vertex = np.zeros(whole.vertex_count, np.int64)
         number_of_vertex[self.vertices] = np.arange(len(self.vertices))
-        return Hierarchy.from_parts(np.where(parent < 0, -1, self._number[parent]), whole.stem_count[self.branches],
-                                    np.where(attach < 0, -1, number_of_vertex[attach]), vertex_source,
-                                    np.argsort(np.argsort(whole.branch_source[self.branches])))
+        return Hierarchy.from_parts(
+            np.where(parent < 0, -1, self._number[parent]),
+            whole.stem_count[self.branches],
+            np.where(attach < 0, -1, number_of_vertex[attach]),
+            vertex_source,
+            np.argsort(np.argsort(whole.branch_source[self.branches])),
+        )
 
     def _ath(self, whole: Ath) -> Ath:
         chosen = np.flatnonzero(np.isin(whole.node_branch, self.branches))
         parent = whole.node_parent[chosen]
-        return Ath(self.source.hierarchy, whole.thresholds, whole.rest[self.vertices],
-                   self._number[whole.node_branch[chosen]].astype(np.int32),
-                   np.where(parent < 0, -1, np.searchsorted(chosen, parent)).astype(np.int32),
-                   whole.node_depth[chosen], whole.whole[chosen])
+        return Ath(
+            self.source.hierarchy,
+            whole.thresholds,
+            whole.rest[self.vertices],
+            self._number[whole.node_branch[chosen]].astype(np.int32),
+            np.where(parent < 0, -1, np.searchsorted(chosen, parent)).astype(np.int32),
+            whole.node_depth[chosen],
+            whole.whole[chosen],
+        )
 
 
 @dataclass(frozen=True)
@@ -98,8 +114,10 @@ class ExtrapolationFactors:
     def of(cls, whole: np.ndarray, sample: np.ndarray) -> ExtrapolationFactors:
         """Of branches, (B,) of _native.BRANCH."""
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, sample)]
-        rows, nodes = (np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
-                       for counts in zip(*map(_counts, plans)))
+        rows, nodes = (
+            np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
+            for counts in zip(*map(_counts, plans))
+        )
         return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes, qz.SAFE_REST_CAP)
 
 
@@ -146,7 +164,7 @@ def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarra
             continue
         due += share * size
         if 2 * due >= size:
-            kept[branch: after[branch]] = True
+            kept[branch : after[branch]] = True
             due -= size
         branch = after[branch]
     for branch, parent in reversed(list(enumerate(hierarchy.branch_parent.tolist()))):

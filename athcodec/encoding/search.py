@@ -17,13 +17,7 @@ import numpy as np
 from athcodec.ath import Ath
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.learned_modes import (
-    Components,
-    LearnedModes,
-    components,
-    estimated_bits,
-    learn,
-)
+from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
 from athcodec.encoding.motion import Plan, SegmentMotion, position_error
 from athcodec.encoding.progress import TRIALS, Progress
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
@@ -70,10 +64,12 @@ def samples_of(source: Source) -> list[SegmentSample]:
     if len(middles) == 1:
         return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
-    groups = np.array_split(np.argsort([_moved(source, segment) for segment in middles], kind="stable"),
-                            min(SAMPLES, len(middles)))
-    return [SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum()))
-            for group in groups]
+    groups = np.array_split(
+        np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
+    )
+    return [
+        SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups
+    ]
 
 
 def _moved(source: Source, segment: int) -> float:
@@ -83,8 +79,9 @@ def _moved(source: Source, segment: int) -> float:
     return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)
 
 
-def decide(source: Source, ath: Ath, bound: float, effort: str, report: Progress,
-           jobs: int | None = None) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
+def decide(
+    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None
+) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
     """Settings, and what follows from them: hierarchy and rest pose as coded, learned modes."""
     search = Search.of(source, ath, bound, effort, report, jobs)
     settings = search.found()
@@ -98,11 +95,20 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
     levels = ath.height + 2
     return Settings(
-        bound=bound, largest_bound=source.largest_bound(bound), limit=source.limit(bound), step=qz.single(step),
-        level_steps=np.ones(levels), rest_step=qz.single(rest_step), sheet=source.sheet_like,
-        loose=loose_branches(source, wildest.positions), lags=lags(source, rest_step),
-        rotation_step_factors=(0,) * levels, learned_bases=(False,) * levels, learned_pieces=None,
-        node_steps=np.full(levels, step))
+        bound=bound,
+        largest_bound=source.largest_bound(bound),
+        limit=source.limit(bound),
+        step=qz.single(step),
+        level_steps=np.ones(levels),
+        rest_step=qz.single(rest_step),
+        sheet=source.sheet_like,
+        loose=loose_branches(source, wildest.positions),
+        lags=lags(source, rest_step),
+        rotation_step_factors=(0,) * levels,
+        learned_bases=(False,) * levels,
+        learned_pieces=None,
+        node_steps=np.full(levels, step),
+    )
 
 
 class Search:
@@ -112,8 +118,17 @@ class Search:
     that is a sample of a larger plant.
     """
 
-    def __init__(self, source: Source, ath: Ath, start: Settings, samples: list[SegmentSample], effort: str,
-                 report: Progress, jobs: int | None = None, extrapolation: ExtrapolationFactors | None = None):
+    def __init__(
+        self,
+        source: Source,
+        ath: Ath,
+        start: Settings,
+        samples: list[SegmentSample],
+        effort: str,
+        report: Progress,
+        jobs: int | None = None,
+        extrapolation: ExtrapolationFactors | None = None,
+    ):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         self.start, self.samples, self.levels = start, samples, ath.height + 2
         self.sample = samples[len(samples) // 2].positions
@@ -125,8 +140,9 @@ class Search:
         self._extra_trials = 0
 
     @classmethod
-    def of(cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress,
-           jobs: int | None = None) -> Search:
+    def of(
+        cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None
+    ) -> Search:
         """For a whole plant."""
         samples = samples_of(source)
         return cls(source, ath, first_settings(source, ath, bound, samples[-1]), samples, effort, report, jobs)
@@ -159,8 +175,14 @@ class Search:
         return self.best() if sample is None else self.best_of_sample(sample)
 
     def best(self) -> Settings:
-        steps = [self._with_basis, self._with_rotations, self._with_learned_bases, self._with_basis,
-                 self._with_learned_modes, self._with_steps]
+        steps = [
+            self._with_basis,
+            self._with_rotations,
+            self._with_learned_bases,
+            self._with_basis,
+            self._with_learned_modes,
+            self._with_steps,
+        ]
         if self.effort == "fast":
             steps = [self._with_rotations]
         if self.source.weights is not None:
@@ -183,10 +205,13 @@ class Search:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
-        some = replace(start, sheet=sample.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept],
-                       limit=limit)
-        extrapolation = ExtrapolationFactors.of(branch_records(self.source.hierarchy, self.ath, start),
-                                                branch_records(sample.source.hierarchy, sample.ath, some))
+        some = replace(
+            start, sheet=sample.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept], limit=limit
+        )
+        extrapolation = ExtrapolationFactors.of(
+            branch_records(self.source.hierarchy, self.ath, start),
+            branch_records(sample.source.hierarchy, sample.ath, some),
+        )
         samples = [segment.of_plant(sample) for segment in self.samples]
         search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
@@ -194,19 +219,30 @@ class Search:
         coarser = np.where(inner > 0, np.sqrt(extrapolation.vertices * inner / np.maximum(all_inner, 1)), 1.0)
         by_form = np.array_equal(found.sheet, sample.source.sheet_like)
         settings = replace(
-            start, step=found.step, level_steps=found.level_steps, rest_step=found.rest_step,
-            rotation_step_factors=found.rotation_step_factors, learned_bases=found.learned_bases,
+            start,
+            step=found.step,
+            level_steps=found.level_steps,
+            rest_step=found.rest_step,
+            rotation_step_factors=found.rotation_step_factors,
+            learned_bases=found.learned_bases,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
-            node_steps=found.node_steps * coarser)
+            node_steps=found.node_steps * coarser,
+        )
         if search.required_saving is None:
             return settings
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, and of each level's streams in it) at these settings."""
-        varied = (settings.step, settings.level_steps.tobytes(), settings.rest_step, settings.rotation_step_factors,
-                  settings.learned_bases, settings.sheet.tobytes(),
-                  settings.learned_pieces is not None and settings.learned_pieces.tobytes())
+        varied = (
+            settings.step,
+            settings.level_steps.tobytes(),
+            settings.rest_step,
+            settings.rotation_step_factors,
+            settings.learned_bases,
+            settings.sheet.tobytes(),
+            settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
+        )
         if varied not in self._known:
             self._known[varied] = self._try(settings)
         return self._known[varied]
@@ -223,8 +259,9 @@ class Search:
             mode_bytes += len(data) * self.extrapolation.rows[level]
         return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
 
-    def _level_bytes(self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None,
-                     sample: SegmentSample) -> np.ndarray:
+    def _level_bytes(
+        self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, sample: SegmentSample
+    ) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
         coded = code_stems(prelude, settings, sample.positions, learned_modes)
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
@@ -247,16 +284,18 @@ class Search:
         if known not in self._components:
             prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
-            self._components[known] = components(prelude.plan, (
-                analyse_finely(prelude, settings, self.source.positions(segment)) for segment in some))
+            self._components[known] = components(
+                prelude.plan, (analyse_finely(prelude, settings, self.source.positions(segment)) for segment in some)
+            )
         return learn(plan, self._components[known], settings.step, None if everywhere else settings.learned_pieces)
 
     def _with_learned_modes(self, settings: Settings) -> Settings:
         """Learned modes for the pieces that take fewer bits with them, if the file as a whole gets shorter."""
         plain = replace(settings, learned_pieces=None)
         wanted = dict(zip(qz.REQUIRED_SAVINGS, self._pieces_for_learned_modes(plain, qz.REQUIRED_SAVINGS)))
-        tried = {None: plain} | {saving: replace(plain, learned_pieces=some) for saving, some in wanted.items()
-                                 if some.any()}
+        tried = {None: plain} | {
+            saving: replace(plain, learned_pieces=some) for saving, some in wanted.items() if some.any()
+        }
         self.required_saving, settings = self._cheapest_of(tried)
         return settings
 
@@ -265,9 +304,16 @@ class Search:
         prelude = self.prelude(plain)
         learned_modes = self.learned_modes(prelude.plan, plain, everywhere=True)
         pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
-        modes, tracks = (sum(estimated_bits(analyse(prelude, plain, sample.positions, some)[0].coefficients, pieces,
-                                            len(learned_modes.counts)) * sample.scale for sample in self.samples)
-                         for some in (None, learned_modes))
+        modes, tracks = (
+            sum(
+                estimated_bits(
+                    analyse(prelude, plain, sample.positions, some)[0].coefficients, pieces, len(learned_modes.counts)
+                )
+                * sample.scale
+                for sample in self.samples
+            )
+            for some in (None, learned_modes)
+        )
         owners = np.repeat(np.arange(len(learned_modes.counts)), learned_modes.counts)
         price = estimated_bits(learned_modes.integers, owners, len(learned_modes.counts))
         return [(learned_modes.counts > 0) & ((tracks + price) * saving < modes) for saving in required_savings]
@@ -308,8 +354,11 @@ class Search:
         rotations = {settings.rotation_step_factors}
         if not any(settings.rotation_step_factors):
             rotations.add((2,) * self.levels)
-        candidates = [replace(settings, sheet=sheet, rotation_step_factors=factors)
-                      for sheet in sheets for factors in sorted(rotations)]
+        candidates = [
+            replace(settings, sheet=sheet, rotation_step_factors=factors)
+            for sheet in sheets
+            for factors in sorted(rotations)
+        ]
         return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
 
     def _with_level_steps(self, settings: Settings) -> Settings:
@@ -390,8 +439,10 @@ class Search:
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:
-                size = sum(len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
-                           for level in self._map_levels(prelude.plan))
+                size = sum(
+                    len(streams.encode_affines(segment, level)) * self.extrapolation.nodes[level]
+                    for level in self._map_levels(prelude.plan)
+                )
                 if size * scale > allowed and quality < qz.NODE_QUALITIES[-1]:
                     continue
                 chosen, limits = steps, self._errors_of_maps(prelude, segment)

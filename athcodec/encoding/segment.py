@@ -19,14 +19,7 @@ from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import (
-    LevelStream,
-    Plan,
-    SegmentMotion,
-    gather,
-    position_error,
-    temporal_basis,
-)
+from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather, position_error, temporal_basis
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.segmentation import split_segments
@@ -65,10 +58,15 @@ class Source:
         self.origin = np.float64((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.sheet_like = ~_thin_branches(self)
-        self.clip_range_segments = [[(start + a, start + b) for a, b in
-                               split_segments(stop - start, self.clip.vertex_count, self.segment_frames,
-                                              ct.Limits.memory_bytes)]
-                              for start, stop in self.clip.clip_range_frames]
+        self.clip_range_segments = [
+            [
+                (start + a, start + b)
+                for a, b in split_segments(
+                    stop - start, self.clip.vertex_count, self.segment_frames, ct.Limits.memory_bytes
+                )
+            ]
+            for start, stop in self.clip.clip_range_frames
+        ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
 
     @property
@@ -194,7 +192,7 @@ def lags(source: Source, step: float) -> np.ndarray:
     for b in np.flatnonzero(source.sheet_like):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
-        lags[b] = qz.rest_lag(source.rest[first: first + count], source.rest[attach] if attach >= 0 else None, step)
+        lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
     return lags
 
 
@@ -239,14 +237,16 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
     """Second moments over time, (T, T), of those tracks of one level's stream that do not quantise to nothing, in units
     of their steps, and how many they are; of a segment that was analysed finely, in cosines."""
     pieces, slots = segment.plan.pieces, []
-    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]),
-                          (pieces["low_modes"], pieces["count"], pieces["level"])):
+    for low, high, at in (
+        (0, pieces["low_modes"], pieces["low_level"]),
+        (pieces["low_modes"], pieces["count"], pieces["level"]),
+    ):
         for piece in np.flatnonzero(at == level):
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     moments, count = np.zeros((segment.frames, segment.frames)), 0
-    parts = (segment.coefficients[chosen[at: at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
+    parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     for part in (*parts, segment.tracks[segment.plan.base_level == level]):
         rows = part.reshape(-1, segment.frames) / FINER
         rows = rows[(rows**2).sum(axis=1) > qz.DEAD_ZONE**2]
@@ -269,8 +269,7 @@ def _learn_bases(prelude: CodedPrelude, settings: Settings, positions: np.ndarra
     if not levels:
         return {}
     segment = analyse_finely(prelude, settings, positions)
-    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE)
-             for level in levels}
+    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE) for level in levels}
     return {level: basis for level, basis in bases.items() if basis is not None}
 
 
@@ -298,8 +297,9 @@ class Coded:
         return ct.pack_corrections(self.correction_step, stream)
 
 
-def analyse(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
-            learned_modes: LearnedModes | None) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
+def analyse(
+    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None
+) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
     """The integers of the stems, and the time bases of the levels that learn theirs."""
     bases = _learn_bases(prelude, settings, positions)
     level_streams = _level_streams(settings, prelude.plan.level_count, bases)
@@ -308,8 +308,9 @@ def analyse(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
     return segment, bases
 
 
-def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
-               learned_modes: LearnedModes | None) -> Coded:
+def code_stems(
+    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None
+) -> Coded:
     """Streams of the stems and the corrections that keep the limit."""
     plan = prelude.plan
     segment, bases = analyse(prelude, settings, positions, learned_modes)
@@ -328,18 +329,23 @@ def code_stems(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
     factor = 1.0
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = streams.find_corrections(decoded, positions, prelude.origin, settings.limit, step,
-                                                plan.pool)
+        corrections = streams.find_corrections(decoded, positions, prelude.origin, settings.limit, step, plan.pool)
         if corrections is not None:
             return Coded(segment, stems, corrections, decoded, step, heads)
         factor *= 0.5
         if factor < 1e-3:
-            raise BoundError(f"max error: got {settings.bound:.3g}; it cannot be kept in the output's "
-                             f"{prelude.dtype.name} numbers")
+            raise BoundError(
+                f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
+            )
 
 
-def code_segment(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None,
-                 exact: np.ndarray | None = None) -> tuple[dict, np.ndarray]:
+def code_segment(
+    prelude: CodedPrelude,
+    settings: Settings,
+    positions: np.ndarray,
+    learned_modes: LearnedModes | None,
+    exact: np.ndarray | None = None,
+) -> tuple[dict, np.ndarray]:
     """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.

@@ -16,25 +16,43 @@ from athcodec.threads import SERIAL, ThreadPool, ranges
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
     """branches: (B,) of _native.BRANCH; the sources: the int32 permutations of hierarchy.Hierarchy."""
-    return encode_stream("ath_encode_hierarchy", 1024 + 16 * len(branches) + 4 * len(vertex_source),
-                         address(branches, BRANCH, 1), len(branches), len(vertex_source),
-                         address(branch_source, np.int32, len(branches)),
-                         address(vertex_source, np.int32, len(vertex_source)))
+    return encode_stream(
+        "ath_encode_hierarchy",
+        1024 + 16 * len(branches) + 4 * len(vertex_source),
+        address(branches, BRANCH, 1),
+        len(branches),
+        len(vertex_source),
+        address(branch_source, np.int32, len(branches)),
+        address(vertex_source, np.int32, len(vertex_source)),
+    )
 
 
 def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray) -> tuple[bytes, np.ndarray]:
     """The stream of a rest pose, (N, 3) float64 less the origin, and the pose that it decodes to."""
     decoded = np.zeros_like(rest)
-    data = encode_stream("ath_encode_rest", 1024 + 8 * rest.size, address(branches, BRANCH, 1), len(branches), step,
-                         address(rest, np.float64, rest.size), address(decoded, np.float64, rest.size))
+    data = encode_stream(
+        "ath_encode_rest",
+        1024 + 8 * rest.size,
+        address(branches, BRANCH, 1),
+        len(branches),
+        step,
+        address(rest, np.float64, rest.size),
+        address(decoded, np.float64, rest.size),
+    )
     return data, decoded
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
     """The stream of a rest pose that comes back bit for bit: (N, 3) float32 or float64, origin included."""
     numbers = pose.astype(np.float64, order="C")
-    return encode_stream("ath_encode_exact_rest", 1024 + 10 * pose.size, address(branches, BRANCH, 1), len(branches),
-                         pose.dtype == np.float64, address(numbers, np.float64, pose.size))
+    return encode_stream(
+        "ath_encode_exact_rest",
+        1024 + 10 * pose.size,
+        address(branches, BRANCH, 1),
+        len(branches),
+        pose.dtype == np.float64,
+        address(numbers, np.float64, pose.size),
+    )
 
 
 def encode_times(time: np.ndarray) -> bytes:
@@ -45,8 +63,9 @@ def encode_times(time: np.ndarray) -> bytes:
 def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
     """A learned temporal basis as stored integers of `bits` bits, (rank, frames) int32."""
     rank, frames = steps.shape
-    return encode_stream("ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1,
-                         address(steps, np.int32, steps.size))
+    return encode_stream(
+        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1, address(steps, np.int32, steps.size)
+    )
 
 
 def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
@@ -54,40 +73,70 @@ def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict
     if learned_modes is None:
         return {}
     pieces = len(plan.pieces)
-    arrays = (address(learned_modes.counts, np.int32, pieces), address(learned_modes.first, np.int64, pieces),
-              address(learned_modes.integers, np.int32, learned_modes.integers.size))
-    return {level: encode_stream("ath_encode_shapes", 4096 + 8 * learned_modes.integers.size, plan.core, *arrays, level)
-            for level in learned_modes.levels(plan).tolist()}
+    arrays = (
+        address(learned_modes.counts, np.int32, pieces),
+        address(learned_modes.first, np.int64, pieces),
+        address(learned_modes.integers, np.int32, learned_modes.integers.size),
+    )
+    return {
+        level: encode_stream("ath_encode_shapes", 4096 + 8 * learned_modes.integers.size, plan.core, *arrays, level)
+        for level in learned_modes.levels(plan).tolist()
+    }
 
 
 def encode_stems(segment: SegmentMotion, level: int) -> bytes:
     """Coefficients and tracks of one level."""
-    return encode_stream("ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.core, segment.motion,
-                         segment.integers, level)
+    return encode_stream(
+        "ath_encode_stems", 4096 + segment.coefficients.size, segment.plan.core, segment.motion, segment.integers, level
+    )
 
 
 def encode_affines(segment: SegmentMotion, level: int) -> bytes:
     """Maps of the nodes of one level."""
-    return encode_stream("ath_encode_affines", 4096 + 4 * segment.node_tracks.size, segment.plan.core, segment.motion,
-                         segment.integers, level)
+    return encode_stream(
+        "ath_encode_affines",
+        4096 + 4 * segment.node_tracks.size,
+        segment.plan.core,
+        segment.motion,
+        segment.integers,
+        level,
+    )
 
 
 def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) -> bytes:
     """corrections: (K, 5) int32 rows of (vertex, frame, x, y, z), sorted by vertex, then frame."""
-    return encode_stream("ath_encode_corrections", 4096 + 16 * len(corrections), vertex_count, frames,
-                         address(corrections, np.int32, 5 * len(corrections)), len(corrections))
+    return encode_stream(
+        "ath_encode_corrections",
+        4096 + 16 * len(corrections),
+        vertex_count,
+        frames,
+        address(corrections, np.int32, 5 * len(corrections)),
+        len(corrections),
+    )
 
 
 def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
     """What takes decoded positions, (N, 3, T) float32 or float64, to those of the source, bit for bit."""
     vertices, _, frames = positions.shape
-    return encode_stream("ath_encode_exact", 4096 + 3 * positions.size, vertices, frames, positions.dtype == np.float64,
-                         address(positions, positions.dtype, positions.size),
-                         address(source, positions.dtype, positions.size))
+    return encode_stream(
+        "ath_encode_exact",
+        4096 + 3 * positions.size,
+        vertices,
+        frames,
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        address(source, positions.dtype, positions.size),
+    )
 
 
-def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limit: float | np.ndarray,
-                     step: float, pool: ThreadPool = SERIAL) -> np.ndarray | None:
+def find_corrections(
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    limit: float | np.ndarray,
+    step: float,
+    pool: ThreadPool = SERIAL,
+) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
     Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.
@@ -105,23 +154,36 @@ def find_corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarr
     if any(rows is None for rows in parts):
         return None
     corrections = np.concatenate(parts)
-    lib.ath_apply_corrections(frames, positions.dtype == np.float64,
-                              address(positions, positions.dtype, positions.size), step, corrections.ctypes.data,
-                              len(corrections))
+    lib.ath_apply_corrections(
+        frames,
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        step,
+        corrections.ctypes.data,
+        len(corrections),
+    )
     return corrections
 
 
-def _corrections(positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray,
-                 step: float) -> np.ndarray | None:
+def _corrections(
+    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray, step: float
+) -> np.ndarray | None:
     vertices, _, frames = positions.shape
     capacity = 1024
     while True:
         rows = np.empty((capacity, 5), np.int32)
-        count = lib.ath_find_corrections(vertices, frames, positions.dtype == np.float64,
-                                         address(positions, positions.dtype, positions.size),
-                                         address(source, np.float64, positions.size),
-                                         address(origin, np.float64, 3), address(limits, np.float64, vertices),
-                                         step, rows.ctypes.data, capacity)
+        count = lib.ath_find_corrections(
+            vertices,
+            frames,
+            positions.dtype == np.float64,
+            address(positions, positions.dtype, positions.size),
+            address(source, np.float64, positions.size),
+            address(origin, np.float64, 3),
+            address(limits, np.float64, vertices),
+            step,
+            rows.ctypes.data,
+            capacity,
+        )
         if count < 0:
             return None
         if count <= capacity:

@@ -50,26 +50,36 @@ class WriteOptions:
 FORMATS = (
     Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.exporters.hdf5"),
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.exporters.npz"),
-    Format("usd", "USD: time-sampled points", (".usd", ".usdc", ".usda", ".usdz"), "athcodec.exporters.usd", "usd",
-           ("pxr",)),
-    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf",
-           holds_several=True),
-    Format("alembic", "Alembic: samples of points", (".abc",), "athcodec.exporters.alembic", "alembic",
-           ("alembic3d",)),
+    Format(
+        "usd",
+        "USD: time-sampled points",
+        (".usd", ".usdc", ".usda", ".usdz"),
+        "athcodec.exporters.usd",
+        "usd",
+        ("pxr",),
+    ),
+    Format("gltf", "glTF: joints or morph targets", (".glb",), "athcodec.exporters.gltf", holds_several=True),
+    Format("alembic", "Alembic: samples of points", (".abc",), "athcodec.exporters.alembic", "alembic", ("alembic3d",)),
     Format("pc2", "PC2 point cache", (".pc2",), "athcodec.exporters.pc2"),
     Format("mdd", "MDD point cache", (".mdd",), "athcodec.exporters.mdd"),
     Format("sequence", "numbered OBJ or PLY files", (".obj", ".ply"), "athcodec.exporters.sequence"),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.exporters.xdmf"),
     Format("vtk", "VTU series with a PVD index", (".pvd", ".vtu"), "athcodec.exporters.vtk"),
-    Format("vat", "vertex animation textures: node matrices", (".vat",), "athcodec.exporters.vat", "vat",
-           ("OpenEXR",)),
-    Format("openvat", "vertex animation textures: positions, as OpenVAT has them", (".openvat",),
-           "athcodec.exporters.openvat", "vat", ("OpenEXR",)),
+    Format("vat", "vertex animation textures: node matrices", (".vat",), "athcodec.exporters.vat", "vat", ("OpenEXR",)),
+    Format(
+        "openvat",
+        "vertex animation textures: positions, as OpenVAT has them",
+        (".openvat",),
+        "athcodec.exporters.openvat",
+        "vat",
+        ("OpenEXR",),
+    ),
 )
 
 
-def write(motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None,
-          **options: Any) -> None:
+def write(
+    motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None, **options: Any
+) -> None:
     """Write a motion to a file of any known format, which appears under its name only when it is complete.
 
     Parameters
@@ -112,8 +122,10 @@ def _check_clips(motion: Any, kind: Format) -> None:
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
         suffixes = " ".join(suffix for other in FORMATS if other.holds_several for suffix in other.suffixes)
-        raise ClipError(f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
-                        f"athcodec.open or athcodec.split), or {suffixes}, which holds all")
+        raise ClipError(
+            f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
+            f"athcodec.open or athcodec.split), or {suffixes}, which holds all"
+        )
 
 
 def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None:

@@ -35,13 +35,22 @@ from athcodec.exporters.scene_objects import (
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.sources.scene_objects import DESCRIPTOR, OWN, turned_corners
 
-SCOPES = {"vertex": AbcGeom.GeometryScope.kVertexScope, "corner": AbcGeom.GeometryScope.kFacevaryingScope,
-          "face": AbcGeom.GeometryScope.kUniformScope, "constant": AbcGeom.GeometryScope.kConstantScope}
+SCOPES = {
+    "vertex": AbcGeom.GeometryScope.kVertexScope,
+    "corner": AbcGeom.GeometryScope.kFacevaryingScope,
+    "face": AbcGeom.GeometryScope.kUniformScope,
+    "constant": AbcGeom.GeometryScope.kConstantScope,
+}
 # of the dtype and the shape of a row: the array that holds it and the parameter that writes it
-TYPES = {("f4", ()): (imath.FloatArray, "Float"), ("f8", ()): (imath.DoubleArray, "Double"),
-         ("i4", ()): (imath.IntArray, "Int32"), ("u1", ()): (imath.UnsignedCharArray, "Uchar"),
-         ("f4", (2,)): (imath.V2fArray, "V2f"), ("f4", (3,)): (imath.V3fArray, "V3f"),
-         ("f8", (3,)): (imath.V3dArray, "V3d")}
+TYPES = {
+    ("f4", ()): (imath.FloatArray, "Float"),
+    ("f8", ()): (imath.DoubleArray, "Double"),
+    ("i4", ()): (imath.IntArray, "Int32"),
+    ("u1", ()): (imath.UnsignedCharArray, "Uchar"),
+    ("f4", (2,)): (imath.V2fArray, "V2f"),
+    ("f4", (3,)): (imath.V3fArray, "V3f"),
+    ("f8", (3,)): (imath.V3dArray, "V3d"),
+}
 Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
@@ -109,17 +118,24 @@ def _add(obj: SceneObject, positions: np.ndarray, statics: dict[str, tuple[np.nd
     points = _filled(imath.V3fArray, positions)
     schema = obj.target.getSchema()
     if statics is None:
-        sample = {"mesh": AbcGeom.OPolyMeshSchemaSample, "curves": AbcGeom.OCurvesSchemaSample,
-                  "points": AbcGeom.OPointsSchemaSample}[obj.kind](points)
+        sample = {
+            "mesh": AbcGeom.OPolyMeshSchemaSample,
+            "curves": AbcGeom.OCurvesSchemaSample,
+            "points": AbcGeom.OPointsSchemaSample,
+        }[obj.kind](points)
         schema.set(sample)
         return
     order = turned_corners(obj.faces[0])
     own = {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
     own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
     # samples refer to arrays that somebody has to keep until they are written
-    held = {"points": points, "ids": _filled(imath.IntArray, np.arange(obj.count)),
-            "counts": _filled(imath.IntArray, obj.faces[0]), "curves": _filled(imath.IntArray, obj.curves),
-            "indices": _filled(imath.IntArray, obj.faces[1][order])}
+    held = {
+        "points": points,
+        "ids": _filled(imath.IntArray, np.arange(obj.count)),
+        "counts": _filled(imath.IntArray, obj.faces[0]),
+        "curves": _filled(imath.IntArray, obj.curves),
+        "indices": _filled(imath.IntArray, obj.faces[1][order]),
+    }
     schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
     for name, (values, domain) in own.items():
         if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
@@ -129,8 +145,9 @@ def _add(obj: SceneObject, positions: np.ndarray, statics: dict[str, tuple[np.nd
 def _mesh_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     further = {}
     for name, row, array, keyword, kind in (
-            ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
-            ("normals", (3,), imath.V3fArray, "iNormals", AbcGeom.ON3fGeomParamSample)):
+        ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
+        ("normals", (3,), imath.V3fArray, "iNormals", AbcGeom.ON3fGeomParamSample),
+    ):
         values, domain = own.get(name, (None, ""))
         if values is not None and values.shape[1:] == row and values.dtype == np.float32:
             del own[name]
@@ -145,8 +162,9 @@ def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     basis = AbcGeom.BasisType.kBsplineBasis if is_cubic else AbcGeom.BasisType.kNoBasis
     is_closed = obj.details.get("wrap") == "periodic"
     wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
-    return AbcGeom.OCurvesSchemaSample(held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis,
-                                       **_widths(held, own, "iWidth"))
+    return AbcGeom.OCurvesSchemaSample(
+        held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis, **_widths(held, own, "iWidth")
+    )
 
 
 def _point_sample(obj: SceneObject, held: dict, own: dict) -> Any:

@@ -29,15 +29,19 @@ class Cells:
 def cells_of(motion: Any) -> Cells:
     """The cells that a motion's attributes, faces and edges are."""
     kinds, counts, nodes, domains = [], [], [], []
-    volumes = {name.removeprefix("cells_"): values for name, values in motion.attributes.items()
-               if name.startswith("cells_") and values.ndim == 2 and values.shape[1:] == (NODES.get(name[6:]),)}
+    volumes = {
+        name.removeprefix("cells_"): values
+        for name, values in motion.attributes.items()
+        if name.startswith("cells_") and values.ndim == 2 and values.shape[1:] == (NODES.get(name[6:]),)
+    }
     if motion.edges is not None and len(motion.edges):
         _add(kinds, counts, nodes, "line", np.asarray(motion.edges))
         domains.append("edge")
     if motion.polygons is not None and len(motion.polygons[0]) and not volumes:
         sizes, corners = motion.polygons
-        kinds.append(np.select([sizes == 3, sizes == 4], [VTK_NUMBERS["triangle"], VTK_NUMBERS["quad"]],
-                               VTK_NUMBERS["polygon"]))
+        kinds.append(
+            np.select([sizes == 3, sizes == 4], [VTK_NUMBERS["triangle"], VTK_NUMBERS["quad"]], VTK_NUMBERS["polygon"])
+        )
         counts.append(sizes)
         nodes.append(corners)
         domains.append("face")

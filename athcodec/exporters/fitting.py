@@ -163,10 +163,16 @@ def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An order of the vertices, and ranges of it that are the parts to begin with."""
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
-        return motion.decoder.hierarchy.vertex_source, parts.first_vertex.astype(np.int64), (
-            parts.vertex_count.astype(np.int64))
-    hierarchy = hierarchy_of(motion) if motion.branch_parent is not None else (
-        build_hierarchy(np.zeros(motion.vertex_count, np.int32), np.array([-1]), np.asarray(motion.rest)))
+        return (
+            motion.decoder.hierarchy.vertex_source,
+            parts.first_vertex.astype(np.int64),
+            (parts.vertex_count.astype(np.int64)),
+        )
+    hierarchy = (
+        hierarchy_of(motion)
+        if motion.branch_parent is not None
+        else (build_hierarchy(np.zeros(motion.vertex_count, np.int32), np.array([-1]), np.asarray(motion.rest)))
+    )
     return hierarchy.vertex_source, hierarchy.first_vertex.astype(np.int64), hierarchy.stem_count.astype(np.int64)
 
 
@@ -181,8 +187,9 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
     return first[of] + starts, stops - starts
 
 
-def _fitted(motion: Any, parts: Parts, solver: Any, rest: np.ndarray,
-            step: int = 1) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+def _fitted(
+    motion: Any, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
     that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
@@ -239,12 +246,26 @@ def _proper(matrices: np.ndarray) -> np.ndarray:
 def quaternions(rotations: np.ndarray) -> np.ndarray:
     """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
     m = np.moveaxis(rotations, (-2, -1), (0, 1))
-    squares = np.stack([1 + m[0, 0] - m[1, 1] - m[2, 2], 1 - m[0, 0] + m[1, 1] - m[2, 2],
-                        1 - m[0, 0] - m[1, 1] + m[2, 2], 1 + m[0, 0] + m[1, 1] + m[2, 2]], axis=-1)
+    squares = np.stack(
+        [
+            1 + m[0, 0] - m[1, 1] - m[2, 2],
+            1 - m[0, 0] + m[1, 1] - m[2, 2],
+            1 - m[0, 0] - m[1, 1] + m[2, 2],
+            1 + m[0, 0] + m[1, 1] + m[2, 2],
+        ],
+        axis=-1,
+    )
     xy, xz, yz = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
     xw, yw, zw = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    rows = np.stack([np.stack([squares[..., 0], xy, xz, xw], -1), np.stack([xy, squares[..., 1], yz, yw], -1),
-                     np.stack([xz, yz, squares[..., 2], zw], -1), np.stack([xw, yw, zw, squares[..., 3]], -1)], -2)
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, xw], -1),
+            np.stack([xy, squares[..., 1], yz, yw], -1),
+            np.stack([xz, yz, squares[..., 2], zw], -1),
+            np.stack([xw, yw, zw, squares[..., 3]], -1),
+        ],
+        -2,
+    )
     best = squares.argmax(axis=-1)
     found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
     return found / np.linalg.norm(found, axis=-1, keepdims=True)
@@ -253,7 +274,15 @@ def quaternions(rotations: np.ndarray) -> np.ndarray:
 def rotation_matrices(quaternion: np.ndarray) -> np.ndarray:
     """(..., 3, 3) of quaternions (..., 4), taken to length 1."""
     x, y, z, w = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    rows = [
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    ]
     return np.stack(rows, axis=-1).reshape(*quaternion.shape[:-1], 3, 3)

@@ -50,8 +50,9 @@ MORPH_FRAMES, MORPH_BYTES = 4096, 2 << 30
 BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
-               report: Callable[[float], None]) -> dict[str, Any]:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
@@ -60,8 +61,10 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
     if wanted != "morphs":
         joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, lambda done: report(0.95 * done))
     if wanted == "joints" and joints is None:
-        raise ClipError(f"joints: got more than {MOST_JOINTS} that it takes to move the clip, expected fewer: choose a "
-                        "lower level, or morphs")
+        raise ClipError(
+            f"joints: got more than {MOST_JOINTS} that it takes to move the clip, expected fewer: choose a "
+            "lower level, or morphs"
+        )
     if wanted == "auto":
         wanted = _smaller(motion, joints)
     if wanted == "morphs":
@@ -114,9 +117,11 @@ def _smaller(motion: Any, joints: Joints | None) -> str:
 def _check_morphs(motion: Any) -> None:
     size = 12 * motion.frame_count * motion.vertex_count
     if motion.frame_count > MORPH_FRAMES or size > MORPH_BYTES:
-        raise ClipError(f"morph targets: got {motion.frame_count} frames of {motion.vertex_count} vertices, "
-                        f"{size} bytes; expected at most {MORPH_FRAMES} frames and {MORPH_BYTES} bytes: choose joints, "
-                        "or fewer frames")
+        raise ClipError(
+            f"morph targets: got {motion.frame_count} frames of {motion.vertex_count} vertices, "
+            f"{size} bytes; expected at most {MORPH_FRAMES} frames and {MORPH_BYTES} bytes: choose joints, "
+            "or fewer frames"
+        )
 
 
 def _add_animation(glb: Glb, take: Take, samplers: list[dict], channels: list[dict]) -> None:
@@ -135,8 +140,10 @@ class _Joined:
 
     def add(self, glb: Glb, root: int, found: list[GltfMesh], report: Callable[[float], None]) -> Iterator[bytes]:
         joints = self._joints
-        nodes = [glb.node(root, name=f"part_{i}", translation=t.tolist(), rotation=_unit(r))
-                 for i, (t, r) in enumerate(zip(*joints.rest[:2]))]
+        nodes = [
+            glb.node(root, name=f"part_{i}", translation=t.tolist(), rotation=_unit(r))
+            for i, (t, r) in enumerate(zip(*joints.rest[:2]))
+        ]
         bind = glb.array(np.ascontiguousarray(joints.bind.swapaxes(1, 2)).reshape(-1, 16))
         glb.json["skins"] = [{"joints": nodes, "inverseBindMatrices": bind, "skeleton": root}]
         dtype = np.uint8 if len(nodes) <= 256 else np.uint16
@@ -173,8 +180,9 @@ def _keys(take: Take, values: np.ndarray) -> np.ndarray:
     return keys
 
 
-def _channels(glb: Glb, nodes: list[int], take: Take, poses: list[np.ndarray], used: list[np.ndarray],
-              moves: list[np.ndarray]) -> tuple[list[dict], list[dict]]:
+def _channels(
+    glb: Glb, nodes: list[int], take: Take, poses: list[np.ndarray], used: list[np.ndarray], moves: list[np.ndarray]
+) -> tuple[list[dict], list[dict]]:
     """Samplers and channels of those joints (J,) that are used, by path; what moves has all keys, the others one."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
     samplers, channels = [], []
@@ -222,23 +230,32 @@ class _Morphed:
         self.max_error = UNKNOWN_BOUND
         return self._targets(glb, found, bounds, report)
 
-    def _add_targets(self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int,
-                     count: int) -> list[list[dict]]:
+    def _add_targets(
+        self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int, count: int
+    ) -> list[list[dict]]:
         """The accessors, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for _ in range(self._motion.frame_count):
             accessors.append([])
             for mesh, shape in zip(meshes, found):
-                index = glb.accessor(view, np.dtype(np.float32), len(shape.source), 3, byteOffset=place,
-                                     min=[UNKNOWN_BOUND] * 3, max=[UNKNOWN_BOUND] * 3)
+                index = glb.accessor(
+                    view,
+                    np.dtype(np.float32),
+                    len(shape.source),
+                    3,
+                    byteOffset=place,
+                    min=[UNKNOWN_BOUND] * 3,
+                    max=[UNKNOWN_BOUND] * 3,
+                )
                 accessors[-1].append(glb.json["accessors"][index])
                 primitive = glb.json["meshes"][mesh]["primitives"][0]
                 primitive.setdefault("targets", []).append({"POSITION": index})
                 place += 12 * len(shape.source)
         return accessors
 
-    def _targets(self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]],
-                 report: Callable[[float], None]) -> Iterator[bytes]:
+    def _targets(
+        self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]], report: Callable[[float], None]
+    ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
         largest = 0.0
         for start, frames in self._motion.blocks():

@@ -42,7 +42,12 @@ class Glb:
     def __init__(self, extras: Mapping[str, Any]):
         self.json: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": f"athcodec {__version__}", "extras": dict(extras)},
-            "scene": 0, "scenes": [{"nodes": []}], "nodes": [], "meshes": [], "accessors": [], "bufferViews": [],
+            "scene": 0,
+            "scenes": [{"nodes": []}],
+            "nodes": [],
+            "meshes": [],
+            "accessors": [],
+            "bufferViews": [],
         }
         self._pieces: list[bytes | memoryview] = []
         self._length = 0
@@ -51,8 +56,11 @@ class Glb:
         """A node below another, or of the scene."""
         self.json["nodes"].append(values)
         index = len(self.json["nodes"]) - 1
-        above = self.json["scenes"][0]["nodes"] if parent is None else (
-            self.json["nodes"][parent].setdefault("children", []))
+        above = (
+            self.json["scenes"][0]["nodes"]
+            if parent is None
+            else (self.json["nodes"][parent].setdefault("children", []))
+        )
         above.append(index)
         return index
 
@@ -120,8 +128,11 @@ class Glb:
         out.write(self._text().ljust(room))
 
     def _text(self) -> bytes:
-        return json.dumps({key: value for key, value in self.json.items() if value or key == "scene"},
-                          separators=(",", ":"), allow_nan=False).encode()
+        return json.dumps(
+            {key: value for key, value in self.json.items() if value or key == "scene"},
+            separators=(",", ":"),
+            allow_nan=False,
+        ).encode()
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +169,9 @@ def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = No
     return made, left_out
 
 
-def add_mesh(glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None,
-             **primitive: Any) -> int:
+def add_mesh(
+    glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None, **primitive: Any
+) -> int:
     """Adds a mesh to the file, in its rest pose (N, 3)."""
     semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
     for key, values in (mesh.attributes | dict(attributes or {})).items():
@@ -203,8 +215,10 @@ def takes(motion: Any) -> list[Take]:
     """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
     apart."""
     clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
-    return [_take(motion, clip_range, start, stop)
-            for clip_range, (start, stop) in zip(clip_ranges, motion.clip_range_frames)]
+    return [
+        _take(motion, clip_range, start, stop)
+        for clip_range, (start, stop) in zip(clip_ranges, motion.clip_range_frames)
+    ]
 
 
 def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
@@ -316,8 +330,9 @@ def _as_component(values: np.ndarray) -> np.ndarray | None:
     return values.astype(np.float32) if max(-low, high) <= 1 << 24 else None
 
 
-def _split(corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray],
-           vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def _split(
+    corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray], vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """The vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
     if not per_corner or not len(corner_vertex):
         return np.arange(vertex_count), corner_vertex

@@ -55,8 +55,12 @@ def fit_joints(motion: Any, allowed: float, most: int, report: Callable[[float],
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
     bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)
     bind[:, 3, 3] = 1.0
-    joints = Joints(parts.vertex_part(), bind.astype(np.float32), tuple(a.astype(np.float32) for a in still),
-                    tuple(pose.astype(np.float32) for pose in poses))
+    joints = Joints(
+        parts.vertex_part(),
+        bind.astype(np.float32),
+        tuple(a.astype(np.float32) for a in still),
+        tuple(pose.astype(np.float32) for pose in poses),
+    )
     joints.max_error = _measured(motion, joints, lambda done: report(0.7 + 0.3 * done))
     return joints
 
@@ -75,8 +79,11 @@ def _measured(motion: Any, joints: Joints, report: Callable[[float], None]) -> f
 def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], extent: np.ndarray, slack: float) -> None:
     """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`."""
     around = np.sqrt((extent**2).sum(axis=1, keepdims=True) - extent**2)  # from each axis
-    moves = (lambda values, constant: values - constant, lambda values, constant: _turns(constant, values) * around,
-             lambda values, constant: (values - constant) * extent)
+    moves = (
+        lambda values, constant: values - constant,
+        lambda values, constant: _turns(constant, values) * around,
+        lambda values, constant: (values - constant) * extent,
+    )
     for values, rest, moved in zip(poses, still, moves):
         for constant in (values[0].copy(), rest):
             held = np.linalg.norm(moved(values, constant), axis=-1).max(axis=0) <= slack
@@ -85,6 +92,7 @@ def _hold(poses: list[np.ndarray], still: tuple[np.ndarray, ...], extent: np.nda
 
 def _turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Angles about a part's own axes, (T, K, 3), at most, between quaternions (K, 4) and (T, K, 4)."""
-    turn = (before[..., 3:] * after[..., :3] - after[..., 3:] * before[..., :3]
-            - np.cross(before[..., :3], after[..., :3]))
+    turn = (
+        before[..., 3:] * after[..., :3] - after[..., 3:] * before[..., :3] - np.cross(before[..., :3], after[..., :3])
+    )
     return np.pi * turn

@@ -14,13 +14,21 @@ import numpy as np
 
 COORDINATE_FORMATS = {4: "v %.9g %.9g %.9g\n", 8: "v %.16e %.16e %.16e\n"}
 BLOCK_ROWS = 1 << 14
-_PLY_NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint", "f4": "float",
-              "f8": "double"}
+_PLY_NAMES = {
+    "i1": "char",
+    "u1": "uchar",
+    "i2": "short",
+    "u2": "ushort",
+    "i4": "int",
+    "u4": "uint",
+    "f4": "float",
+    "f8": "double",
+}
 _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def domain_of(motion: Any, name: str) -> str:
-    """"vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
+    """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
     domains = motion.metadata.get("domains")
     said = domains.get(name) if isinstance(domains, dict) else None
     values = motion.attributes[name]
@@ -70,8 +78,12 @@ class ObjWriter:
     def __init__(self, motion: Any):
         self._tail = "".join(_obj_tail(motion)).encode()
         colors = motion.attributes.get("colors")
-        fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f" \
+        fits = (
+            colors is not None
+            and colors.shape == (motion.vertex_count, 3)
+            and colors.dtype.kind == "f"
             and domain_of(motion, "colors") == "vertex"
+        )
         self._colors = colors if fits else None
 
     def write(self, file: BinaryIO, points: np.ndarray) -> None:
@@ -79,9 +91,9 @@ class ObjWriter:
         if self._colors is not None:
             form = form[:-1] + " %.9g %.9g %.9g\n"
         for start in range(0, len(points), BLOCK_ROWS):
-            rows = points[start: start + BLOCK_ROWS].astype(np.float64)
+            rows = points[start : start + BLOCK_ROWS].astype(np.float64)
             if self._colors is not None:
-                rows = np.concatenate([rows, self._colors[start: start + BLOCK_ROWS]], axis=1)
+                rows = np.concatenate([rows, self._colors[start : start + BLOCK_ROWS]], axis=1)
             file.write((form * len(rows) % tuple(rows.reshape(-1).tolist())).encode())
         file.write(self._tail)
 
@@ -101,8 +113,10 @@ def _obj_tail(motion: Any) -> list[str]:
         return [*lines, *faces, *edges]
     for number, (name, start, stop) in enumerate(spans):
         lines.append(f"o {name}\n")
-        mine = [*(faces[slice(*np.searchsorted(face_parts, [number, number + 1]))]),
-                *(edges[slice(*np.searchsorted(edge_parts, [number, number + 1]))])]
+        mine = [
+            *(faces[slice(*np.searchsorted(face_parts, [number, number + 1]))]),
+            *(edges[slice(*np.searchsorted(edge_parts, [number, number + 1]))]),
+        ]
         lines += mine or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
     return lines
 
@@ -127,10 +141,12 @@ def _obj_faces(motion: Any, has_uv: bool, per_corner: bool) -> list[str]:
         return []
     counts, corners = motion.polygons
     corners = (np.asarray(corners, np.int64) + 1).tolist()
-    words = [f"{vertex}/{place if per_corner else vertex}" if has_uv else f"{vertex}"
-             for place, vertex in enumerate(corners, 1)]
+    words = [
+        f"{vertex}/{place if per_corner else vertex}" if has_uv else f"{vertex}"
+        for place, vertex in enumerate(corners, 1)
+    ]
     ends = np.cumsum(counts, dtype=np.int64).tolist()
-    lines = [f"f {' '.join(words[end - count: end])}\n" for end, count in zip(ends, np.asarray(counts).tolist())]
+    lines = [f"f {' '.join(words[end - count : end])}\n" for end, count in zip(ends, np.asarray(counts).tolist())]
     _switch_names(motion, lines, "face_material", "material_names", "usemtl")
     _switch_names(motion, lines, "face_group", "group_names", "g")
     return lines
@@ -162,9 +178,15 @@ class PlyWriter:
         edge_count = 0 if motion.edges is None else len(motion.edges)
         edge_header = [f"element edge {edge_count}", "property int vertex1", "property int vertex2"]
         self._tail = faces + (np.asarray(motion.edges, "<i4").tobytes() if edge_count else b"")
-        lines = ["ply", "format binary_little_endian 1.0", f"element vertex {motion.vertex_count}",
-                 *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
-                 *face_header, *(edge_header if edge_count else []), "end_header"]
+        lines = [
+            "ply",
+            "format binary_little_endian 1.0",
+            f"element vertex {motion.vertex_count}",
+            *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
+            *face_header,
+            *(edge_header if edge_count else []),
+            "end_header",
+        ]
         self._header = ("\n".join(lines) + "\n").encode()
 
     def write(self, file: BinaryIO, points: np.ndarray) -> None:
@@ -209,8 +231,9 @@ def _ply_faces(motion: Any) -> tuple[list[str], bytes]:
     if (np.asarray(counts) == counts[0]).all():
         return header, _ply_rows(corners, uv if per_corner else None, int(counts[0]), number)
     return header, b"".join(
-        _ply_rows(corners[end - size: end], uv[end - size: end] if per_corner else None, int(size), number)
-        for size, end in zip(np.asarray(counts).tolist(), ends.tolist()))
+        _ply_rows(corners[end - size : end], uv[end - size : end] if per_corner else None, int(size), number)
+        for size, end in zip(np.asarray(counts).tolist(), ends.tolist())
+    )
 
 
 def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:

@@ -44,7 +44,8 @@ def _member(archive: zipfile.ZipFile, name: str, packing: int) -> Any:
 def _write_positions(motion: Any, member: Any, report: Callable[[float], None]) -> None:
     shape, dtype = (motion.frame_count, motion.vertex_count, 3), motion.dtype.newbyteorder("<")
     np.lib.format.write_array_header_1_0(
-        member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape})
+        member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    )
     for start, frames in motion.blocks():
         member.write(np.ascontiguousarray(frames, dtype).data.cast("B"))
         report((start + len(frames)) / motion.frame_count)

@@ -28,8 +28,9 @@ NARROWEST = 64
 HIGHEST = 16384
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
-               report: Callable[[float], None]) -> dict[str, Any]:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: 16 bits in
     place of float.
 
@@ -46,8 +47,10 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
         column, row = _texels(motion, size[0])
         places = np.stack([(column + 0.5) / size[0], (row + 0.5) / size[1]], axis=1).astype(np.float32)
         write_rest(motion, os.path.join(folder, f"{name}_vat.glb"), name, {"TEXCOORD_1": places}, branch_extras(motion))
-        facts = {"os-remap": {"Min": low.tolist(), "Max": high.tolist(), "Frames": motion.frame_count},
-                 "athcodec": facts_of(motion) | {"max_error": error, "width": size[0], "height": size[1]}}
+        facts = {
+            "os-remap": {"Min": low.tolist(), "Max": high.tolist(), "Frames": motion.frame_count},
+            "athcodec": facts_of(motion) | {"max_error": error, "width": size[0], "height": size[1]},
+        }
         write_json(os.path.join(folder, f"{name}-remap_info.json"), facts)
     report(1.0)
     return facts
@@ -59,8 +62,9 @@ def _texels(motion: Any, width: int) -> tuple[np.ndarray, np.ndarray]:
     return vertices % width, vertices // width * motion.frame_count
 
 
-def _texture(motion: Any, size: tuple[int, int], half: bool,
-             report: Callable[[float], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _texture(
+    motion: Any, size: tuple[int, int], half: bool, report: Callable[[float], None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """The pixels, the least and the largest offset, and the largest distance of what they show from the motion."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     low, high = _offset_bounds(motion, rest, lambda done: report(0.4 * done))
@@ -87,8 +91,10 @@ def _size(vertices: int, frames: int) -> tuple[int, int]:
         if height <= HIGHEST:
             sizes.append((width * height, abs(np.log2(width / height)), width, height))
     if not sizes:
-        raise ClipError(f"openvat: got {vertices} vertices in {frames} frames, expected what fits into {WIDEST} x "
-                        f"{HIGHEST} texels: choose fewer frames, or vat")
+        raise ClipError(
+            f"openvat: got {vertices} vertices in {frames} frames, expected what fits into {WIDEST} x "
+            f"{HIGHEST} texels: choose fewer frames, or vat"
+        )
     return min(sizes)[2:]
 
 

@@ -54,13 +54,16 @@ def _start_and_step(motion: Any) -> tuple[float, float]:
     step = float(numbers[-1] - numbers[0]) / (len(numbers) - 1)
     off = np.abs(numbers - numbers[0] - step * np.arange(len(numbers)))
     if off.max() > STEP_TOLERANCE * max(1.0, step):
-        raise ClipError(f"time: frame {int(off.argmax())} is {off.max():.3g} frames off, expected even steps: a PC2 "
-                        "cache has no others; mdd has a time per frame")
+        raise ClipError(
+            f"time: frame {int(off.argmax())} is {off.max():.3g} frames off, expected even steps: a PC2 "
+            "cache has no others; mdd has a time per frame"
+        )
     return float(numbers[0]), float(round(step, 6))
 
 
-def write_cache(motion: Any, path: str | PathLike[str], header: bytes, dtype: str,
-                report: Callable[[float], None]) -> None:
+def write_cache(
+    motion: Any, path: str | PathLike[str], header: bytes, dtype: str, report: Callable[[float], None]
+) -> None:
     """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there."""
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
     with new_files(path) as folder:
@@ -90,6 +93,8 @@ def _mesh_to_write(motion: Any, target: Path) -> str:
     with suppress(ClipError):
         different = mine.same_topology(read_mesh(mesh_path))
     if different:
-        raise ClipError(f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "
-                        "the cache's own mesh goes there")
+        raise ClipError(
+            f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "
+            "the cache's own mesh goes there"
+        )
     return ""

@@ -77,8 +77,14 @@ def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
-    described = (isinstance(names, list) and counts is not None and counts.dtype.kind in "iu"
-                 and counts.shape == (len(names),) and (counts >= 0).all() and counts.sum(dtype=np.int64) == count)
+    described = (
+        isinstance(names, list)
+        and counts is not None
+        and counts.dtype.kind in "iu"
+        and counts.shape == (len(names),)
+        and (counts >= 0).all()
+        and counts.sum(dtype=np.int64) == count
+    )
     if described and _fits(motion, counts):
         if not isinstance(kinds, list) or len(kinds) != len(names):
             kinds = [_kind(motion, counts, i) for i in range(len(names))]
@@ -128,8 +134,9 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
 def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
     """For each object its vertices per curve, empty where it is none."""
     said = motion.attributes.get("curve_vertex_counts")
-    totals = [int(end - start) if kind == "curves" else 0 for end, start, kind in
-              zip(ends, np.append(0, ends[:-1]), kinds)]
+    totals = [
+        int(end - start) if kind == "curves" else 0 for end, start, kind in zip(ends, np.append(0, ends[:-1]), kinds)
+    ]
     usable = said is not None and said.ndim == 1 and said.dtype.kind in "iu" and int(said.sum()) == sum(totals)
     done = 0
     for end, total in zip(ends, totals):
@@ -147,8 +154,13 @@ def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[n
 def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str]) -> str:
     """What the clip says where the rows fit, else what they fit."""
     polygons = motion.polygons or ((), ())
-    rows = {"vertex": motion.vertex_count, "corner": len(polygons[1]), "face": len(polygons[0]), "constant": 1,
-            "branch": motion.branch_count}
+    rows = {
+        "vertex": motion.vertex_count,
+        "corner": len(polygons[1]),
+        "face": len(polygons[0]),
+        "constant": 1,
+        "branch": motion.branch_count,
+    }
     count = len(values) if values.ndim else -1
     said = domains.get(name) if isinstance(domains, dict) else None
     if said is not None:

@@ -59,8 +59,10 @@ def file_names(motion: Any, path: str | PathLike[str]) -> list[str]:
     numbers = file_numbers(motion)
     further = sorted(numbering.files().keys() - set(numbers))
     if further:
-        raise ClipError(f"{fspath(numbering.path(further[0]))}: is there already and no frame of the clip, which has "
-                        f"{numbers[0]} to {numbers[-1]}; remove such files or choose another name")
+        raise ClipError(
+            f"{fspath(numbering.path(further[0]))}: is there already and no frame of the clip, which has "
+            f"{numbers[0]} to {numbers[-1]}; remove such files or choose another name"
+        )
     return [numbering.path(number).name for number in numbers]
 
 

@@ -45,8 +45,11 @@ def write_png(path: str, pixels: np.ndarray) -> None:
     lines[0, 1:], lines[1:, 1:] = rows[0], rows[1:] - rows[:-1]
     with open(path, "wb") as out:
         out.write(b"\x89PNG\r\n\x1a\n")
-        for kind, data in ((b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0)),
-                           (b"IDAT", zlib.compress(lines.tobytes(), 6)), (b"IEND", b"")):
+        for kind, data in (
+            (b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0)),
+            (b"IDAT", zlib.compress(lines.tobytes(), 6)),
+            (b"IEND", b""),
+        ):
             out.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
 
 

@@ -34,6 +34,7 @@ def distinct_frame_numbers(motion: Any) -> np.ndarray:
     same = np.flatnonzero(np.diff(numbers) <= 0)
     if same.size:
         frame = int(same[0]) + 1
-        raise ClipError(f"time: frame {frame} has the number {numbers[frame]:g} as the one before it, expected a "
-                        "larger one")
+        raise ClipError(
+            f"time: frame {frame} has the number {numbers[frame]:g} as the one before it, expected a larger one"
+        )
     return numbers

@@ -42,10 +42,28 @@ TYPES = {  # of a row's shape and kind; for the shape None any number of values 
     "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
     "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},
     "i": {(): "Int", (2,): "Int2", (3,): "Int3", (4,): "Int4"},
-    "u": {(): "UInt"}, "q": {(): "Int64"}, "Q": {(): "UInt64"}, "B": {(): "UChar"}, "?": {(): "Bool"},
+    "u": {(): "UInt"},
+    "q": {(): "Int64"},
+    "Q": {(): "UInt64"},
+    "B": {(): "UChar"},
+    "?": {(): "Bool"},
 }
-WIDER = {"?": "?", "b": "i", "h": "i", "H": "i", "B": "B", "i": "i", "I": "u", "l": "q", "q": "q", "L": "Q", "Q": "Q",
-         "e": "e", "f": "f", "d": "d"}
+WIDER = {
+    "?": "?",
+    "b": "i",
+    "h": "i",
+    "H": "i",
+    "B": "B",
+    "i": "i",
+    "I": "u",
+    "l": "q",
+    "q": "q",
+    "L": "Q",
+    "Q": "Q",
+    "e": "e",
+    "f": "f",
+    "d": "d",
+}
 NUMPY = {"i": "<i4", "u": "<u4", "q": "<i8", "Q": "<u8", "B": "u1", "?": "?", "e": "<f2", "f": "<f4", "d": "<f8"}
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
@@ -121,8 +139,7 @@ def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: floa
     up_axis = str(metadata.get("up_axis", "")).upper()
     if up_axis in ("Y", "Z"):
         UsdGeom.SetStageUpAxis(stage, up_axis)
-    kept = {key: value for key, value in metadata.items()
-            if key not in (*KNOWN_METADATA, "unit", "up_axis")}
+    kept = {key: value for key, value in metadata.items() if key not in (*KNOWN_METADATA, "unit", "up_axis")}
     if up_axis == "X":
         kept["up_axis"] = "x"
     unit = metadata.get("unit")
@@ -198,7 +215,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     for obj in objects:
         rows = rows_of(values, domain, obj)
         primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
-            PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size)
+            PRIMVARS.get(name, _identifier(name)), type_name, INTERPOLATION[domain], element_size
+        )
         primvar.Set(_vt(rows, type_name, NUMPY[kind]))
         if np.dtype(NUMPY[kind]) != values.dtype:
             primvar.GetAttr().SetCustomDataByKey(f"{OWN}:dtype", values.dtype.str)
@@ -212,8 +230,9 @@ def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -
     for obj in objects:
         rows = rows_of(values, domain, obj)
         if obj.kind == "mesh":
-            primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar("radius", Sdf.ValueTypeNames.FloatArray,
-                                                                     INTERPOLATION[domain])
+            primvar = UsdGeom.PrimvarsAPI(obj.target).CreatePrimvar(
+                "radius", Sdf.ValueTypeNames.FloatArray, INTERPOLATION[domain]
+            )
             primvar.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(rows)))
         else:
             obj.target.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(rows * np.float32(2))))
@@ -239,8 +258,9 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
 def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
     """What has no place in the prims, byte for byte."""
     for descriptor, raw in own_arrays(motion, left):
-        attribute = root.CreateAttribute(f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True,
-                                         Sdf.VariabilityUniform)
+        attribute = root.CreateAttribute(
+            f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True, Sdf.VariabilityUniform
+        )
         attribute.Set(Vt.UCharArray.FromNumpy(raw) if len(raw) else Vt.UCharArray())
         for key, text in descriptor._asdict().items():
             attribute.SetCustomDataByKey(f"{OWN}:{key}", text)
@@ -249,8 +269,9 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
 # ---- frames ----
 
 
-def _write_frames(stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray,
-                  report: Callable[[float], None]) -> None:
+def _write_frames(
+    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Callable[[float], None]
+) -> None:
     layer = stage.GetRootLayer()
     places = [(obj, obj.target.GetPointsAttr().GetPath(), obj.target.GetExtentAttr().GetPath()) for obj in objects]
     unsaved = 0

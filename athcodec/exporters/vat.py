@@ -29,8 +29,9 @@ MOST_NODES = PER_ROW * WIDEST
 FLOAT16_MAX = 65504.0
 
 
-def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
-               report: Callable[[float], None]) -> dict[str, Any]:
+def write_clip(
+    motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]
+) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
@@ -48,8 +49,9 @@ def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions,
     return facts
 
 
-def _write(motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str,
-           report: Callable[[float], None]) -> dict[str, Any]:
+def _write(
+    motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Callable[[float], None]
+) -> dict[str, Any]:
     pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
     grid = _Grid(len(pivots), motion.frame_count)
     textures = []
@@ -58,12 +60,23 @@ def _write(motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str
         textures.append(texture)
     write_exr(os.path.join(folder, f"{name}_pivots.exr"), {"RGB": grid.pivots(pivots)})
     error, low, high = _measured(motion, rows, pivots, vertex_node, lambda done: report(0.6 + 0.4 * done))
-    facts = {"format": "athcodec-vat", "version": 1} | facts_of(motion) | {
-        "nodes": len(pivots), "precision": "half" if rows.dtype == np.float16 else "float",
-        "width": grid.width, "height": grid.height, "nodes_per_row": grid.per_row,
-        "rows_per_frame": grid.rows_per_frame, "max_error": error, "bounds": {"min": low, "max": high},
-        "textures": textures, "pivots": f"{name}_pivots.exr", "mesh": f"{name}.glb",
-    }
+    facts = (
+        {"format": "athcodec-vat", "version": 1}
+        | facts_of(motion)
+        | {
+            "nodes": len(pivots),
+            "precision": "half" if rows.dtype == np.float16 else "float",
+            "width": grid.width,
+            "height": grid.height,
+            "nodes_per_row": grid.per_row,
+            "rows_per_frame": grid.rows_per_frame,
+            "max_error": error,
+            "bounds": {"min": low, "max": high},
+            "textures": textures,
+            "pivots": f"{name}_pivots.exr",
+            "mesh": f"{name}.glb",
+        }
+    )
     dtype = np.uint16 if len(pivots) <= 65536 else np.float32
     more = {"_NODE": vertex_node.astype(dtype)[:, None], "TEXCOORD_1": grid.places(vertex_node)}
     write_rest(motion, os.path.join(folder, f"{name}.glb"), name, more, branch_extras(motion))
@@ -78,8 +91,10 @@ def _rows(moving: Moving, dtype: type) -> np.ndarray:
     offset = moving.places - moving.parts.middle.astype(np.float32)
     largest = max(float(np.abs(linear).max()), float(np.abs(offset).max()))
     if dtype == np.float16 and largest > FLOAT16_MAX:
-        raise ClipError(f"vat: got motion by {largest:g} units, expected at most {FLOAT16_MAX:g} in half precision: "
-                        "choose another unit")
+        raise ClipError(
+            f"vat: got motion by {largest:g} units, expected at most {FLOAT16_MAX:g} in half precision: "
+            "choose another unit"
+        )
     rows[..., :3], rows[..., 3] = linear, offset
     return rows
 
@@ -114,8 +129,9 @@ class _Grid:
         return np.stack([x / self.width, y / self.height], axis=1).astype(np.float32)
 
 
-def _measured(motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray,
-              report: Callable[[float], None]) -> tuple[float, list[float], list[float]]:
+def _measured(
+    motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Callable[[float], None]
+) -> tuple[float, list[float], list[float]]:
     """The largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     away = np.concatenate([rest - pivots[vertex_node], np.ones((len(rest), 1))], axis=1)

@@ -23,8 +23,10 @@ from athcodec.exporters import WriteOptions
 from athcodec.exporters.cells import cell_and_point_data, cells_of
 from athcodec.exporters.sequence import file_names, write_frames
 
-_HEAD = ('<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-         'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n')
+_HEAD = (
+    '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+    'header_type="UInt64"{}>\n<UnstructuredGrid>\n<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
+)
 
 
 def write_clip(motion: Any, path: str | PathLike[str], options: WriteOptions, report: Callable[[float], None]) -> None:
@@ -51,10 +53,15 @@ def _stem(target: Path) -> str:
 
 
 def _index(motion: Any, names: list[str]) -> str:
-    lines = [f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>\n'
-             for time, name in zip(np.asarray(motion.time).tolist(), names, strict=True)]
-    return ('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n<Collection>\n'
-            + "".join(lines) + "</Collection>\n</VTKFile>\n")
+    lines = [
+        f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>\n'
+        for time, name in zip(np.asarray(motion.time).tolist(), names, strict=True)
+    ]
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n<Collection>\n'
+        + "".join(lines)
+        + "</Collection>\n</VTKFile>\n"
+    )
 
 
 class _VtuWriter:
@@ -67,8 +74,13 @@ class _VtuWriter:
         self._head = _HEAD.format(compressor, motion.vertex_count, len(cells.types)).encode()
         per_point, per_cell = cell_and_point_data(motion, cells)
         described = {"connectivity": cells.nodes, "offsets": cells.stops, "types": cells.types.astype(np.uint8)}
-        parts = [b"</Points>\n", *self._section("Cells", described), *self._section("PointData", per_point),
-                 *self._section("CellData", per_cell), b"</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"]
+        parts = [
+            b"</Points>\n",
+            *self._section("Cells", described),
+            *self._section("PointData", per_point),
+            *self._section("CellData", per_cell),
+            b"</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+        ]
         self._tail = b"".join(parts)
 
     def write(self, file: BinaryIO, points: np.ndarray) -> None:
@@ -77,8 +89,11 @@ class _VtuWriter:
         file.write(self._tail)
 
     def _section(self, tag: str, arrays: dict[str, np.ndarray]) -> list[bytes]:
-        return [f"<{tag}>\n".encode(), *(self._array(name, values) for name, values in arrays.items()),
-                f"</{tag}>\n".encode()]
+        return [
+            f"<{tag}>\n".encode(),
+            *(self._array(name, values) for name, values in arrays.items()),
+            f"</{tag}>\n".encode(),
+        ]
 
     def _array(self, name: str, values: np.ndarray) -> bytes:
         kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind] + str(8 * values.dtype.itemsize)

@@ -27,9 +27,19 @@ from athcodec.sources.xdmf import MIXED
 
 DISPLACEMENT = "displacement"
 _XDMF_NUMBERS = {name: number for number, name in MIXED.items()} | {"line": 2, "vertex": 1}
-_UNIFORM = {"line": "Polyline", "vertex": "Polyvertex", "triangle": "Triangle", "quad": "Quadrilateral",
-            "tetra": "Tetrahedron", "hexahedron": "Hexahedron", "wedge": "Wedge", "pyramid": "Pyramid",
-            "tetra10": "Tetrahedron_10", "hexahedron20": "Hexahedron_20", "hexahedron27": "Hexahedron_27"}
+_UNIFORM = {
+    "line": "Polyline",
+    "vertex": "Polyvertex",
+    "triangle": "Triangle",
+    "quad": "Quadrilateral",
+    "tetra": "Tetrahedron",
+    "hexahedron": "Hexahedron",
+    "wedge": "Wedge",
+    "pyramid": "Pyramid",
+    "tetra10": "Tetrahedron_10",
+    "hexahedron20": "Hexahedron_20",
+    "hexahedron27": "Hexahedron_27",
+}
 _POINTER = 'xpointer(//Grid[@Name="{}"]/Grid[1]/*[self::Topology or self::Geometry])'
 _INCLUDE = "{http://www.w3.org/2001/XInclude}include"
 _FORMS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
@@ -88,9 +98,12 @@ class _Writer:
         geometry = ElementTree.Element("Geometry", GeometryType="XYZ")
         geometry.append(self._item(np.asarray(motion.rest, motion.dtype), "geometry"))
         per_point, per_cell = cell_and_point_data(motion, cells)
-        attributes = [self._attribute(name, center, values, f"{center.lower()}/{index}")
-                      for center, data in (("Node", per_point), ("Cell", per_cell))
-                      for index, (name, values) in enumerate(data.items()) if name != DISPLACEMENT]
+        attributes = [
+            self._attribute(name, center, values, f"{center.lower()}/{index}")
+            for center, data in (("Node", per_point), ("Cell", per_cell))
+            for index, (name, values) in enumerate(data.items())
+            if name != DISPLACEMENT
+        ]
         return [self._topology(cells), geometry], attributes
 
     def _topology(self, cells: Cells) -> ElementTree.Element:
@@ -98,8 +111,12 @@ class _Writer:
         name = VTK_NAMES[int(kinds[0])]
         if len(kinds) == 1 and name in _UNIFORM:
             size = int(cells.stops[0])
-            element = ElementTree.Element("Topology", TopologyType=_UNIFORM[name], NodesPerElement=str(size),
-                                          NumberOfElements=str(len(cells.types)))
+            element = ElementTree.Element(
+                "Topology",
+                TopologyType=_UNIFORM[name],
+                NodesPerElement=str(size),
+                NumberOfElements=str(len(cells.types)),
+            )
             element.append(self._item(cells.nodes.reshape(-1, size), "topology"))
             return element
         element = ElementTree.Element("Topology", TopologyType="Mixed", NumberOfElements=str(len(cells.types)))
@@ -115,9 +132,13 @@ class _Writer:
     def _item(self, values: np.ndarray, place: str) -> ElementTree.Element:
         self._data.create_dataset(place, data=values, **(self._packing if values.size else {}))
         kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind]
-        item = ElementTree.Element("DataItem", Dimensions=" ".join(map(str, values.shape)), Format="HDF",
-                                   NumberType="Char" if values.dtype == np.int8 else "UChar" if values.dtype == np.uint8
-                                   else kind, Precision=str(values.dtype.itemsize))
+        item = ElementTree.Element(
+            "DataItem",
+            Dimensions=" ".join(map(str, values.shape)),
+            Format="HDF",
+            NumberType="Char" if values.dtype == np.int8 else "UChar" if values.dtype == np.uint8 else kind,
+            Precision=str(values.dtype.itemsize),
+        )
         item.text = f"{self._name}:/{place}"
         return item
 

@@ -128,27 +128,58 @@ class Format:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), "athcodec.sources.hdf5",
-           magic=(b"\x89HDF\r\n\x1a\n",)),
+    Format(
+        "hdf5",
+        "HDF5 of athcodec's schema",
+        (".h5", ".hdf5", ".hdf"),
+        "athcodec.sources.hdf5",
+        magic=(b"\x89HDF\r\n\x1a\n",),
+    ),
     Format("npz", "NumPy archive of the same schema", (".npz",), "athcodec.sources.npz"),
-    Format("usd", "USD: meshes, curves and points, UsdSkel", (".usd", ".usdc", ".usda", ".usdz"),
-           "athcodec.sources.usd", "usd", ("pxr",), (b"PXR-USDC", b"#usda")),
-    Format("gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf",
-           magic=(b"glTF",)),
-    Format("alembic", "Alembic: meshes, curves and points", (".abc",), "athcodec.sources.alembic", "alembic",
-           ("alembic3d",), (b"Ogawa",)),
+    Format(
+        "usd",
+        "USD: meshes, curves and points, UsdSkel",
+        (".usd", ".usdc", ".usda", ".usdz"),
+        "athcodec.sources.usd",
+        "usd",
+        ("pxr",),
+        (b"PXR-USDC", b"#usda"),
+    ),
+    Format(
+        "gltf", "glTF: skins, nodes and morph targets", (".glb", ".gltf"), "athcodec.sources.gltf", magic=(b"glTF",)
+    ),
+    Format(
+        "alembic",
+        "Alembic: meshes, curves and points",
+        (".abc",),
+        "athcodec.sources.alembic",
+        "alembic",
+        ("alembic3d",),
+        (b"Ogawa",),
+    ),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), "athcodec.sources.pc2", magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",), "athcodec.sources.mdd"),
-    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply"),
-           "athcodec.sources.sequence"),
+    Format(
+        "sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply"), "athcodec.sources.sequence"
+    ),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf"), "athcodec.sources.xdmf"),
-    Format("vtk", "VTU, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-           (".vtu", ".vtk", ".pvd"), "athcodec.sources.vtk"),
+    Format(
+        "vtk",
+        "VTU, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
+        (".vtu", ".vtk", ".pvd"),
+        "athcodec.sources.vtk",
+    ),
 )
 
 
-def read(path: str | PathLike[str], format: str | None = None, *, unit: str | None = None,
-         up_axis: str | None = None, **options: Any) -> MotionClip:
+def read(
+    path: str | PathLike[str],
+    format: str | None = None,
+    *,
+    unit: str | None = None,
+    up_axis: str | None = None,
+    **options: Any,
+) -> MotionClip:
     """Open the clip in a file of any known format.
 
     Parameters
@@ -236,8 +267,9 @@ def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
     unit = unit_symbol(unit)
     before = unit_symbol(clip.metadata.get("unit") or unit)
     if before != unit and not (before in METRES and unit in METRES):
-        raise ClipError(f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to "
-                        f"{unit!r}")
+        raise ClipError(
+            f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to {unit!r}"
+        )
     factor = 1.0 if before == unit else METRES[before] / METRES[unit]
     return _mapped(clip, np.eye(3) * factor, unit=unit)
 
@@ -268,8 +300,12 @@ def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip
         turned = clip.attributes["normals"] @ (matrix / np.cbrt(np.linalg.det(matrix))).T
         clip.attributes["normals"] = turned.astype(clip.attributes["normals"].dtype)
     source, dtype = clip.positions, clip.dtype
-    positions = Frames(lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
-                       clip.frame_count, clip.vertex_count, dtype)
+    positions = Frames(
+        lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
+        clip.frame_count,
+        clip.vertex_count,
+        dtype,
+    )
     return clip.replace(positions=positions, rest=(clip.rest @ matrix.T).astype(clip.rest_dtype))
 
 

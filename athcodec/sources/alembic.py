@@ -51,9 +51,16 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             data = archive.ask(f"{start} {stop}")
             return np.frombuffer(data, np.float32).reshape(stop - start, shape[1], 3)
 
-        return MotionClip(Frames(frames, *shape), arrays["time"], rest=arrays["rest"], attributes=attributes,
-                          metadata=json.loads(arrays["metadata"].tobytes()), resource=archive, unchanged=unchanged,
-                          **{name: arrays[name] for name in ARRAYS if name in arrays})
+        return MotionClip(
+            Frames(frames, *shape),
+            arrays["time"],
+            rest=arrays["rest"],
+            attributes=attributes,
+            metadata=json.loads(arrays["metadata"].tobytes()),
+            resource=archive,
+            unchanged=unchanged,
+            **{name: arrays[name] for name in ARRAYS if name in arrays},
+        )
 
 
 class _Archive:
@@ -62,11 +69,21 @@ class _Archive:
     def __init__(self, path: str, options: ReadOptions):
         self._lock = threading.Lock()
         env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        self._process = subprocess.Popen([sys.executable, "-m", READER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                         stderr=subprocess.DEVNULL, env=env)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", READER],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=env,
+        )
         self._end = weakref.finalize(self, _stop, self._process)
-        wanted = {"path": os.path.abspath(path), "rest": options.rest, "fps": options.fps, "only": list(options.only),
-                  "skip": list(options.skip)}
+        wanted = {
+            "path": os.path.abspath(path),
+            "rest": options.rest,
+            "fps": options.fps,
+            "only": list(options.only),
+            "skip": list(options.skip),
+        }
         with naming(path), closing_on_failure(self):
             self.described = self.ask(json.dumps(wanted))
 

@@ -38,14 +38,25 @@ MAX_SAMPLES = 1 << 24
 MAX_OBJECTS = 1 << 20
 SAME_TIME = 1e-4  # of a frame
 EXISTING = Abc.WrapExistingFlag.kWrapExisting
-SCHEMAS = {"AbcGeom_PolyMesh": ("mesh", AbcGeom.IPolyMesh), "AbcGeom_SubD": ("mesh", AbcGeom.ISubD),
-           "AbcGeom_Curve": ("curves", AbcGeom.ICurves), "AbcGeom_Points": ("points", AbcGeom.IPoints)}
-SCOPES = {AbcGeom.GeometryScope.kVertexScope: "vertex", AbcGeom.GeometryScope.kVaryingScope: "vertex",
-          AbcGeom.GeometryScope.kFacevaryingScope: "corner", AbcGeom.GeometryScope.kUniformScope: "face",
-          AbcGeom.GeometryScope.kConstantScope: "constant"}
-PARAMS = tuple(getattr(AbcGeom, f"I{name}GeomParam") for name in (
-    "Float Double Half Int32 UInt32 Int16 UInt16 Char Uchar Boolean V2f V3f V2d V3d V2i V3i P3f P3d N3f N3d C3f C4f"
-).split())
+SCHEMAS = {
+    "AbcGeom_PolyMesh": ("mesh", AbcGeom.IPolyMesh),
+    "AbcGeom_SubD": ("mesh", AbcGeom.ISubD),
+    "AbcGeom_Curve": ("curves", AbcGeom.ICurves),
+    "AbcGeom_Points": ("points", AbcGeom.IPoints),
+}
+SCOPES = {
+    AbcGeom.GeometryScope.kVertexScope: "vertex",
+    AbcGeom.GeometryScope.kVaryingScope: "vertex",
+    AbcGeom.GeometryScope.kFacevaryingScope: "corner",
+    AbcGeom.GeometryScope.kUniformScope: "face",
+    AbcGeom.GeometryScope.kConstantScope: "constant",
+}
+PARAMS = tuple(
+    getattr(AbcGeom, f"I{name}GeomParam")
+    for name in (
+        "Float Double Half Int32 UInt32 Int16 UInt16 Char Uchar Boolean V2f V3f V2d V3d V2i V3i P3f P3d N3f N3d C3f C4f"
+    ).split()
+)
 # what the bindings raise: Alembic's exceptions, Boost's for types that do not match, and those of a broken archive
 BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, MemoryError, UnicodeError)
 
@@ -138,8 +149,10 @@ class _Xform:
     def at(self, time: float) -> np.ndarray:
         if self.still is not None:
             return self.still
-        matrix = sum(weight * np.array(self.schema.getValue(self.track.sample(i)).getMatrix(), np.float64)
-                     for i, weight in self.track.at(time))
+        matrix = sum(
+            weight * np.array(self.schema.getValue(self.track.sample(i)).getMatrix(), np.float64)
+            for i, weight in self.track.at(time)
+        )
         if len(self.track.times) < 2:
             self.still = matrix
         return matrix
@@ -183,11 +196,18 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         except ClipError:
             raise
         except BROKEN as error:
-            raise ClipError(f"positions: frame {frame} of {obj.path} cannot be read: "
-                            f"{' '.join(str(error).split())}") from None
+            raise ClipError(
+                f"positions: frame {frame} of {obj.path} cannot be read: {' '.join(str(error).split())}"
+            ) from None
 
-    return clip_of_objects(objects, frames_of_objects(objects, len(times), sample), times - times[0],
-                           own_metadata(own) | _metadata(archive, times, rate), kept, options)
+    return clip_of_objects(
+        objects,
+        frames_of_objects(objects, len(times), sample),
+        times - times[0],
+        own_metadata(own) | _metadata(archive, times, rate),
+        kept,
+        options,
+    )
 
 
 # ---- objects ----
@@ -279,8 +299,10 @@ def _fixed(obj: _Object, found: Any) -> np.ndarray:
     track = _Track(found.getTimeSampling(), found.getNumSamples())
     for i in range(1, len(track.times)):
         if not np.array_equal(np.array(found.getValue(track.sample(i)), np.int32), first):
-            raise ClipError(f"{obj.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
-                            "the same vertices and faces in all")
+            raise ClipError(
+                f"{obj.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
+                "the same vertices and faces in all"
+            )
     return first
 
 
@@ -332,8 +354,9 @@ def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, 
 
 
 def _statics(obj: _Object, order: np.ndarray, time: float) -> None:
-    params = [] if obj.kind == "points" else [("uv", obj.schema.getUVsParam()),
-                                               ("normals", obj.schema.getNormalsParam())]
+    params = (
+        [] if obj.kind == "points" else [("uv", obj.schema.getUVsParam()), ("normals", obj.schema.getNormalsParam())]
+    )
     if obj.kind != "mesh":
         params.append(("radius", obj.schema.getWidthsParam()))
     for name, param in params if obj.kind != "mesh" or hasattr(obj.schema, "getNormalsParam") else params[:1]:
@@ -417,8 +440,9 @@ def _descriptor(text: str) -> ArrayDescriptor:
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
-    found = [(np.array(obj.points.getValue(obj.track.sample(i)), np.float32), weight)
-             for i, weight in obj.track.at(time)]
+    found = [
+        (np.array(obj.points.getValue(obj.track.sample(i)), np.float32), weight) for i, weight in obj.track.at(time)
+    ]
     counts = {len(points) for points, _ in found}
     if len(counts) != 1:
         raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")

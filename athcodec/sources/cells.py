@@ -16,15 +16,60 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.sources.mesh import with_polygons
 
-VTK_NAMES = {1: "vertex", 2: "poly_vertex", 3: "line", 4: "poly_line", 5: "triangle", 6: "triangle_strip", 7: "polygon",
-             8: "pixel", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3",
-             22: "triangle6", 23: "quad8", 24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
-             28: "quad9", 29: "hexahedron27", 30: "quad6", 32: "wedge18", 34: "triangle7"}
+VTK_NAMES = {
+    1: "vertex",
+    2: "poly_vertex",
+    3: "line",
+    4: "poly_line",
+    5: "triangle",
+    6: "triangle_strip",
+    7: "polygon",
+    8: "pixel",
+    9: "quad",
+    10: "tetra",
+    11: "voxel",
+    12: "hexahedron",
+    13: "wedge",
+    14: "pyramid",
+    21: "line3",
+    22: "triangle6",
+    23: "quad8",
+    24: "tetra10",
+    25: "hexahedron20",
+    26: "wedge15",
+    27: "pyramid13",
+    28: "quad9",
+    29: "hexahedron27",
+    30: "quad6",
+    32: "wedge18",
+    34: "triangle7",
+}
 VTK_NUMBERS = {name: number for number, name in VTK_NAMES.items()}
-NODES = {"vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "triangle7": 7, "pixel": 4, "quad": 4,
-         "quad6": 6, "quad8": 8, "quad9": 9, "tetra": 4, "tetra10": 10, "voxel": 8, "hexahedron": 8, "hexahedron20": 20,
-         "hexahedron24": 24, "hexahedron27": 27, "wedge": 6, "wedge15": 15, "wedge18": 18, "pyramid": 5,
-         "pyramid13": 13}
+NODES = {
+    "vertex": 1,
+    "line": 2,
+    "line3": 3,
+    "triangle": 3,
+    "triangle6": 6,
+    "triangle7": 7,
+    "pixel": 4,
+    "quad": 4,
+    "quad6": 6,
+    "quad8": 8,
+    "quad9": 9,
+    "tetra": 4,
+    "tetra10": 10,
+    "voxel": 8,
+    "hexahedron": 8,
+    "hexahedron20": 20,
+    "hexahedron24": 24,
+    "hexahedron27": 27,
+    "wedge": 6,
+    "wedge15": 15,
+    "wedge18": 18,
+    "pyramid": 5,
+    "pyramid13": 13,
+}
 _CORNERS = {"triangle": [0, 1, 2], "quad": [0, 1, 2, 3], "pixel": [0, 1, 3, 2]}
 _SIDES = {
     "tetra": [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]],
@@ -76,8 +121,9 @@ def base_kind(kind: str) -> str:
     return kind.rstrip("0123456789")
 
 
-def blocks_of(types: np.ndarray, starts: np.ndarray, stops: np.ndarray, nodes: np.ndarray,
-              names: dict[int, str]) -> list[Block]:
+def blocks_of(
+    types: np.ndarray, starts: np.ndarray, stops: np.ndarray, nodes: np.ndarray, names: dict[int, str]
+) -> list[Block]:
     """Cells whose nodes lie between starts and stops, each of a type of `names`. Raises ClipError for another one."""
     blocks = []
     for number in np.unique(types):
@@ -100,8 +146,10 @@ def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
     """Raises ClipError where a cell has a vertex that does not exist."""
     for block in blocks:
         if block.nodes.size and not 0 <= block.nodes.min() <= block.nodes.max() < vertex_count:
-            raise ClipError(f"cells: got a {block.kind} with vertices {block.nodes.min()} to {block.nodes.max()}, "
-                            f"expected 0 to {vertex_count - 1}")
+            raise ClipError(
+                f"cells: got a {block.kind} with vertices {block.nodes.min()} to {block.nodes.max()}, "
+                f"expected 0 to {vertex_count - 1}"
+            )
     topology = Topology()
     _add_edges(topology, blocks)
     _add_faces(topology, blocks)
@@ -154,8 +202,11 @@ def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
     if len(counts):
         topology.faces, polygons = with_polygons(counts, corners)
         topology.attributes |= polygons
-        topology.domains |= {name: domain for name, domain in (("face_vertex_counts", "face"),
-                                                               ("face_vertex_indices", "corner")) if name in polygons}
+        topology.domains |= {
+            name: domain
+            for name, domain in (("face_vertex_counts", "face"), ("face_vertex_indices", "corner"))
+            if name in polygons
+        }
 
 
 def _in_order(counts: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -177,8 +228,9 @@ def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[
     """(counts, corners) of the sides that only one cell has and no face is yet, triangles first."""
     found_counts, found_corners = [], []
     for size in (3, 4):
-        sides = [block.nodes[:, side] for block in volumes
-                 for side in _SIDES[base_kind(block.kind)] if len(side) == size]
+        sides = [
+            block.nodes[:, side] for block in volumes for side in _SIDES[base_kind(block.kind)] if len(side) == size
+        ]
         if not sides:
             continue
         sides = np.concatenate(sides)

@@ -59,11 +59,16 @@ def _check(file: BinaryIO, start: int, size: int) -> None:
         else:
             # PATHS says its count twice
             packed = numbers[2] if name == "PATHS" else numbers[1]
-            fits = max(numbers[0], numbers[1] if name == "PATHS" else 0) <= LARGEST_EXPANSION * packed <= (
-                LARGEST_EXPANSION * length)
+            fits = (
+                max(numbers[0], numbers[1] if name == "PATHS" else 0)
+                <= LARGEST_EXPANSION * packed
+                <= (LARGEST_EXPANSION * length)
+            )
         if not fits:
-            raise ClipError(f"stage: got {numbers[0]} entries in the {length} bytes of its section {name}, expected as "
-                            "many as it holds")
+            raise ClipError(
+                f"stage: got {numbers[0]} entries in the {length} bytes of its section {name}, expected as "
+                "many as it holds"
+            )
 
 
 def _numbers(file: BinaryIO, start: int, size: int, place: int, length: int) -> list[int]:
@@ -73,7 +78,7 @@ def _numbers(file: BinaryIO, start: int, size: int, place: int, length: int) -> 
 
 
 def _sections(file: BinaryIO, start: int, size: int, contents: int) -> list[tuple[str, int, int]]:
-    count, = struct.unpack("<Q", _read(file, start, size, contents, 8))
+    (count,) = struct.unpack("<Q", _read(file, start, size, contents, 8))
     if count > MAX_SECTIONS:
         raise ClipError(f"stage: got {count} sections, expected at most {MAX_SECTIONS}")
     table = _read(file, start, size, contents + 8, 32 * count)

@@ -44,8 +44,16 @@ class Steps(Protocol):
         """Raises ClipError where the cells are others than in the first step."""
 
 
-def clip_of_steps(steps: Steps, time: np.ndarray, metadata: dict[str, Any], name: str, options: ReadOptions,
-                  static: dict[str, np.ndarray], resource: Any = None, unchanged: Any = None) -> MotionClip:
+def clip_of_steps(
+    steps: Steps,
+    time: np.ndarray,
+    metadata: dict[str, Any],
+    name: str,
+    options: ReadOptions,
+    static: dict[str, np.ndarray],
+    resource: Any = None,
+    unchanged: Any = None,
+) -> MotionClip:
     """The clip of a result at (T,) times. static: data per point that do not change. Raises ClipError where nothing
     moves, or it is not clear what does."""
     first = _padded(steps.points(0))
@@ -58,8 +66,10 @@ def clip_of_steps(steps: Steps, time: np.ndarray, metadata: dict[str, Any], name
         steps.check(step)
         points = first if fixed else _padded(steps.points(step))
         if len(points) != count:
-            raise ClipError(f"frame {step}: got {len(points)} vertices, expected {count} as in the first; topology "
-                            "that changes cannot be coded")
+            raise ClipError(
+                f"frame {step}: got {len(points)} vertices, expected {count} as in the first; topology "
+                "that changes cannot be coded"
+            )
         if not moved_by:
             return points
         moved = _padded(steps.field(step, moved_by))
@@ -72,18 +82,31 @@ def clip_of_steps(steps: Steps, time: np.ndarray, metadata: dict[str, Any], name
             return np.stack([frame(step).astype(dtype) for step in range(start, stop)])
 
     domains = dict(topology.domains)
-    attributes = topology.attributes | {key: values for key, values in static.items()
-                                        if key not in RESERVED_NAMES and key not in topology.attributes}
+    attributes = topology.attributes | {
+        key: values for key, values in static.items() if key not in RESERVED_NAMES and key not in topology.attributes
+    }
     attributes = {key: values for key, values in attributes.items() if key not in options.skip}
     attributes["part_vertex_counts"] = np.array([count], np.int32)
     domains["part_vertex_counts"] = "constant"
     polygons = topology.faces if topology.faces is not None else topology.attributes.get("face_vertex_counts")
-    said = {"part_names": [name], "part_kinds": [kind_of(polygons, topology.edges)],
-            "domains": {key: domain for key, domain in domains.items() if key in attributes}}
+    said = {
+        "part_names": [name],
+        "part_kinds": [kind_of(polygons, topology.edges)],
+        "domains": {key: domain for key, domain in domains.items() if key in attributes},
+    }
     rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
-    return MotionClip(Frames(read, len(time), count, dtype), time, faces=topology.faces, edges=topology.edges,
-                      rest=rest, rest_pose="mean" if options.rest == "mean" else "first", attributes=attributes,
-                      metadata=said | metadata, resource=resource, unchanged=unchanged)
+    return MotionClip(
+        Frames(read, len(time), count, dtype),
+        time,
+        faces=topology.faces,
+        edges=topology.edges,
+        rest=rest,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        attributes=attributes,
+        metadata=said | metadata,
+        resource=resource,
+        unchanged=unchanged,
+    )
 
 
 def _padded(points: np.ndarray) -> np.ndarray:
@@ -111,15 +134,20 @@ def _displacement(steps: Any, step_count: int, options: ReadOptions) -> str | No
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
     if not found and step_count > 1:
-        raise ClipError(f"field: got points that do not move and no displacement, only {_listed(names)}; name one of "
-                        "them with --field")
+        raise ClipError(
+            f"field: got points that do not move and no displacement, only {_listed(names)}; name one of "
+            "them with --field"
+        )
     return found[0] if found else None
 
 
 def _points_differ(steps: Any, step_count: int) -> bool:
     first = steps.points(0)
-    return any(not np.array_equal(first, steps.points(step)) for step in {1, step_count // 2, step_count - 1}
-               if 0 < step < step_count)
+    return any(
+        not np.array_equal(first, steps.points(step))
+        for step in {1, step_count // 2, step_count - 1}
+        if 0 < step < step_count
+    )
 
 
 def _is_vector(values: np.ndarray) -> bool:

@@ -102,11 +102,18 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             time=np.arange(len(timing.times)) / timing.fps,
             rest=rest if rest is not None and np.isfinite(rest).all() else None,
             rest_pose="mean" if options.rest == "mean" else "first",
-            edges=edges, faces=faces, attributes=attributes, resource=file, skin=_skin(scene, nodes),
+            edges=edges,
+            faces=faces,
+            attributes=attributes,
+            resource=file,
+            skin=_skin(scene, nodes),
             clip_ranges=(ClipRange("", len(timing.times), True),) if timing.is_loop else (),
-            metadata={"unit": "m", "up_axis": "y"} | timing.clock | _names(nodes)
+            metadata={"unit": "m", "up_axis": "y"}
+            | timing.clock
+            | _names(nodes)
             | ({} if options.takes else _played(scene)),
-            unchanged=file.unchanged, **branches,
+            unchanged=file.unchanged,
+            **branches,
         )
         rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]
@@ -121,7 +128,7 @@ def _positions(motion: _Motion, times: np.ndarray) -> Frames:
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
     """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
-    patterns = [name[len(ANIMATION):] for name in options.only if name.startswith(ANIMATION)]
+    patterns = [name[len(ANIMATION) :] for name in options.only if name.startswith(ANIMATION)]
     if not options.takes:
         chosen = list(_animations(file, patterns, f"only: got {ANIMATION}").values()) if patterns else None
         return {"": Scene(file, chosen)}
@@ -146,8 +153,11 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
                 nodes.extend(_nodes(scene, index, mesh, next(filter(None, called), f"mesh {mesh_index}")))
     if not nodes:
         names = brief(sorted({name for name in seen if name}))
-        raise ClipError(f"only: got {', '.join(patterns)}, expected names such as {names}" if patterns and seen else
-                        "meshes: got none in the scene, expected at least one")
+        raise ClipError(
+            f"only: got {', '.join(patterns)}, expected names such as {names}"
+            if patterns and seen
+            else "meshes: got none in the scene, expected at least one"
+        )
     first = 0
     for node in nodes:
         node.first = first
@@ -187,8 +197,9 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
     nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
         attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
-        targets = [integer(target, "POSITION") if "POSITION" in target else None
-                   for target in entries(primitive, "targets")]
+        targets = [
+            integer(target, "POSITION") if "POSITION" in target else None for target in entries(primitive, "targets")
+        ]
         if "POSITION" not in attributes:
             raise ClipError(f"mesh {name!r}: got a primitive without POSITION, expected one with it")
         _refuse_draco(scene.file, primitive, attributes["POSITION"])
@@ -198,8 +209,15 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
             if not isinstance(weights, list) or len(weights) != len(targets):
                 raise ClipError(f"mesh {name!r}: got weights {brief(weights)}, expected {len(targets)}")
             nodes[key] = GltfNode(
-                index, name, scene.nodes[index]["mesh"], scene.nodes[index].get("skin"), attributes, targets,
-                np.array(weights, np.float64), count=scene.file.count(attributes["POSITION"]))
+                index,
+                name,
+                scene.nodes[index]["mesh"],
+                scene.nodes[index].get("skin"),
+                attributes,
+                targets,
+                np.array(weights, np.float64),
+                count=scene.file.count(attributes["POSITION"]),
+            )
         node = nodes[key]
         kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
         node.kind = max(node.kind, kind, key=KINDS.index)
@@ -213,8 +231,10 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
 def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
     packed = "KHR_draco_mesh_compression" in (primitive.get("extensions") or {})
     if packed and file.item("accessors", positions).get("bufferView") is None:
-        raise ClipError("meshes: got KHR_draco_mesh_compression, expected a file without it: decompress it first, for "
-                        "example with gltf-transform copy")
+        raise ClipError(
+            "meshes: got KHR_draco_mesh_compression, expected a file without it: decompress it first, for "
+            "example with gltf-transform copy"
+        )
 
 
 def _load(node: GltfNode, scene: Scene) -> None:
@@ -222,8 +242,9 @@ def _load(node: GltfNode, scene: Scene) -> None:
     node.base = _triples(file, node.attributes["POSITION"], node.count, "POSITION")
     for target in node.targets:
         if target is not None and file.count(target) != node.count:
-            raise ClipError(f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected "
-                            f"{node.count}")
+            raise ClipError(
+                f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected {node.count}"
+            )
     if node.skin is None:
         return
     skin = file.item("skins", node.skin)
@@ -274,8 +295,10 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
     weight = np.concatenate([*weight, np.ones(len(bare))])
     total[bare] = 1.0
     if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(node.joints):
-        raise ClipError(f"mesh {node.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
-                        f"joints below {len(node.joints)}")
+        raise ClipError(
+            f"mesh {node.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
+            f"joints below {len(node.joints)}"
+        )
     pair, index = np.unique(joint * node.count + vertex, return_inverse=True)
     weight = np.bincount(index, weight / total[vertex], len(pair))
     joint, vertex = np.divmod(pair, node.count)
@@ -393,8 +416,9 @@ def _said(scene: Scene) -> dict[str, Any]:
     items = [scene.file.json["asset"]]
     if len(scene.played) == 1:
         items.append(scene.file.item("animations", scene.played[0]))
-    return {key: value for item in items if isinstance(item.get("extras"), dict)
-            for key, value in item["extras"].items()}
+    return {
+        key: value for item in items if isinstance(item.get("extras"), dict) for key, value in item["extras"].items()
+    }
 
 
 def _returns(motion: _Motion, keys: np.ndarray) -> bool:
@@ -452,8 +476,9 @@ def _corners(file: GltfFile, primitive: dict, node: GltfNode) -> np.ndarray:
         return np.arange(node.count)
     values = file.array(primitive["indices"])
     if values.shape[1] != 1 or values.dtype.kind != "u" or int(values.max()) >= node.count:
-        raise ClipError(f"mesh {node.name!r}: got indices up to {values.max()}, expected those of {node.count} "
-                        "vertices")
+        raise ClipError(
+            f"mesh {node.name!r}: got indices up to {values.max()}, expected those of {node.count} vertices"
+        )
     return values[:, 0].astype(np.int64)
 
 
@@ -478,13 +503,18 @@ def _rows(corners: np.ndarray, mode: int) -> np.ndarray:
     return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]
 
 
-def _attributes(file: GltfFile, nodes: list[GltfNode], skip: Collection[str], motion: _Motion,
-                keep_normals: bool) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _attributes(
+    file: GltfFile, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keep_normals: bool
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
     keep_normals = keep_normals and not any(node.skin is not None or node.weights.any() for node in nodes)
-    keys = dict.fromkeys(key for node in nodes for key in node.attributes
-                         if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL")
+    keys = dict.fromkeys(
+        key
+        for node in nodes
+        for key in node.attributes
+        if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL"
+    )
     found: dict[str, np.ndarray] = {}
     for key in keys:
         name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:])
@@ -550,8 +580,11 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
             vertex_joint[rows] = place[node.index]
         else:
             vertex_joint[rows] = np.array([place[joint] for joint in node.joints])[node.strongest]
-    return Skin(np.array([_above(scene, joint, place) for joint in order], np.int32), vertex_joint,
-                tuple(scene.name(joint) for joint in order))
+    return Skin(
+        np.array([_above(scene, joint, place) for joint in order], np.int32),
+        vertex_joint,
+        tuple(scene.name(joint) for joint in order),
+    )
 
 
 def _above(scene: Scene, joint: int, place: dict[int, int]) -> int:

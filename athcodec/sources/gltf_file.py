@@ -29,8 +29,19 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KEPT_VIEWS = 8  # that have been decompressed
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 # Extensions that a reader of positions may ignore, or that are read here.
-HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_", "EXT_lights_", "MSFT_texture_",
-            "ADOBE_materials_", "KHR_mesh_quantization", "KHR_animation_pointer", *MESHOPT)
+HARMLESS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_lights_",
+    "KHR_xmp",
+    "EXT_texture_",
+    "EXT_lights_",
+    "MSFT_texture_",
+    "ADOBE_materials_",
+    "KHR_mesh_quantization",
+    "KHR_animation_pointer",
+    *MESHOPT,
+)
 
 _GLB_HEADER = struct.Struct("<4sII")
 _CHUNK_HEADER = struct.Struct("<II")
@@ -101,8 +112,9 @@ class GltfFile:
             raise ClipError(f"asset: got version {version[:20]!r}, expected 2.0")
         for name in self.json.get("extensionsRequired") or ():
             if not str(name).startswith(HARMLESS):
-                raise ClipError(f"extensionsRequired: got {str(name)[:60]!r}, which is not read here; expected a file "
-                                "without it")
+                raise ClipError(
+                    f"extensionsRequired: got {str(name)[:60]!r}, which is not read here; expected a file without it"
+                )
 
     def item(self, kind: str, index: Any) -> dict:
         """Entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
@@ -156,8 +168,10 @@ class GltfFile:
         size = stride * (count - 1) + item
         length = integer(view, "byteLength", low=1)
         if stride < item or offset + size > length:
-            raise ClipError(f"{where}: got {count} elements of {item} bytes at {offset}, expected what fits into the "
-                            f"{length} bytes of its buffer view")
+            raise ClipError(
+                f"{where}: got {count} elements of {item} bytes at {offset}, expected what fits into the "
+                f"{length} bytes of its buffer view"
+            )
         raw = self._view(index, view, offset, size)
         return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
 
@@ -194,8 +208,9 @@ class GltfFile:
             self._buffers[index] = self._buffer(index)
         buffer = self._buffers[index]
         if offset + size > buffer.size:
-            raise ClipError(f"{where}: got bytes {offset} to {offset + size}, expected those of a buffer of "
-                            f"{buffer.size}")
+            raise ClipError(
+                f"{where}: got bytes {offset} to {offset + size}, expected those of a buffer of {buffer.size}"
+            )
         return buffer.read(offset, size)
 
     def _buffer(self, index: int) -> _Bytes:

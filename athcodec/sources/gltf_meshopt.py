@@ -18,17 +18,23 @@ def unpack(raw: bytes, packed: Mapping) -> bytes:
     try:
         import meshoptimizer as library
     except ImportError:
-        raise MissingExtra("glTF compressed by EXT_meshopt_compression: needs meshoptimizer: "
-                           'pip install "athcodec[gltf]"') from None
+        raise MissingExtra(
+            'glTF compressed by EXT_meshopt_compression: needs meshoptimizer: pip install "athcodec[gltf]"'
+        ) from None
     count, stride = integer(packed, "count", low=1), integer(packed, "byteStride", low=1, stop=257)
     if count * stride > MOST_PER_BYTE * len(raw):
         raise ClipError(f"meshopt: got {count} elements of {stride} bytes in {len(raw)}, expected fewer")
     mode, filtered = packed.get("mode"), packed.get("filter", "NONE")
-    if mode not in ("ATTRIBUTES", "TRIANGLES", "INDICES") or stride not in STRIDES.get(filtered, ()) or (
-            stride % 4 if mode == "ATTRIBUTES" else stride not in (2, 4) or filtered != "NONE") or (
-            mode == "TRIANGLES" and count % 3):
-        raise ClipError(f"meshopt: got mode {mode!r}, filter {filtered!r}, {count} elements of {stride} bytes; "
-                        "expected what the extension defines")
+    if (
+        mode not in ("ATTRIBUTES", "TRIANGLES", "INDICES")
+        or stride not in STRIDES.get(filtered, ())
+        or (stride % 4 if mode == "ATTRIBUTES" else stride not in (2, 4) or filtered != "NONE")
+        or (mode == "TRIANGLES" and count % 3)
+    ):
+        raise ClipError(
+            f"meshopt: got mode {mode!r}, filter {filtered!r}, {count} elements of {stride} bytes; "
+            "expected what the extension defines"
+        )
     try:
         if mode == "ATTRIBUTES":
             values = library.decode_vertex_buffer(count, stride, raw)
@@ -36,8 +42,11 @@ def unpack(raw: bytes, packed: Mapping) -> bytes:
             decode = library.decode_index_buffer if mode == "TRIANGLES" else library.decode_index_sequence
             values = decode(count, stride, raw)
         values = np.frombuffer(np.ascontiguousarray(values).tobytes()[: count * stride], np.uint8).copy()
-        filters = {"OCTAHEDRAL": library.decode_filter_oct, "QUATERNION": library.decode_filter_quat,
-                   "EXPONENTIAL": library.decode_filter_exp}
+        filters = {
+            "OCTAHEDRAL": library.decode_filter_oct,
+            "QUATERNION": library.decode_filter_quat,
+            "EXPONENTIAL": library.decode_filter_exp,
+        }
         if filtered in filters:
             values = filters[filtered](values, count, stride)
     except (RuntimeError, ValueError, TypeError) as error:

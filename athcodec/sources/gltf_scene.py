@@ -77,9 +77,17 @@ def normalized(quaternions: np.ndarray) -> np.ndarray:
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
     x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    rows = [
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    ]
     return np.stack(rows, axis=-1).reshape(*quaternions.shape[:-1], 3, 3)
 
 
@@ -174,15 +182,18 @@ class Scene:
             if sampler >= len(samplers):
                 raise ClipError(f"animation {index}: got sampler {sampler}, expected one below {len(samplers)}")
             if "matrix" in self.nodes[node] and path in TRS:
-                raise ClipError(f"animation {index}: moves node {node}, which has a matrix, expected translation, "
-                                "rotation and scale")
+                raise ClipError(
+                    f"animation {index}: moves node {node}, which has a matrix, expected translation, "
+                    "rotation and scale"
+                )
             self._tracks[node, path] = self._track(samplers[sampler], path, f"animation {index}, sampler {sampler}")
 
     def _track(self, sampler: dict, path: str, where: str) -> Track:
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
-            raise ClipError(f"{where}: got interpolation {brief(interpolation)}, expected one of "
-                            f"{', '.join(INTERPOLATIONS)}")
+            raise ClipError(
+                f"{where}: got interpolation {brief(interpolation)}, expected one of {', '.join(INTERPOLATIONS)}"
+            )
         key = integer(sampler, "input")
         if key not in self._times:
             self._times[key] = self.file.floats(key)[:, 0].astype(np.float64)
@@ -193,8 +204,10 @@ class Scene:
         values_per_key = 3 if interpolation == "CUBICSPLINE" else 1
         width = len(TRS[path]) if path in TRS else values.size // (len(times) * values_per_key)
         if width == 0 or values.size != len(times) * values_per_key * width:
-            raise ClipError(f"{where}: got {values.size} numbers for {len(times)} keys, expected "
-                            f"{values_per_key * max(width, 1)} per key")
+            raise ClipError(
+                f"{where}: got {values.size} numbers for {len(times)} keys, expected "
+                f"{values_per_key * max(width, 1)} per key"
+            )
         shape = (len(times), 3, width) if values_per_key == 3 else (len(times), width)
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
@@ -247,8 +260,10 @@ class Scene:
     def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
         """(k, nodes, 4, 4): from each node to its parent."""
         frames = 1 if times is None else len(times)
-        parts = {path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
-                 for path, default in TRS.items()}
+        parts = {
+            path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
+            for path, default in TRS.items()
+        }
         for path, nodes, track in self._groups if times is not None else ():
             inside = [i for i, node in enumerate(nodes) if node in place]
             parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]

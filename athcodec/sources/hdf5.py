@@ -70,8 +70,9 @@ def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     if isinstance(metadata.get("domains"), str):
         metadata["domains"] = _parsed("domains", metadata["domains"])
     attributes = _static_arrays(file, options.skip)
-    return clip_of_arrays(positions, lambda name: _array(file, name), attributes, metadata, options, resource=file,
-                          unchanged=unchanged)
+    return clip_of_arrays(
+        positions, lambda name: _array(file, name), attributes, metadata, options, resource=file, unchanged=unchanged
+    )
 
 
 def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
@@ -91,8 +92,7 @@ def _array(file: h5py.File, name: str) -> np.ndarray | None:
 def _load(name: str, dataset: h5py.Dataset) -> np.ndarray:
     if dataset.nbytes > MAX_ATTRIBUTE_BYTES:
         raise ClipError(
-            f"{name}: got {dataset.nbytes} bytes, expected a static array of at most {MAX_ATTRIBUTE_BYTES}; "
-            "or skip it"
+            f"{name}: got {dataset.nbytes} bytes, expected a static array of at most {MAX_ATTRIBUTE_BYTES}; or skip it"
         )
     try:
         if h5py.check_string_dtype(dataset.dtype) and dataset.dtype.hasobject:

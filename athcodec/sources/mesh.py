@@ -22,9 +22,24 @@ from athcodec.errors import ClipError
 
 FLOAT32_DIGITS = 9
 HEADER_BYTES = 1 << 16
-PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-             "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-             "float32": "f4", "float64": "f8"}
+PLY_TYPES = {
+    "char": "i1",
+    "uchar": "u1",
+    "short": "i2",
+    "ushort": "u2",
+    "int": "i4",
+    "uint": "u4",
+    "float": "f4",
+    "double": "f8",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "float32": "f4",
+    "float64": "f8",
+}
 
 
 @dataclass
@@ -43,7 +58,7 @@ class Mesh:
         return polygons(self.faces, self.attributes)
 
     def same_topology(self, other: Mesh) -> str:
-        """"" where both have as many vertices and the same faces and edges, else what is different."""
+        """ "" where both have as many vertices and the same faces and edges, else what is different."""
         if len(self.points) != len(other.points):
             return f"got {len(other.points)} vertices, expected {len(self.points)}"
         for what, mine, theirs in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
@@ -229,8 +244,11 @@ def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[n
         raise ClipError("vertices: got fewer than three coordinates")
     points = np.array(list(map(float, flat)), np.float64).reshape(-1, 3)
     if dtype is None:
-        dtype = np.float64 if any(len(word) > FLOAT32_DIGITS and _digits(word) > FLOAT32_DIGITS for word in flat) \
+        dtype = (
+            np.float64
+            if any(len(word) > FLOAT32_DIGITS and _digits(word) > FLOAT32_DIGITS for word in flat)
             else np.float32
+        )
     width = len(rows[0])
     if width not in (6, 7) or any(len(row) != width for row in rows):
         return _narrowed(points, dtype), None
@@ -305,8 +323,9 @@ def _add_parts(mesh: Mesh, labels: np.ndarray, names: Sequence[str]) -> None:
     if mesh.edges is not None:
         edged[mesh.edges] = True
     spans = zip(starts, np.append(starts[1:], len(labels)))
-    mesh.metadata["part_kinds"] = ["mesh" if faced[a:b].any() else "curves" if edged[a:b].any() else "points"
-                                   for a, b in spans]
+    mesh.metadata["part_kinds"] = [
+        "mesh" if faced[a:b].any() else "curves" if edged[a:b].any() else "points" for a, b in spans
+    ]
 
 
 def _add_face_names(mesh: Mesh, name: str, labels: np.ndarray, names_key: str, names: Iterable[str]) -> None:
@@ -393,12 +412,12 @@ class _Text:
         width = sum(1 + lengths[name] if counted_by else 1 for name, _, counted_by in element.properties)
         if self._at + count * width > len(self._words):
             raise ClipError(f"{element.name}: got the end of the file, expected {element.count} of them")
-        words = self._words[self._at: self._at + count * width]
+        words = self._words[self._at : self._at + count * width]
         table = np.array(list(map(float, words)), np.float64).reshape(count, width)
         rows, column = np.empty(count, element.row("=", lengths)), 0
         for name in rows.dtype.names:
             span = int(np.prod(rows.dtype[name].shape, dtype=int))
-            values = table[:, column: column + span]
+            values = table[:, column : column + span]
             with np.errstate(invalid="ignore", over="ignore"):
                 rows[name] = values.reshape(rows[name].shape)
             column += span
@@ -445,9 +464,12 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, n
     with_same = _uniform(source, element, lengths)
     if with_same is not None:
         source.skip(element, lengths, element.count)
-        return {name: with_same[name] if name not in lengths
-                else (with_same[f"{name} count"].astype(np.int64), with_same[name].reshape(-1))
-                for name, *_ in element.properties}
+        return {
+            name: with_same[name]
+            if name not in lengths
+            else (with_same[f"{name} count"].astype(np.int64), with_same[name].reshape(-1))
+            for name, *_ in element.properties
+        }
     return _one_by_one(source, element)
 
 
@@ -484,14 +506,16 @@ def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, np.nd
         for name, length in lengths.items():
             counts[name].append(length)
     joined = {name: np.concatenate(values) for name, values in parts.items()}
-    return {name: (np.array(counts[name], np.int64), values) if name in counts else values
-            for name, values in joined.items()}
+    return {
+        name: (np.array(counts[name], np.int64), values) if name in counts else values
+        for name, values in joined.items()
+    }
 
 
 def parse_ply(data: bytes) -> Mesh:
     """The mesh in the bytes of a PLY file. Raises ClipError."""
     header = ply_header(data)
-    source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length:])
+    source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length :])
     values: dict[str, dict[str, np.ndarray]] = {}
     for element in header.elements:
         if element.name in values:
@@ -512,8 +536,14 @@ def parse_ply(data: bytes) -> Mesh:
 
 def ply_points(vertices: Any) -> np.ndarray:
     """(N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
-    dtype = np.float32 if all(vertices[axis].dtype.newbyteorder("=") in (np.float32, np.int8, np.uint8, np.int16,
-                                                                        np.uint16) for axis in "xyz") else np.float64
+    dtype = (
+        np.float32
+        if all(
+            vertices[axis].dtype.newbyteorder("=") in (np.float32, np.int8, np.uint8, np.int16, np.uint16)
+            for axis in "xyz"
+        )
+        else np.float64
+    )
     return np.stack([vertices[axis].astype(dtype) for axis in "xyz"], axis=1)
 
 

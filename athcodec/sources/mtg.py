@@ -87,8 +87,10 @@ def mtg_branches(path: str | PathLike[str], clip: MotionClip) -> tuple[np.ndarra
     elif len(mtg.labels) == clip.vertex_count:
         branch, along = mtg.branch, _depths(mtg.parent)
     else:
-        raise ClipError(f"{fspath(path)}: got {len(mtg.labels)} parts without coordinates, expected "
-                        f"{clip.vertex_count} as vertices of the clip, or the features XX, YY and ZZ")
+        raise ClipError(
+            f"{fspath(path)}: got {len(mtg.labels)} parts without coordinates, expected "
+            f"{clip.vertex_count} as vertices of the clip, or the features XX, YY and ZZ"
+        )
     branch, branch_parent = _without_empty(branch, mtg.branch_parent)
     order = np.lexsort((np.arange(len(branch)), along, branch))
     labels = branch[order]
@@ -180,10 +182,13 @@ class _Plants:
         column = next((place for place, cell in enumerate(cells[: self._topology_columns]) if cell), None)
         if column is None or cells[column] == "*":
             return
-        features = {self.names[place]: cells[place] for place in range(self._topology_columns, len(cells))
-                    if place < len(self.names) and self.names[place] and cells[place]}
+        features = {
+            self.names[place]: cells[place]
+            for place in range(self._topology_columns, len(cells))
+            if place < len(self.names) and self.names[place] and cells[place]
+        }
         code = re.sub(r"\s", "", cells[column])
-        extra = next((cell for cell in cells[column + 1: self._topology_columns] if cell.startswith(_BEGINNINGS)), "")
+        extra = next((cell for cell in cells[column + 1 : self._topology_columns] if cell.startswith(_BEGINNINGS)), "")
         if extra:
             raise self._fail(f"got the codes {code[:20]!r} and {extra[:20]!r}, expected one")
         made = self._code(code, column)
@@ -201,8 +206,10 @@ class _Plants:
                 break
             at = step.end()
             before = now
-            made = [now := self._step(now, relation, label, is_absolute)
-                    for relation, label in self._unfolded(now, *step.groups())]
+            made = [
+                now := self._step(now, relation, label, is_absolute)
+                for relation, label in self._unfolded(now, *step.groups())
+            ]
             about = made if "." in step[1] else [now]
             if "." in step[1] and before >= 0:
                 about = [before, *made]
@@ -222,7 +229,7 @@ class _Plants:
         if alias:
             if alias[1] not in self._aliases:
                 raise self._fail(f"got the alias {alias[1][:20]!r}, which no entity above has")
-            return self._aliases[alias[1]], code[alias.end():], True
+            return self._aliases[alias[1]], code[alias.end() :], True
         left = next((entity for entity in reversed(self._latest[:column]) if entity >= 0), -1)
         if left >= 0:
             return left, code, False
@@ -293,8 +300,11 @@ def _parts(plants: _Plants) -> Mtg:
             parent[row], follows[row] = place[_last_leaf(entities, below)], relation == "<"
     order = _roots_first(parent)
     branch, branch_parent = _chains(parent, follows, order)
-    features = {name: np.array([_number(entities[leaf].features.get(name)) for leaf in leaves])
-                for name in plants.names[1:] if name}
+    features = {
+        name: np.array([_number(entities[leaf].features.get(name)) for leaf in leaves])
+        for name in plants.names[1:]
+        if name
+    }
     positions = np.array([_position(entities[leaf]) for leaf in leaves])
     base = positions[parent]
     base[parent < 0] = np.nan
@@ -401,8 +411,9 @@ def _depths(parent: np.ndarray) -> np.ndarray:
     return depth
 
 
-def _nearest(path: str | PathLike[str], mtg: Mtg, located: np.ndarray,
-             rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(
+    path: str | PathLike[str], mtg: Mtg, located: np.ndarray, rest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The branch of the nearest piece, from a part's base to its position, and how far up the branch that is."""
     rows = np.flatnonzero(located)
     tip = mtg.positions[rows]
@@ -410,8 +421,10 @@ def _nearest(path: str | PathLike[str], mtg: Mtg, located: np.ndarray,
     piece, share, distance = _nearest_pieces(rest, base, tip)
     diagonal = np.linalg.norm(np.ptp(rest, axis=0))
     if np.median(distance) > FARTHEST * diagonal:
-        raise ClipError(f"{fspath(path)}: half of the vertices are more than {np.median(distance):.3g} away from the "
-                        f"plant of the MTG, expected {FARTHEST * diagonal:.3g}: are its units and axes the clip's?")
+        raise ClipError(
+            f"{fspath(path)}: half of the vertices are more than {np.median(distance):.3g} away from the "
+            f"plant of the MTG, expected {FARTHEST * diagonal:.3g}: are its units and axes the clip's?"
+        )
     return mtg.branch[rows[piece]], _depths(mtg.parent)[rows[piece]] + share
 
 
@@ -423,14 +436,14 @@ def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tu
     distance = np.zeros(len(points))
     rows = max(1, BLOCK_PAIRS // len(base))
     for start in range(0, len(points), rows):
-        block = points[start: start + rows]
+        block = points[start : start + rows]
         from_base = block[:, None] - base
         shares = np.clip(np.einsum("ijk,jk->ij", from_base, along) / square, 0, 1)
         away = ((from_base - shares[..., None] * along) ** 2).sum(axis=2)
         best = away.argmin(axis=1)
         every = np.arange(len(block))
-        piece[start: start + rows], share[start: start + rows] = best, shares[every, best]
-        distance[start: start + rows] = np.sqrt(away[every, best])
+        piece[start : start + rows], share[start : start + rows] = best, shares[every, best]
+        distance[start : start + rows] = np.sqrt(away[every, best])
     return piece, share, distance
 
 

@@ -33,8 +33,21 @@ SCALARS = ("fps", "start_frame", "unit", "up_axis")
 METADATA = "metadata"
 SKIP_BYTES = 1 << 20
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
-_BROKEN = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, KeyError, RuntimeError,
-           NotImplementedError, struct.error, MemoryError, OverflowError, TypeError, SyntaxError)
+_BROKEN = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    ValueError,
+    KeyError,
+    RuntimeError,
+    NotImplementedError,
+    struct.error,
+    MemoryError,
+    OverflowError,
+    TypeError,
+    SyntaxError,
+)
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
@@ -59,24 +72,30 @@ def _naming_array(name: str) -> Iterator[None]:
 
 def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
     archive = zipfile.ZipFile(file)
-    members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()
-               if info.filename.endswith(".npy")}
+    members = {
+        info.filename.removesuffix(".npy"): info for info in archive.infolist() if info.filename.endswith(".npy")
+    }
     if "positions" not in members:
         raise ClipError("positions: got no such array, expected (frames, vertices, 3)")
     with _naming_array("positions"):
         positions = _Positions(file, archive, members.pop("positions")).frames()
-    arrays = {name: _array(archive, name, info) for name, info in members.items()
-              if name in RESERVED_NAMES or name not in options.skip}
+    arrays = {
+        name: _array(archive, name, info)
+        for name, info in members.items()
+        if name in RESERVED_NAMES or name not in options.skip
+    }
     metadata = _metadata(arrays)
     attributes = {name: values for name, values in arrays.items() if name not in RESERVED_NAMES}
-    return clip_of_arrays(positions, arrays.get, attributes, metadata, options, resource=file,
-                          unchanged=FileWatch(file.fileno()))
+    return clip_of_arrays(
+        positions, arrays.get, attributes, metadata, options, resource=file, unchanged=FileWatch(file.fileno())
+    )
 
 
 def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> np.ndarray:
     if info.file_size > MAX_ARRAY_BYTES:
-        raise ClipError(f"{name}: got {info.file_size} bytes, expected a static array of at most {MAX_ARRAY_BYTES}; or "
-                        "skip it")
+        raise ClipError(
+            f"{name}: got {info.file_size} bytes, expected a static array of at most {MAX_ARRAY_BYTES}; or skip it"
+        )
     with _naming_array(name), archive.open(info) as member:
         values = np.lib.format.read_array(member, allow_pickle=False)
         if member.read(1):

@@ -47,8 +47,11 @@ def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
         raise ClipError(f"header: got the start {first} and {step} frames per sample, expected a step above 0")
     check_size(file, frame_count, vertex_count, HEADER.size)
     time, metadata = numbered_times(float(first) + float(step) * np.arange(frame_count), options.fps)
-    return {"positions": raw_frames(file, HEADER.size, frame_count, vertex_count, "<f4"), "time": time,
-            "metadata": metadata}
+    return {
+        "positions": raw_frames(file, HEADER.size, frame_count, vertex_count, "<f4"),
+        "time": time,
+        "metadata": metadata,
+    }
 
 
 def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes: int) -> None:
@@ -68,9 +71,16 @@ def open_cache(path: str | PathLike[str], options: ReadOptions, read_header: Any
         fields = read_header(file, options)
         mesh = cached_mesh(path, options, fields["positions"].shape[1])
         metadata = mesh.metadata | fields.pop("metadata")
-        return MotionClip(**fields, metadata=metadata, faces=mesh.faces, edges=mesh.edges, attributes=mesh.attributes,
-                          rest_pose="mean" if options.rest == "mean" else "first", resource=file,
-                          unchanged=FileWatch(file.fileno()))
+        return MotionClip(
+            **fields,
+            metadata=metadata,
+            faces=mesh.faces,
+            edges=mesh.edges,
+            attributes=mesh.attributes,
+            rest_pose="mean" if options.rest == "mean" else "first",
+            resource=file,
+            unchanged=FileWatch(file.fileno()),
+        )
 
 
 def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: int) -> Mesh:
@@ -79,8 +89,11 @@ def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: i
     they may be in other units or axes."""
     found = options.mesh or _mesh_beside(Path(path))
     if found is None:
-        metadata = {"part_names": [Path(path).stem], "part_kinds": ["points"],
-                    "domains": {"part_vertex_counts": "constant"}}
+        metadata = {
+            "part_names": [Path(path).stem],
+            "part_kinds": ["points"],
+            "domains": {"part_vertex_counts": "constant"},
+        }
         attributes = {"part_vertex_counts": np.array([vertex_count], np.int32)}
         return Mesh(np.empty((vertex_count, 3)), attributes=attributes, metadata=metadata)
     if Path(found).suffix.lower() in MESH_SUFFIXES:
@@ -90,10 +103,12 @@ def cached_mesh(path: str | PathLike[str], options: ReadOptions, vertex_count: i
             metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
             mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata)
     if len(mesh.points) != vertex_count:
-        raise ClipError(f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the "
-                        "cache")
-    mesh.attributes = {name: values for name, values in mesh.attributes.items()
-                       if name not in options.skip and name != "normals"}
+        raise ClipError(
+            f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
+        )
+    mesh.attributes = {
+        name: values for name, values in mesh.attributes.items() if name not in options.skip and name != "normals"
+    }
     return mesh
 
 

@@ -65,12 +65,14 @@ class SceneObject:
         """Raises ClipError where faces or curves do not fit the points."""
         corners = self.face_counts.sum(dtype=np.int64)
         if (self.face_counts < 0).any() or corners != len(self.face_indices):
-            raise ClipError(f"{self.path}: got faces of {corners} corners, expected {len(self.face_indices)}, one per "
-                            "index")
+            raise ClipError(
+                f"{self.path}: got faces of {corners} corners, expected {len(self.face_indices)}, one per index"
+            )
         bad = np.flatnonzero((self.face_indices < 0) | (self.face_indices >= self.count))
         if bad.size:
-            raise ClipError(f"{self.path}: corner {bad[0]} is vertex {self.face_indices[bad[0]]}, expected 0 to "
-                            f"{self.count - 1}")
+            raise ClipError(
+                f"{self.path}: corner {bad[0]} is vertex {self.face_indices[bad[0]]}, expected 0 to {self.count - 1}"
+            )
         points = self.count if self.curve_counts is None else self.curve_counts.sum(dtype=np.int64)
         if points != self.count or self.curve_counts is not None and (self.curve_counts < 0).any():
             raise ClipError(f"{self.path}: got curves of {points} points, expected {self.count}")
@@ -123,15 +125,23 @@ class ArrayDescriptor(NamedTuple):
     def array(self, raw: bytes) -> np.ndarray | None:
         """The array; None where the bytes do not make one."""
         try:
-            dtype = np.dtype([tuple(item) for item in json.loads(self.dtype)] if self.dtype.startswith("[")
-                             else self.dtype)
+            dtype = np.dtype(
+                [tuple(item) for item in json.loads(self.dtype)] if self.dtype.startswith("[") else self.dtype
+            )
             return None if dtype.hasobject else np.frombuffer(raw, dtype).reshape(json.loads(self.shape))
         except (ValueError, TypeError, RecursionError):
             return None
 
 
-def clip_of_objects(objects: list[Any], frames: Frames, time: np.ndarray, metadata: dict[str, Any],
-                    kept: Iterable[tuple[ArrayDescriptor, bytes]], options: ReadOptions, **more: Any) -> MotionClip:
+def clip_of_objects(
+    objects: list[Any],
+    frames: Frames,
+    time: np.ndarray,
+    metadata: dict[str, Any],
+    kept: Iterable[tuple[ArrayDescriptor, bytes]],
+    options: ReadOptions,
+    **more: Any,
+) -> MotionClip:
     """The clip of all objects. kept: arrays that a writer of ours has added to the file; more: further fields of
     MotionClip."""
     attributes, domains = _joined_statics(objects, options.skip)
@@ -140,16 +150,26 @@ def clip_of_objects(objects: list[Any], frames: Frames, time: np.ndarray, metada
     rest, links = known.pop("rest", None), known.pop("edges", None)
     polygons = _faces(objects, attributes)
     return MotionClip(
-        frames, time, rest=rest if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first", edges=_edges(objects) if links is None else links,
-        faces=polygons, attributes=attributes, metadata=metadata | _names_and_kinds(objects) | {"domains": domains},
-        **known, **more)
+        frames,
+        time,
+        rest=rest if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        edges=_edges(objects) if links is None else links,
+        faces=polygons,
+        attributes=attributes,
+        metadata=metadata | _names_and_kinds(objects) | {"domains": domains},
+        **known,
+        **more,
+    )
 
 
-def frames_of_objects(objects: Sequence[Any], frame_count: int,
-                      sample: Callable[[Any, int], tuple[np.ndarray, np.ndarray]],
-                      frame_name: Callable[[int], str] = "frame {}".format,
-                      context: Callable[[], AbstractContextManager[None]] = nullcontext) -> Frames:
+def frames_of_objects(
+    objects: Sequence[Any],
+    frame_count: int,
+    sample: Callable[[Any, int], tuple[np.ndarray, np.ndarray]],
+    frame_name: Callable[[int], str] = "frame {}".format,
+    context: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> Frames:
     """Positions of all objects in world space, frame by frame.
 
     sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
@@ -162,8 +182,10 @@ def frames_of_objects(objects: Sequence[Any], frame_count: int,
             return obj.still
         points, matrix = sample(obj, frame)
         if len(points) != obj.count:
-            raise ClipError(f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count} as in "
-                            "the first frame")
+            raise ClipError(
+                f"{obj.path}: got {len(points)} points in {frame_name(frame)}, expected {obj.count} as in "
+                "the first frame"
+            )
         points = transformed(points, matrix)
         if obj.is_still:
             obj.still = points
@@ -187,8 +209,12 @@ def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
 
 
-def _add_kept(kept: Iterable[tuple[ArrayDescriptor, bytes]], attributes: dict[str, np.ndarray],
-              domains: dict[str, str], skip: Collection[str]) -> None:
+def _add_kept(
+    kept: Iterable[tuple[ArrayDescriptor, bytes]],
+    attributes: dict[str, np.ndarray],
+    domains: dict[str, str],
+    skip: Collection[str],
+) -> None:
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     for descriptor, raw in kept:
         name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
@@ -205,8 +231,10 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
     """Metadata: the names, or the paths where names come twice."""
     names = [obj.name for obj in objects]
     unique = len(set(names)) == len(names)
-    metadata = {"part_names": names if unique else [obj.path for obj in objects],
-                "part_kinds": [obj.kind for obj in objects]}
+    metadata = {
+        "part_names": names if unique else [obj.path for obj in objects],
+        "part_kinds": [obj.kind for obj in objects],
+    }
     return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
 
 
@@ -224,8 +252,9 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
     attributes["part_vertex_counts"] = np.array([obj.count for obj in objects], np.int32)
     domains["part_vertex_counts"] = "constant"
     if any(obj.curve_counts is not None for obj in objects):
-        attributes["curve_vertex_counts"] = np.concatenate([obj.curve_counts for obj in objects
-                                                            if obj.curve_counts is not None])
+        attributes["curve_vertex_counts"] = np.concatenate(
+            [obj.curve_counts for obj in objects if obj.curve_counts is not None]
+        )
         domains["curve_vertex_counts"] = "constant"
     return attributes, domains
 

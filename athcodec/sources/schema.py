@@ -17,17 +17,31 @@ from athcodec.sources import ReadOptions
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
 
 
-def clip_of_arrays(positions: Any, array: Callable[[str], np.ndarray | None], attributes: dict[str, np.ndarray],
-                   metadata: dict[str, Any], options: ReadOptions, **watched: Any) -> MotionClip:
+def clip_of_arrays(
+    positions: Any,
+    array: Callable[[str], np.ndarray | None],
+    attributes: dict[str, np.ndarray],
+    metadata: dict[str, Any],
+    options: ReadOptions,
+    **watched: Any,
+) -> MotionClip:
     """The clip of positions and of the arrays that `array` gives by their names in the schema, None for one that is
     missing. watched: resource and unchanged as in MotionClip. Raises ClipError."""
     time = array("time")
     if time is None:
         time = np.arange(positions.shape[0] if positions.shape else 0) / frame_rate(metadata)
     clip = MotionClip(
-        positions, time, rest=array("rest") if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first", edges=array("edges"), faces=array("faces"),
-        attributes=attributes, metadata=metadata, **_branches(positions, array, metadata, options), **watched)
+        positions,
+        time,
+        rest=array("rest") if options.rest == "auto" else None,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        edges=array("edges"),
+        faces=array("faces"),
+        attributes=attributes,
+        metadata=metadata,
+        **_branches(positions, array, metadata, options),
+        **watched,
+    )
     order = clip.attributes.get("branch_order")
     if order is not None and clip.has_branches and np.array_equal(order, branch_orders(clip.branch_parent)):
         del clip.attributes["branch_order"]
@@ -35,8 +49,9 @@ def clip_of_arrays(positions: Any, array: Callable[[str], np.ndarray | None], at
     return clip
 
 
-def _branches(positions: Any, array: Callable[[str], np.ndarray | None], metadata: dict[str, Any],
-              options: ReadOptions) -> dict[str, np.ndarray | None]:
+def _branches(
+    positions: Any, array: Callable[[str], np.ndarray | None], metadata: dict[str, Any], options: ReadOptions
+) -> dict[str, np.ndarray | None]:
     """Those of the file, else those that its edges make."""
     found = {name: array(name) for name in BRANCHES}
     edges = array("edges")

@@ -57,7 +57,7 @@ class Numbering:
         """The files that are there, by their numbers, in that order."""
         found = {}
         for name in os.listdir(self.folder):
-            digits = name[len(self.prefix): len(name) - len(self.suffix)]
+            digits = name[len(self.prefix) : len(name) - len(self.suffix)]
             is_number = digits.isascii() and digits.isdigit() and len(digits) <= len(str(LARGEST_NUMBER))
             if is_number and name == self.path(int(digits)).name:
                 found[int(digits)] = self.folder / name
@@ -113,9 +113,16 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
     mesh.metadata["part_names"] = _without_numbers(mesh.metadata["part_names"], reader.paths[0], path)
     attributes = {name: values for name, values in mesh.attributes.items() if name not in options.skip}
     with naming(path):
-        return MotionClip(reader.frames, time, faces=mesh.faces, edges=mesh.edges, attributes=attributes,
-                          metadata=mesh.metadata | metadata, rest_pose="mean" if options.rest == "mean" else "first",
-                          unchanged=reader.unchanged)
+        return MotionClip(
+            reader.frames,
+            time,
+            faces=mesh.faces,
+            edges=mesh.edges,
+            attributes=attributes,
+            metadata=mesh.metadata | metadata,
+            rest_pose="mean" if options.rest == "mean" else "first",
+            unchanged=reader.unchanged,
+        )
 
 
 def _without_numbers(names: Sequence[str], first: Path, path: str | PathLike[str]) -> list[str]:
@@ -140,8 +147,12 @@ class FileFrames:
         where that cannot tell whether all else is as in the first.
     """
 
-    def __init__(self, paths: Sequence[Path], parse: Callable[[bytes, Path], Mesh],
-                 fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]]):
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        parse: Callable[[bytes, Path], Mesh],
+        fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]],
+    ):
         self.paths, self._parse = list(paths), parse
         self.unchanged = FileWatch(*self.paths)
         data = self.paths[0].read_bytes()
@@ -168,8 +179,10 @@ class FileFrames:
         mesh = self._parse(data, path)
         different = self.mesh.same_topology(mesh)
         if different:
-            raise ClipError(f"frame {frame}, {path.name}: {different}, unlike {self.paths[0].name}; topology that "
-                            "changes cannot be coded")
+            raise ClipError(
+                f"frame {frame}, {path.name}: {different}, unlike {self.paths[0].name}; topology that "
+                "changes cannot be coded"
+            )
         return mesh.points
 
 

@@ -137,8 +137,16 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
 
     frames = frames_of_objects(objects, len(codes), sample, lambda frame: _frame_name(codes, frame), source.reading)
     return clip_of_objects(
-        objects, frames, (codes - codes[0]) / stage.GetTimeCodesPerSecond(), layer | _metadata(stage, codes, rate),
-        _kept_arrays(stage), options, resource=source, unchanged=source.unchanged, skin=_skin(objects, skins))
+        objects,
+        frames,
+        (codes - codes[0]) / stage.GetTimeCodesPerSecond(),
+        layer | _metadata(stage, codes, rate),
+        _kept_arrays(stage),
+        options,
+        resource=source,
+        unchanged=source.unchanged,
+        skin=_skin(objects, skins),
+    )
 
 
 # ---- prims ----
@@ -159,8 +167,9 @@ def _find_objects(stage: Usd.Stage, only: Sequence[str]) -> list[_Prim]:
             objects.append(_Prim(kind, prim.GetName(), str(prim.GetPath()), prim=prim, points=points))
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
-        raise ClipError(f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or "
-                        "Points")
+        raise ClipError(
+            f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points"
+        )
     return objects
 
 
@@ -184,6 +193,7 @@ def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
 
 def _visible(objects: list[_Prim], codes: np.ndarray) -> list[_Prim]:
     """Those that are visible at some time from the first frame to the last."""
+
     def seen(prim: Usd.Prim) -> bool:
         times = {float(codes[0])}
         for ancestor in _lineage(prim):
@@ -207,7 +217,8 @@ def _measure(objects: list[_Prim], codes: np.ndarray) -> None:
         first += obj.count
         obj.moves = obj.skeleton is not None or any(
             prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
-            for prim in _lineage(obj.prim))
+            for prim in _lineage(obj.prim)
+        )
         obj.is_still = not obj.moves and not obj.points.ValueMightBeTimeVarying()
         _topology(obj, codes)
         _statics(obj, codes, np.array(cache.GetLocalToWorldTransform(obj.prim)))
@@ -246,8 +257,10 @@ def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarra
         for sample in query.GetTimeSamplesInInterval(_interval(codes)):
             if not np.array_equal(_array(query.Get(sample), np.int32), first):
                 frame = int(np.searchsorted(codes, sample - 1e-9))
-                raise ClipError(f"{obj.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
-                                f"(time code {sample:g}), expected the same vertices and faces in all")
+                raise ClipError(
+                    f"{obj.path}: {attribute.GetName()} changes in frame {min(frame, len(codes) - 1)} "
+                    f"(time code {sample:g}), expected the same vertices and faces in all"
+                )
     return first
 
 
@@ -316,8 +329,14 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         if primvar.HasValue() and not primvar.ValueMightBeTimeVarying():
             values = primvar.ComputeFlattened(codes[0])
             name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
-            _keep(obj, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar.GetElementSize(),
-                  primvar.GetAttr())
+            _keep(
+                obj,
+                NAMES.get(name, name),
+                values,
+                primvar.GetInterpolation(),
+                primvar.GetElementSize(),
+                primvar.GetAttr(),
+            )
     _rename_first_uv(obj)
     normals = UsdGeom.PointBased(obj.prim).GetNormalsAttr()
     if normals.HasAuthoredValue() and not normals.ValueMightBeTimeVarying() and "normals" not in obj.statics:
@@ -349,8 +368,14 @@ def _widths(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
         obj.halve_widths(matrix)
 
 
-def _keep(obj: _Prim, name: str, values: Any, interpolation: str, element_size: int = 1,
-          attribute: Usd.Attribute | None = None) -> None:
+def _keep(
+    obj: _Prim,
+    name: str,
+    values: Any,
+    interpolation: str,
+    element_size: int = 1,
+    attribute: Usd.Attribute | None = None,
+) -> None:
     """Notes a static array where its rows fit the prim; strings and references to files are none."""
     values = _numbers(values)
     if values is None:
@@ -399,7 +424,7 @@ def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
     for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
         values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
         if isinstance(values, Vt.UCharArray):
-            name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1:]
+            name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1 :]
             texts = (_said(attribute, key) or "" for key in ("dtype", "shape", "domain"))
             yield ArrayDescriptor(name, *texts), np.array(values).tobytes()
 
@@ -499,7 +524,7 @@ def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]
         if obj.skeleton is not None:
             own = obj.skeleton.largest(obj.count)
             offset = first[obj.skeleton.query.GetPrim().GetPath()]
-            joints[obj.first: obj.first + obj.count] = np.where(own < 0, -1, own + offset)
+            joints[obj.first : obj.first + obj.count] = np.where(own < 0, -1, own + offset)
     return Skin(np.concatenate(parents).astype(np.int32), joints, names)
 
 

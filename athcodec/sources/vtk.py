@@ -32,13 +32,35 @@ from athcodec.sources.sequence import sequence_files
 from athcodec.sources.timing import numbered_times, times_in_seconds
 from athcodec.sources.xdmf import parse_xml
 
-_TYPES = {"Float32": "f4", "Float64": "f8", "Int8": "i1", "Int16": "i2", "Int32": "i4", "Int64": "i8", "UInt8": "u1",
-          "UInt16": "u2", "UInt32": "u4", "UInt64": "u8"}
-_UNPACKERS: dict[str, Callable[[], Any]] = {"vtkZLibDataCompressor": zlib.decompressobj,
-                                            "vtkLZMADataCompressor": lzma.LZMADecompressor}
+_TYPES = {
+    "Float32": "f4",
+    "Float64": "f8",
+    "Int8": "i1",
+    "Int16": "i2",
+    "Int32": "i4",
+    "Int64": "i8",
+    "UInt8": "u1",
+    "UInt16": "u2",
+    "UInt32": "u4",
+    "UInt64": "u8",
+}
+_UNPACKERS: dict[str, Callable[[], Any]] = {
+    "vtkZLibDataCompressor": zlib.decompressobj,
+    "vtkLZMADataCompressor": lzma.LZMADecompressor,
+}
 MAX_BLOCK_BYTES = 1 << 30
-_BROKEN = (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError, zlib.error, lzma.LZMAError,
-           binascii.Error, ElementTree.ParseError)
+_BROKEN = (
+    ValueError,
+    KeyError,
+    TypeError,
+    IndexError,
+    OverflowError,
+    MemoryError,
+    zlib.error,
+    lzma.LZMAError,
+    binascii.Error,
+    ElementTree.ParseError,
+)
 
 
 def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
@@ -78,8 +100,10 @@ def _index_of(path: Path) -> Path | None:
 
 def _datasets(index: Path) -> list[tuple[Path, float]]:
     root = parse_xml(index.read_bytes(), "VTKFile")
-    found = [(index.parent / element.get("file", ""), float(element.get("timestep", "nan")), element.get("part", "0"))
-             for element in root.iter("DataSet")]
+    found = [
+        (index.parent / element.get("file", ""), float(element.get("timestep", "nan")), element.get("part", "0"))
+        for element in root.iter("DataSet")
+    ]
     if not found:
         raise ClipError(f"{index}: got no DataSet, expected some files")
     if len({part for *_, part in found}) > 1:
@@ -115,8 +139,11 @@ class _Steps:
         for name, values in first.cell_data.items():
             if all(np.array_equal(other.cell_data.get(name), values) for other in others):
                 self.topology.add_cell_data(name, values)
-        self._static = {name: values for name, values in first.point_data.items()
-                        if all(np.array_equal(other.point_data.get(name), values) for other in others)}
+        self._static = {
+            name: values
+            for name, values in first.point_data.items()
+            if all(np.array_equal(other.point_data.get(name), values) for other in others)
+        }
         self._fields = list(first.point_data)
 
     def static(self) -> dict[str, np.ndarray]:
@@ -138,8 +165,10 @@ class _Steps:
 
     def check(self, step: int) -> None:
         if not all(map(np.array_equal, self._grid(step).cells, self._cells)):
-            raise ClipError(f"frame {step}, {self._files[step].name}: got other cells than in {self._files[0].name}; "
-                            "topology that changes cannot be coded")
+            raise ClipError(
+                f"frame {step}, {self._files[step].name}: got other cells than in {self._files[0].name}; "
+                "topology that changes cannot be coded"
+            )
 
     def _grid(self, step: int) -> _Grid:
         if self._now is None or self._now[0] != step:
@@ -214,15 +243,20 @@ class _Vtu:
         types = self._integers(cells["types"]) if "types" in cells else np.zeros(0, np.int64)
         nodes = self._integers(cells["connectivity"]) if "connectivity" in cells else np.zeros(0, np.int64)
         starts = np.concatenate([[0], stops[:-1]]).astype(np.int64) if len(stops) else stops
-        if len(types) != len(stops) or (starts > stops).any() or (len(stops) and stops[-1] > len(nodes)) or \
-                (len(starts) and starts.min() < 0):
+        if (
+            len(types) != len(stops)
+            or (starts > stops).any()
+            or (len(stops) and stops[-1] > len(nodes))
+            or (len(starts) and starts.min() < 0)
+        ):
             raise ClipError("cells: got offsets that do not fit types and nodes")
         found = self._array(points).reshape(-1, int(points.get("NumberOfComponents") or 3))
         said = piece.get("NumberOfPoints")
         if said is not None and int(said) != len(found):
             raise ClipError(f"points: got {len(found)}, expected {int(said)}")
-        return _Grid(found, (types, starts, stops, nodes), self._arrays(piece, "PointData"),
-                     self._arrays(piece, "CellData"))
+        return _Grid(
+            found, (types, starts, stops, nodes), self._arrays(piece, "PointData"), self._arrays(piece, "CellData")
+        )
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
         found = {}
@@ -271,7 +305,7 @@ class _Vtu:
         head_bytes = size * (3 + blocks)
         head = _from_base64(text, head_bytes)
         packed = sum(self._numbers(head, 3 + blocks)[3:])
-        body = text[4 * ((head_bytes + 2) // 3):]
+        body = text[4 * ((head_bytes + 2) // 3) :]
         return self._unpacked(head + _from_base64(body, packed))
 
     def _unpacked(self, data: bytes) -> bytes:
@@ -280,11 +314,11 @@ class _Vtu:
         if self._unpack is None:
             if len(data) < size + first:
                 raise ClipError(f"got {len(data) - size} bytes of data, expected {first}")
-            return data[size: size + first]
+            return data[size : size + first]
         sizes = self._numbers(data, 3 + first)
         at, parts = size * (3 + first), []
         for length in sizes[3:]:
-            parts.append(self._unpack().decompress(data[at: at + length], max(1, min(sizes[1], MAX_BLOCK_BYTES))))
+            parts.append(self._unpack().decompress(data[at : at + length], max(1, min(sizes[1], MAX_BLOCK_BYTES))))
             at += length
         whole_size = sizes[1] * (first - bool(sizes[2])) + sizes[2] if first else 0
         joined = b"".join(parts)

@@ -25,18 +25,56 @@ from athcodec.sources.opening import FileWatch, closing_on_failure, naming
 from athcodec.sources.timing import times_in_seconds, whole
 
 MAX_ARRAY_BYTES = 1 << 30
-MIXED = {1: "poly_vertex", 2: "poly_line", 3: "polygon", 4: "triangle", 5: "quad", 6: "tetra", 7: "pyramid", 8: "wedge",
-         9: "hexahedron", 34: "line3", 35: "quad9", 36: "triangle6", 37: "quad8", 38: "tetra10", 39: "pyramid13",
-         40: "wedge15", 41: "wedge18", 48: "hexahedron20", 49: "hexahedron24", 50: "hexahedron27"}
+MIXED = {
+    1: "poly_vertex",
+    2: "poly_line",
+    3: "polygon",
+    4: "triangle",
+    5: "quad",
+    6: "tetra",
+    7: "pyramid",
+    8: "wedge",
+    9: "hexahedron",
+    34: "line3",
+    35: "quad9",
+    36: "triangle6",
+    37: "quad8",
+    38: "tetra10",
+    39: "pyramid13",
+    40: "wedge15",
+    41: "wedge18",
+    48: "hexahedron20",
+    49: "hexahedron24",
+    50: "hexahedron27",
+}
 COUNTED = (1, 2, 3)
-TOPOLOGIES = {"triangle": "triangle", "quadrilateral": "quad", "tetrahedron": "tetra", "hexahedron": "hexahedron",
-              "wedge": "wedge", "pyramid": "pyramid", "edge_3": "line3", "triangle_6": "triangle6",
-              "tri_6": "triangle6",
-              "quadrilateral_8": "quad8", "quad_8": "quad8", "quadrilateral_9": "quad9", "quad_9": "quad9",
-              "tetrahedron_10": "tetra10", "tet_10": "tetra10", "pyramid_13": "pyramid13", "wedge_15": "wedge15",
-              "wedge_18": "wedge18", "hexahedron_20": "hexahedron20", "hex_20": "hexahedron20",
-              "hexahedron_24": "hexahedron24", "hex_24": "hexahedron24", "hexahedron_27": "hexahedron27",
-              "hex_27": "hexahedron27", "line": "line"}
+TOPOLOGIES = {
+    "triangle": "triangle",
+    "quadrilateral": "quad",
+    "tetrahedron": "tetra",
+    "hexahedron": "hexahedron",
+    "wedge": "wedge",
+    "pyramid": "pyramid",
+    "edge_3": "line3",
+    "triangle_6": "triangle6",
+    "tri_6": "triangle6",
+    "quadrilateral_8": "quad8",
+    "quad_8": "quad8",
+    "quadrilateral_9": "quad9",
+    "quad_9": "quad9",
+    "tetrahedron_10": "tetra10",
+    "tet_10": "tetra10",
+    "pyramid_13": "pyramid13",
+    "wedge_15": "wedge15",
+    "wedge_18": "wedge18",
+    "hexahedron_20": "hexahedron20",
+    "hex_20": "hexahedron20",
+    "hexahedron_24": "hexahedron24",
+    "hex_24": "hexahedron24",
+    "hexahedron_27": "hexahedron27",
+    "hex_27": "hexahedron27",
+    "line": "line",
+}
 PLAIN = {"polyvertex": "poly_vertex", "polyline": "poly_line", "polygon": "polygon"}
 _KINDS = {"float": "f", "int": "i", "uint": "u", "char": "i", "uchar": "u", "short": "i", "ushort": "u"}
 _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2}
@@ -121,8 +159,12 @@ class Data:
             dataset = self._files[path][inside]
             if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind not in "fiu":
                 raise ClipError(f"{path.name}: {inside[:80]!r}: got no array of numbers")
-            size = dataset.nbytes if selection == () else dataset.dtype.itemsize * int(
-                np.prod([len(range(*part.indices(length))) for part, length in zip(selection, dataset.shape)]))
+            size = (
+                dataset.nbytes
+                if selection == ()
+                else dataset.dtype.itemsize
+                * int(np.prod([len(range(*part.indices(length))) for part, length in zip(selection, dataset.shape)]))
+            )
             if size > MAX_ARRAY_BYTES:
                 raise ClipError(f"{path.name}: {inside[:80]!r}: got {size} bytes, expected at most {MAX_ARRAY_BYTES}")
             return np.asarray(dataset[selection]).astype(dataset.dtype.newbyteorder("="), copy=False)
@@ -138,8 +180,10 @@ class Data:
         start, stride, count = self.read(children[0]).reshape(3, -1).astype(np.int64)
         if (start < 0).any() or (stride < 1).any() or (count < 0).any():
             raise ClipError("HyperSlab: got a negative start or count, expected some of the data")
-        selection = tuple(slice(a, a + (n - 1) * step + 1 if n else a, step) for a, step, n in
-                          zip(start.tolist(), stride.tolist(), count.tolist()))
+        selection = tuple(
+            slice(a, a + (n - 1) * step + 1 if n else a, step)
+            for a, step, n in zip(start.tolist(), stride.tolist(), count.tolist())
+        )
         source = children[1]
         whole_file = source.get("Format", "").upper() == "HDF"
         values = self._hdf(source, selection) if whole_file else self.read(source)[selection]
@@ -175,8 +219,14 @@ class _Steps:
     def __init__(self, data: Data, root: ElementTree.Element, options: ReadOptions):
         self._data, self._root = data, root
         self._series, self._grids = _find_steps(root, options.field)
-        own = next((grid for grid in [*root.iter("Grid")] if grid.get("GridType", "Uniform") == "Uniform"
-                    and grid.find("Geometry") is not None), None)
+        own = next(
+            (
+                grid
+                for grid in [*root.iter("Grid")]
+                if grid.get("GridType", "Uniform") == "Uniform" and grid.find("Geometry") is not None
+            ),
+            None,
+        )
         if own is None:
             raise ClipError("got no grid with a Geometry, expected points")
         self._mesh = self._grids[0] if self._grids[0].find("Geometry") is not None else own
@@ -240,7 +290,8 @@ class _Steps:
         blocks = self._blocks(element)
         same = len(blocks) == len(self._first_blocks) and all(
             a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.rows, b.rows)
-            for a, b in zip(blocks, self._first_blocks))
+            for a, b in zip(blocks, self._first_blocks)
+        )
         if not same:
             raise ClipError(f"frame {step}: got other cells than in the first; topology that changes cannot be coded")
 
@@ -280,9 +331,16 @@ class _Steps:
 
     def _is_static(self, name: str, center: str) -> bool:
         """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
+
         def item(step: int) -> ElementTree.Element | None:
-            return next((element.find("DataItem") for found, where, element in self._attributes(step)
-                         if (found, where) == (name, center)), None)
+            return next(
+                (
+                    element.find("DataItem")
+                    for found, where, element in self._attributes(step)
+                    if (found, where) == (name, center)
+                ),
+                None,
+            )
 
         first = item(0)
         others = [item(step) for step in range(len(self._grids) - 1, 0, -1)]
@@ -333,8 +391,11 @@ def _signature(element: ElementTree.Element | None) -> bytes:
 
 def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTree.Element | None, list]:
     """The temporal collection (one with the wanted field, else the first) and its grids; a single grid without one."""
-    series = [grid for grid in root.iter("Grid") if grid.get("GridType") == "Collection"
-              and grid.get("CollectionType", "Spatial") == "Temporal"]
+    series = [
+        grid
+        for grid in root.iter("Grid")
+        if grid.get("GridType") == "Collection" and grid.get("CollectionType", "Spatial") == "Temporal"
+    ]
     series = [collection for collection in series if collection.findall("Grid")]
     if not series:
         single = [grid for grid in root.iter("Grid") if grid.get("GridType", "Uniform") == "Uniform"]
@@ -347,8 +408,10 @@ def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTr
     grids = chosen.findall("Grid")
     pieces = [grid for grid in grids if grid.get("GridType", "Uniform") != "Uniform"]
     if pieces:
-        raise ClipError(f"got a step with a grid of the type {pieces[0].get('GridType')[:40]!r}, expected Uniform: "
-                        "pieces of parallel runs have to be merged first")
+        raise ClipError(
+            f"got a step with a grid of the type {pieces[0].get('GridType')[:40]!r}, expected Uniform: "
+            "pieces of parallel runs have to be merged first"
+        )
     return chosen, grids
 
 
@@ -383,5 +446,3 @@ def _mixed_blocks(stream: np.ndarray) -> list[Block]:
         at += size
         stops.append(at)
     return blocks_of(np.array(types), np.array(starts, np.int64), np.array(stops, np.int64), stream, MIXED)
-
-

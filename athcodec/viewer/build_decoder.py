@@ -29,13 +29,21 @@ STACK_BYTES = 64 << 10
 SMALL = ("container.c", "decode.c", "fault.c", "file.c", "plan.c")
 """Run once per file: compiled for size, all else for speed."""
 FLAGS = [
-    "-target", "wasm32-freestanding",
+    "-target",
+    "wasm32-freestanding",
     "-mcpu=generic+bulk_memory+bulk_memory_opt+nontrapping_fptoint+sign_ext+simd128",
-    "-std=c11", "-fno-unroll-loops", "-DATH_STATIC",  # unrolled it is larger, and no faster
+    "-std=c11",
+    "-fno-unroll-loops",
+    "-DATH_STATIC",  # unrolled it is larger, and no faster
     # the bits of positions are part of the format, as in core/CMakeLists.txt
-    "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
-    "-Wall", "-Wextra", "-Werror",
-    "-nostdlib", "-s",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-nostdlib",
+    "-s",
 ]
 # Zig puts the stack below the data, where an overflow traps
 LINKING = ["-Wl,--no-entry", f"-Wl,-z,stack-size={STACK_BYTES}"]
@@ -78,8 +86,16 @@ def compile_decoder(template: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for path in small:
             _zig(folder, "-Os", "-c", str(path), "-o", f"{path.stem}.o")
-        _zig(folder, "-O3", *LINKING, *wanted, *(str(path) for path in sources if path not in small),
-             *(f"{path.stem}.o" for path in small), "-o", "decoder.wasm")
+        _zig(
+            folder,
+            "-O3",
+            *LINKING,
+            *wanted,
+            *(str(path) for path in sources if path not in small),
+            *(f"{path.stem}.o" for path in small),
+            "-o",
+            "decoder.wasm",
+        )
         return (Path(folder) / "decoder.wasm").read_bytes()
 
 
@@ -125,8 +141,11 @@ def main() -> int:
         return 1
     different = differences(built, MODULE.read_text("utf-8") if MODULE.exists() else "")
     if different and arguments.check:
-        print(f"build_decoder: {MODULE.name}: got other {' and '.join(different)} than the sources make; "
-              "run python athcodec/viewer/build_decoder.py and commit the result", file=sys.stderr)
+        print(
+            f"build_decoder: {MODULE.name}: got other {' and '.join(different)} than the sources make; "
+            "run python athcodec/viewer/build_decoder.py and commit the result",
+            file=sys.stderr,
+        )
         return 1
     if different:
         MODULE.write_text(built, "utf-8", newline="\n")

@@ -23,6 +23,7 @@ MOST_BYTES = 150_000
 """Of what is ours in the bundles: loader, worker with decoder, page."""
 OURS = ("ATHLoader.js", "ath_worker.js", "viewer.js")
 
+
 class BuildError(Exception):
     """One line for the user."""
 
@@ -85,8 +86,11 @@ def main() -> int:
             print(f"build_viewer: got {size:,} bytes, expected at most {MOST_BYTES:,}", file=sys.stderr)
             return 1
         if different and arguments.check:
-            print(f"build_viewer: {', '.join(different)}: got other than the sources make; "
-                  "run python athcodec/viewer/build_viewer.py and commit the result", file=sys.stderr)
+            print(
+                f"build_viewer: {', '.join(different)}: got other than the sources make; "
+                "run python athcodec/viewer/build_viewer.py and commit the result",
+                file=sys.stderr,
+            )
             return 1
         if different:
             shutil.rmtree(WEB, ignore_errors=True)

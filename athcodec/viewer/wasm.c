@@ -2,10 +2,7 @@
  * instruction each, and checks that ath.h's structs are as ath_decoder.template.mjs reads them. */
 #include "ath.h"
 
-void *memcpy(void *restrict to, const void *restrict from, size_t size)
-{
-    return __builtin_memcpy(to, from, size);
-}
+void *memcpy(void *restrict to, const void *restrict from, size_t size) { return __builtin_memcpy(to, from, size); }
 
 void *memset(void *to, int value, size_t size) { return __builtin_memset(to, value, size); }
 
@@ -17,7 +14,7 @@ _Static_assert(offsetof(ath_branch, depth) == 28 && sizeof(ath_branch) == 32, "B
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
 _Static_assert(offsetof(ath_fault_info, chunk) == 8 && sizeof(ath_fault_info) == 56 && ATH_FAULT_TEXT == 256, "FAULT");
-_Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67
-               && ATH_NO_MEMORY == 68, "result codes");
+_Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67 && ATH_NO_MEMORY == 68,
+               "result codes");
 _Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
 _Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2 && ATH_AS_MARKED == 3, "WRAPS");

@@ -90,8 +90,9 @@ def check(codec: Codec, source: Source, bound: float) -> tuple[bytes, np.ndarray
     data = codec.encode(source, bound)
     decoded = codec.decode(data)
     if decoded.shape != source.positions.shape or decoded.dtype != np.float32:
-        raise BoundBroken(f"{codec.name}: got {decoded.dtype} {decoded.shape}; "
-                          f"expected float32 {source.positions.shape}")
+        raise BoundBroken(
+            f"{codec.name}: got {decoded.dtype} {decoded.shape}; expected float32 {source.positions.shape}"
+        )
     error = largest_error(source.positions, decoded)
     if not error <= bound:
         raise BoundBroken(f"{codec.name}: got an error of {error:.6g}; expected at most {bound:.6g}")

@@ -17,14 +17,7 @@ import numpy as np
 
 from athcodec.encoding import quantise
 from bench.codecs import Source
-from bench.codecs.coder import (
-    EntropyCoder,
-    Reader,
-    Writer,
-    compiler,
-    read_corrections,
-    write_corrections,
-)
+from bench.codecs.coder import EntropyCoder, Reader, Writer, compiler, read_corrections, write_corrections
 from bench.codecs.tree import VertexOrder, ordered
 
 FINALISTS = 3
@@ -82,10 +75,7 @@ class Search:
 
     def run(self, rounds: int) -> list[Settings]:
         """All settings tried, best first."""
-        splits = [
-            range(len(axis.values)) if isinstance(axis, Split) else (axis.start,)
-            for axis in self.grid.values()
-        ]
+        splits = [range(len(axis.values)) if isinstance(axis, Split) else (axis.start,) for axis in self.grid.values()]
         best = min((self._round(first, True) for first in product(*splits)), key=self._cost)
         for _ in range(rounds - 1):
             before, best = best, self._round(best, False)
@@ -149,9 +139,7 @@ class Baseline(ABC):
 
     def encode(self, source: Source, bound: float) -> bytes:
         quick = self.coder.quick()
-        search = Search(
-            lambda settings: len(self._trial(source, bound, settings, quick)), self.grid(source, bound)
-        )
+        search = Search(lambda settings: len(self._trial(source, bound, settings, quick)), self.grid(source, bound))
         tried = search.run(self.rounds)
         finalists = tried[:1] if quick is self.coder else tried[:FINALISTS]
         encodings = [(self._trial(source, bound, settings, self.coder), settings) for settings in finalists]

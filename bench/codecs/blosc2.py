@@ -48,19 +48,29 @@ class Blosc2(Program):
 
     def _packed(self, part: np.ndarray, filters: str, thorough: bool) -> bytes:
         blosc2 = self.load()
-        pipeline = [blosc2.Filter.SHUFFLE, blosc2.Filter.BYTEDELTA] if filters == "BYTEDELTA" else [
-            getattr(blosc2.Filter, filters)]
+        pipeline = (
+            [blosc2.Filter.SHUFFLE, blosc2.Filter.BYTEDELTA]
+            if filters == "BYTEDELTA"
+            else [getattr(blosc2.Filter, filters)]
+        )
         metas = [0, part.itemsize] if filters == "BYTEDELTA" else [0]
         block = min(part.nbytes, blosc2.MAX_BLOCKSIZE)
         tries = [block, 0] if thorough else [block]  # 0: its own choice
-        settings = {"codec": blosc2.Codec.ZSTD, "clevel": 9 if thorough else 5, "filters": pipeline,
-                    "filters_meta": metas, "typesize": part.itemsize, "nthreads": 1}
+        settings = {
+            "codec": blosc2.Codec.ZSTD,
+            "clevel": 9 if thorough else 5,
+            "filters": pipeline,
+            "filters_meta": metas,
+            "typesize": part.itemsize,
+            "nthreads": 1,
+        }
         return min((blosc2.compress2(part, blocksize=size, **settings) for size in tries), key=len)
 
     def _unpacked(self, data: bytes, dtype: str, layout: str, shape: tuple[int, int, int]) -> np.ndarray:
         decompress = self.load().decompress2
-        return decode_arrays(lambda blob, part: np.frombuffer(decompress(blob, nthreads=1), dtype).reshape(part),
-                      data, layout, shape)
+        return decode_arrays(
+            lambda blob, part: np.frombuffer(decompress(blob, nthreads=1), dtype).reshape(part), data, layout, shape
+        )
 
 
 def _rounded(values: np.ndarray, bits: int) -> np.ndarray:

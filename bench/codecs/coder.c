@@ -25,8 +25,8 @@ static int64_t finish(ath_coder *coder, int valid) { return valid && coder_finis
 
 /* row_count x 3 x frames integers below 2^30, at most ATH_SEGMENT_FRAMES frames. `unit` rows, at most
  * ATH_SLOTS, belong together, each with its own history; 1: every row goes on from the one before. */
-BENCH_API int64_t bench_rows(stream_bytes bytes, int64_t size, int32_t row_count, int32_t frames,
-                             int32_t unit, int32_t *rows)
+BENCH_API int64_t bench_rows(stream_bytes bytes, int64_t size, int32_t row_count, int32_t frames, int32_t unit,
+                             int32_t *rows)
 {
     if (frames > ATH_SEGMENT_FRAMES || unit < 1 || unit > ATH_SLOTS) return ENCODING ? -2 : 0;
     ath_coder coder;
@@ -74,8 +74,7 @@ static void code_table_row(ath_coder *coder, table_model *model, int32_t columns
 }
 
 /* A table of integers below 2^30, each under the magnitudes near it and those usual in its column. */
-BENCH_API int64_t bench_table(stream_bytes bytes, int64_t size, int32_t row_count, int32_t columns,
-                              int32_t *table)
+BENCH_API int64_t bench_table(stream_bytes bytes, int64_t size, int32_t row_count, int32_t columns, int32_t *table)
 {
     ath_coder coder;
     table_model *model = malloc(sizeof *model);
@@ -88,31 +87,28 @@ BENCH_API int64_t bench_table(stream_bytes bytes, int64_t size, int32_t row_coun
     model->usual = memory + 2 * width + 2;
     for (int32_t c = 0; c < columns; c++) model->usual[c] = 32;
     coder_start(&coder, bytes, (size_t)size);
-    for (int32_t r = 0; r < row_count; r++)
-        code_table_row(&coder, model, columns, table + (size_t)r * (size_t)columns);
+    for (int32_t r = 0; r < row_count; r++) code_table_row(&coder, model, columns, table + (size_t)r * (size_t)columns);
     free(memory);
     free(model);
     return finish(&coder, 1);
 }
 
-BENCH_API int64_t bench_hierarchy(stream_bytes bytes, int64_t size, int32_t branch_count,
-                                  int32_t vertex_count, ath_branch *branches, int32_t *branch_source,
-                                  int32_t *vertex_source)
+BENCH_API int64_t bench_hierarchy(stream_bytes bytes, int64_t size, int32_t branch_count, int32_t vertex_count,
+                                  ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
     ath_coder coder;
     hierarchy_model *model = malloc(sizeof *model);
     if (!model) abort();
     coder_start(&coder, bytes, (size_t)size);
-    int valid = code_hierarchy(&coder, model, branch_count, vertex_count, branches, branch_source,
-                               vertex_source);
+    int valid = code_hierarchy(&coder, model, branch_count, vertex_count, branches, branch_source, vertex_source);
     free(model);
     return finish(&coder, valid);
 }
 
 #ifndef ATH_ENCODING
 /* Adds the corrections of `frames` frames to positions, vertex_count x 3 x stride. */
-BENCH_API int64_t bench_corrections(stream_bytes bytes, int64_t size, int32_t vertex_count, int32_t frames,
-                                    double step, int32_t stride, float *positions)
+BENCH_API int64_t bench_corrections(stream_bytes bytes, int64_t size, int32_t vertex_count, int32_t frames, double step,
+                                    int32_t stride, float *positions)
 {
     ath_coder coder;
     correction_model *model = malloc(sizeof *model);

@@ -136,8 +136,7 @@ class RangeCoder:
     def _motion_rows(self, rows: np.ndarray, unit: int) -> bytes:
         parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
         streams = [
-            _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data)
-            for part in parts
+            _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data) for part in parts
         ]
         return _join(streams)
 
@@ -191,11 +190,7 @@ class Zstd:
 
     def read_table(self, data: bytes, shape: tuple[int, int]) -> np.ndarray:
         raw = zstandard.decompress(data[1:])
-        return (
-            np.ascontiguousarray(_from_byte_lines(raw, shape[::-1]).T)
-            if data[0]
-            else _from_byte_lines(raw, shape)
-        )
+        return np.ascontiguousarray(_from_byte_lines(raw, shape[::-1]).T) if data[0] else _from_byte_lines(raw, shape)
 
 
 def _byte_lines(table: np.ndarray) -> bytes:
@@ -413,9 +408,7 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
             break
         factor *= 0.5
     else:
-        raise ValueError(
-            f"corrections: got a limit of {limit:.3g}; expected one that float32 positions can keep"
-        )
+        raise ValueError(f"corrections: got a limit of {limit:.3g}; expected one that float32 positions can keep")
     result = struct.pack("<f", step)
     for at, part, rows in zip(starts, parts, found, strict=True):
         positions[:, :, at : at + SEGMENT_FRAMES] = part

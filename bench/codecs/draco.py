@@ -50,13 +50,22 @@ class Draco(Program):
         if bits > FLOAT_BITS:
             raise CannotKeep(f"Draco: got {bits} bits; expected at most {FLOAT_BITS} in a coordinate")
         return self.load().encode(
-            points.astype(np.float32), quantization_bits=bits, quantization_range=2**bits - 1,
-            quantization_origin=[0.0, 0.0, 0.0], compression_level=level, preserve_order=True)
+            points.astype(np.float32),
+            quantization_bits=bits,
+            quantization_range=2**bits - 1,
+            quantization_origin=[0.0, 0.0, 0.0],
+            compression_level=level,
+            preserve_order=True,
+        )
 
     def _wide(self, points: np.ndarray, bits: int, level: int) -> bytes:
         return self.load().encode(
-            np.zeros((len(points), 3), np.float32), quantization_bits=1, compression_level=level,
-            preserve_order=True, generic_attributes={1: np.ascontiguousarray(points)})
+            np.zeros((len(points), 3), np.float32),
+            quantization_bits=1,
+            compression_level=level,
+            preserve_order=True,
+            generic_attributes={1: np.ascontiguousarray(points)},
+        )
 
     def _points(self, data: bytes, wide: bool) -> np.ndarray:
         cloud = self.load().decode(data)
@@ -71,9 +80,9 @@ def _clouds(values: np.ndarray, choice) -> list[np.ndarray]:
     points, count, _ = choice
     turned = values.transpose(1, 0, 2) if points in ("frame", "vertex, wide") else values
     if "wide" in points:
-        return [turned[:, i:i + count].reshape(len(turned), -1) for i in range(0, turned.shape[1], count)]
+        return [turned[:, i : i + count].reshape(len(turned), -1) for i in range(0, turned.shape[1], count)]
     count = count or len(turned)
-    return [turned[i:i + count].reshape(-1, 3) for i in range(0, len(turned), count)]
+    return [turned[i : i + count].reshape(-1, 3) for i in range(0, len(turned), count)]
 
 
 def _from_clouds(clouds: list[np.ndarray], shape: tuple[int, int, int], choice) -> np.ndarray:

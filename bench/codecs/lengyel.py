@@ -18,16 +18,7 @@ from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.pca import GRID, Trajectories, cosines, grid_of, principal, read_group, write_group
-from bench.codecs.tree import (
-    VertexOrder,
-    memo,
-    ordered,
-    read_order,
-    read_pose,
-    vertex_order,
-    write_order,
-    write_pose,
-)
+from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
 
 LEAST_EXTENT = 1e-3  # of the part's largest; flatter directions are not stretched
 REGULARISATION = 1e-3  # towards no rotation, which determines the twist of straight parts
@@ -58,19 +49,13 @@ class Lengyel(Baseline):
         frames = writer.count(positions.shape[2])
         rigid, depth = writer.count(settings["rigid"]), writer.count(settings["depth"])
         trajectories = Trajectories(bool(writer.count(settings["joint"])), frames)
-        pose = (
-            positions.mean(axis=2)
-            if settings["pose_of"] == "mean"
-            else source.rest[order.source].astype(np.float64)
-        )
+        pose = positions.mean(axis=2) if settings["pose_of"] == "mean" else source.rest[order.source].astype(np.float64)
         pose = write_pose(writer, order, pose, settings["pose"] * bound)
         parts = Parts(part_of_vertex(order.hierarchy, depth), pose)
         track_step = writer.single(settings["tracks"] * settings["step"] * bound)
         fit, place = (parts.fit_rigid, parts.place_rigid) if rigid else (parts.fit_affine, parts.place_affine)
         exact = memo(
-            source,
-            ("frames", rigid, depth, settings["pose_of"], settings["pose"] * bound),
-            lambda: fit(positions),
+            source, ("frames", rigid, depth, settings["pose_of"], settings["pose"] * bound), lambda: fit(positions)
         )
         residual = positions - place(_write_tracks(writer, exact, track_step, settings))
         step = writer.single(settings["step"] * bound)

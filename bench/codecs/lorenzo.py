@@ -12,16 +12,7 @@ import numpy as np
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings
 from bench.codecs.coder import Reader, Writer
-from bench.codecs.tree import (
-    ORDERS,
-    VertexOrder,
-    differences,
-    ordered,
-    read_order,
-    sums,
-    vertex_order,
-    write_order,
-)
+from bench.codecs.tree import ORDERS, VertexOrder, differences, ordered, read_order, sums, vertex_order, write_order
 
 
 def write_lorenzo(writer: Writer, q: np.ndarray, order: VertexOrder, in_time: int, along: int) -> None:

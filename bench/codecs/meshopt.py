@@ -19,8 +19,16 @@ class Meshopt(Program):
 
     def choices(self, form: str) -> list:
         """(elements, how many of the others each holds; 0: as many as fit, zigzag)."""
-        elements = [("vertices", 1), ("vertices", 4), ("vertices", 0), ("frames", 1), ("frames", 2),
-                    ("frames", 4), ("frames", 8), ("frames", 0)]
+        elements = [
+            ("vertices", 1),
+            ("vertices", 4),
+            ("vertices", 0),
+            ("frames", 1),
+            ("frames", 2),
+            ("frames", 4),
+            ("frames", 8),
+            ("frames", 0),
+        ]
         return [(*element, folded) for element in elements for folded in (False, True)]
 
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:

@@ -18,16 +18,7 @@ from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer
 from bench.codecs.lorenzo import read_lorenzo, write_lorenzo
-from bench.codecs.tree import (
-    VertexOrder,
-    memo,
-    ordered,
-    read_order,
-    read_pose,
-    vertex_order,
-    write_order,
-    write_pose,
-)
+from bench.codecs.tree import VertexOrder, memo, ordered, read_order, read_pose, vertex_order, write_order, write_pose
 
 BITS = Split((12, 16, 20), 1)
 
@@ -51,13 +42,9 @@ class PaperAth(Baseline):
         order = vertex_order(source, "hierarchy")
         write_order(writer, order)
         positions = ordered(source, order)
-        pose = write_pose(
-            writer, order, source.rest[order.source].astype(np.float64), settings["pose"] * bound
-        )
+        pose = write_pose(writer, order, source.rest[order.source].astype(np.float64), settings["pose"] * bound)
         ath, maps = memo(
-            source,
-            ("ath", settings["tolerance"] * bound),
-            lambda: _maps(source, settings["tolerance"] * bound),
+            source, ("ath", settings["tolerance"] * bound), lambda: _maps(source, settings["tolerance"] * bound)
         )
         nodes = np.zeros(order.hierarchy.branch_count, np.int64)
         nodes[ath.node_branch] = 1
@@ -69,11 +56,7 @@ class PaperAth(Baseline):
         residual = pieces.residual(positions, linear.reshape(len(maps), -1, 3, 3), shift) - pose[:, :, None]
         step = writer.single(settings["step"] * bound)
         write_lorenzo(
-            writer,
-            quantised(residual / step, settings["dead_zone"]),
-            order,
-            settings["in_time"],
-            settings["along"],
+            writer, quantised(residual / step, settings["dead_zone"]), order, settings["in_time"], settings["along"]
         )
         return order
 
@@ -136,10 +119,7 @@ class _Pieces:
     def place(self, residual: np.ndarray, linear: np.ndarray, shift: np.ndarray) -> np.ndarray:
         """A R (eq. 4)."""
         around = residual - self.centres[self.of_vertex, :, None]
-        return (
-            self._apply(np.moveaxis(linear, 0, 3)[self.of_vertex], around)
-            + np.moveaxis(shift, 0, 2)[self.of_vertex]
-        )
+        return self._apply(np.moveaxis(linear, 0, 3)[self.of_vertex], around) + np.moveaxis(shift, 0, 2)[self.of_vertex]
 
     @staticmethod
     def _apply(linear: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -118,13 +118,9 @@ def mean_motion(source: Source, order: VertexOrder) -> tuple[np.ndarray, np.ndar
     return memo(source, ("motion", order.hierarchy is not None), make)
 
 
-def source_basis(
-    source: Source, order: VertexOrder, trajectories: Trajectories
-) -> tuple[np.ndarray, np.ndarray]:
+def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories) -> tuple[np.ndarray, np.ndarray]:
     return memo(
-        source,
-        ("principal", trajectories.joint),
-        lambda: principal(trajectories.rows(mean_motion(source, order)[1])),
+        source, ("principal", trajectories.joint), lambda: principal(trajectories.rows(mean_motion(source, order)[1]))
     )
 
 
@@ -190,9 +186,7 @@ def _read_predicted(reader: Reader, steps: np.ndarray) -> np.ndarray:
     q = np.zeros((len(weights), residual.shape[1] + degree), np.int64)
     for t in range(residual.shape[1]):
         past = q[:, t : t + degree][:, ::-1]
-        q[:, t + degree] = residual[:, t] + np.rint((past * weights).sum(axis=1) / 2**LPC_BITS).astype(
-            np.int64
-        )
+        q[:, t + degree] = residual[:, t] + np.rint((past * weights).sum(axis=1) / 2**LPC_BITS).astype(np.int64)
     return q[:, degree:] * steps[:, None]
 
 
@@ -217,11 +211,7 @@ def write_coefficients(
 
 def read_coefficients(reader: Reader, order: VertexOrder, trajectories: Trajectories) -> np.ndarray:
     degrees = reader.table()[0]
-    q = (
-        trajectories.from_axes(reader.rows(), len(degrees))
-        .reshape(len(order.source), -1, len(degrees))
-        .copy()
-    )
+    q = trajectories.from_axes(reader.rows(), len(degrees)).reshape(len(order.source), -1, len(degrees)).copy()
     for degree in (1, 2):
         q[:, :, degrees == degree] = sums(q[:, :, degrees == degree], order, degree)
     return q.reshape(-1, len(degrees))
@@ -321,9 +311,7 @@ class GlobalPca(Baseline):
     degrees: tuple[int, ...] = (0,)  # of linear prediction
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        return grid_of(
-            "step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees)
-        )
+        return grid_of("step keep basis joint differences first dead_zone pose lpc order", lpc=Choice(self.degrees))
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
         order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
@@ -352,8 +340,7 @@ class ClusteredPca(Baseline):
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
         return grid_of(
-            "step clusters keep basis joint differences first dead_zone pose order",
-            clusters=Ladder(self.counts, 4),
+            "step clusters keep basis joint differences first dead_zone pose order", clusters=Ladder(self.counts, 4)
         )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
@@ -363,9 +350,7 @@ class ClusteredPca(Baseline):
         writer.table(np.diff(groups, prepend=0)[:, None])
         for group, spectrum in enumerate(spectra):
             members = motion[groups == group]
-            write_group(
-                writer, members, VertexOrder(np.arange(len(members))), spectrum, step, settings, trajectories
-            )
+            write_group(writer, members, VertexOrder(np.arange(len(members))), spectrum, step, settings, trajectories)
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
@@ -382,12 +367,8 @@ class ClusteredPca(Baseline):
 
         def make():
             motion = mean_motion(source, order)[1]
-            groups = self._lloyd(
-                trajectories.rows(motion), count, 1 if trajectories.joint else 3, len(motion)
-            )
-            spectra = [
-                principal(trajectories.rows(motion[groups == group])) for group in range(groups.max() + 1)
-            ]
+            groups = self._lloyd(trajectories.rows(motion), count, 1 if trajectories.joint else 3, len(motion))
+            spectra = [principal(trajectories.rows(motion[groups == group])) for group in range(groups.max() + 1)]
             return groups, spectra
 
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
@@ -395,9 +376,7 @@ class ClusteredPca(Baseline):
     def _lloyd(self, rows: np.ndarray, count: int, rows_per_vertex: int, vertices: int) -> np.ndarray:
         """Clusters of vertices by the basis with the smallest residual; starts from runs of neighbours."""
         groups = np.arange(vertices) * count // vertices
-        coefficients = (
-            rows @ principal(rows)[1][:24].T
-        )  # the main part of the motion, small enough to iterate on
+        coefficients = rows @ principal(rows)[1][:24].T  # the main part of the motion, small enough to iterate on
         for _ in range(self.turns):
             residuals = np.full((count, vertices), np.inf)
             for group in range(count):

@@ -26,9 +26,14 @@ class Pcodec(Program):
         pcodec = self.load()
         layout, delta = choice
         spec = pcodec.DeltaSpec
-        specs = {"auto": spec.auto, "none": spec.no_op,
-                 "first": lambda: spec.try_consecutive(1), "second": lambda: spec.try_consecutive(2),
-                 "convolution 4": lambda: spec.try_conv1(4), "convolution 16": lambda: spec.try_conv1(16)}
+        specs = {
+            "auto": spec.auto,
+            "none": spec.no_op,
+            "first": lambda: spec.try_consecutive(1),
+            "second": lambda: spec.try_consecutive(2),
+            "convolution 4": lambda: spec.try_conv1(4),
+            "convolution 16": lambda: spec.try_conv1(16),
+        }
         config = pcodec.ChunkConfig(compression_level=12 if thorough else 8, delta_spec=specs[delta]())
         return encode_arrays(lambda part: pcodec.standalone.simple_compress(part.ravel(), config), values, layout)
 

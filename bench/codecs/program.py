@@ -24,8 +24,16 @@ import zstandard
 
 from bench.codecs import Source, blocks, largest_error
 
-AXES = {"T,N,3": (0, 1, 2), "T,3N": (0, 1, 2), "N,T,3": (1, 0, 2), "3N,T": (1, 2, 0),
-        "3,T,N": (2, 0, 1), "3,N,T": (2, 1, 0), "3|T,N": (2, 0, 1), "3|N,T": (2, 1, 0)}
+AXES = {
+    "T,N,3": (0, 1, 2),
+    "T,3N": (0, 1, 2),
+    "N,T,3": (1, 0, 2),
+    "3N,T": (1, 2, 0),
+    "3,T,N": (2, 0, 1),
+    "3,N,T": (2, 1, 0),
+    "3|T,N": (2, 0, 1),
+    "3|N,T": (2, 1, 0),
+}
 LAYOUTS = tuple(AXES)  # "3|": three arrays, one per axis
 FLAT_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "3N,T")  # those that differ as one row of numbers
 
@@ -57,7 +65,7 @@ def split(data: bytes) -> list[bytes]:
     (count,) = struct.unpack_from("<I", data)
     lengths = struct.unpack_from(f"<{count}I", data, 4)
     stops = 4 + 4 * count + np.cumsum(lengths)
-    return [data[stop - length:stop] for stop, length in zip(stops.tolist(), lengths, strict=True)]
+    return [data[stop - length : stop] for stop, length in zip(stops.tolist(), lengths, strict=True)]
 
 
 def deflate(data: bytes, level: int = 19) -> bytes:
@@ -265,7 +273,7 @@ class Case:
         width = min(vertices, max(64, values // (3 * length)))
         first, start = (vertices - width) // 2, (frames - length) // 2
         taken = slice(first, first + width)
-        positions = np.ascontiguousarray(self.positions[start:start + length, taken])
+        positions = np.ascontiguousarray(self.positions[start : start + length, taken])
         order = None if self.order is None else self.order[taken]
         return Case(positions, self.rest[taken], self.exact, order)
 
@@ -354,8 +362,9 @@ class Program:
         forms = self.lossless_forms if self.lossless else self.forms
         for form, order in product(forms, cases):
             self._descend(form, order, lambda setup: self._size(pieces, setup, bound, sizes))
-        ranked = sorted((size, number, setup) for number, (setup, size) in enumerate(sizes.items())
-                        if np.isfinite(size))
+        ranked = sorted(
+            (size, number, setup) for number, (setup, size) in enumerate(sizes.items()) if np.isfinite(size)
+        )
         # a setup that fails on the whole clip is replaced by the next
         done: list[tuple[bytes, Setup]] = []
         for _, _, setup in ranked:
@@ -404,11 +413,14 @@ class Program:
         pose, step = poses[-1]
         heads = [Setup(form, order, pose, step)]
         for _ in range(2):
-            own = [replace(heads[0], predictor=predictor, choice=choice)
-                   for predictor, choice in product(predictors, range(len(self.choices(form))))]
+            own = [
+                replace(heads[0], predictor=predictor, choice=choice)
+                for predictor, choice in product(predictors, range(len(self.choices(form))))
+            ]
             heads = sorted(own, key=size)[:BEAM]
-            heads = sorted((replace(head, pose=pose, pose_step=step)
-                            for head, (pose, step) in product(heads, poses)), key=size)
+            heads = sorted(
+                (replace(head, pose=pose, pose_step=step) for head, (pose, step) in product(heads, poses)), key=size
+            )
 
     def _size(self, pieces: dict[str, Case], setup: Setup, bound: float, sizes: dict[Setup, float]) -> float:
         if setup not in sizes:
@@ -425,9 +437,15 @@ class Program:
             blobs = write(case, setup, bound, thorough)
         except CannotKeep:
             return None
-        head = HEAD.pack(FORMS.index(setup.form), self.lossless, POSES.index(setup.pose),
-                         PREDICTORS.index(setup.predictor), bool(case.permutation), setup.choice,
-                         *case.positions.shape[:2])
+        head = HEAD.pack(
+            FORMS.index(setup.form),
+            self.lossless,
+            POSES.index(setup.pose),
+            PREDICTORS.index(setup.predictor),
+            bool(case.permutation),
+            setup.choice,
+            *case.positions.shape[:2],
+        )
         return join([head, *blobs, *filter(None, [case.permutation])])
 
     def _write_integers(self, case: Case, setup: Setup, bound: float, thorough: bool) -> list[bytes]:
@@ -438,8 +456,9 @@ class Program:
         if setup.pose != "none":
             reference = turn(case.pose(setup.pose))
             values, pose = values - reference, self._kept_pose(case, setup, reference)
-        payload = self.encode_integers(predict(values, setup.predictor),
-                                       self.choices("integers")[setup.choice], thorough)
+        payload = self.encode_integers(
+            predict(values, setup.predictor), self.choices("integers")[setup.choice], thorough
+        )
         return [grid, pose, payload]
 
     @staticmethod
@@ -448,8 +467,9 @@ class Program:
             case._known[setup.pose, "packed"] = pack_integers(reference)
         return case._known[setup.pose, "packed"]
 
-    def _read_integers(self, blobs: list[bytes], shape: tuple[int, int, int], exact: bool, pose: str,
-                       predictor: str, choice) -> np.ndarray:
+    def _read_integers(
+        self, blobs: list[bytes], shape: tuple[int, int, int], exact: bool, pose: str, predictor: str, choice
+    ) -> np.ndarray:
         grid, packed, payload = blobs
         values = self.decode_integers(payload, shape, choice).astype(np.int32, copy=False)
         values = unpredict(values, predictor)
@@ -497,8 +517,9 @@ class Program:
                 case._known[key] = (grid.pack(), pack_integers(integers), grid.positions(integers))
         return case._known[key]
 
-    def _read_floats(self, blobs: list[bytes], shape: tuple[int, int, int], exact: bool, pose: str,
-                     predictor: str, choice) -> np.ndarray:
+    def _read_floats(
+        self, blobs: list[bytes], shape: tuple[int, int, int], exact: bool, pose: str, predictor: str, choice
+    ) -> np.ndarray:
         numbers, packed, payload = blobs  # a float's predictor is the program's own
         values = self.decode_floats(payload, shape, choice)
         if pose == "none":
@@ -512,8 +533,7 @@ class Program:
 
 def _pack_exact(pose: np.ndarray) -> bytes:
     """(N, 3) float32 and zstd: row after row, axis after axis, or their bits as integers."""
-    ways = {b"r": deflate(pose.tobytes()), b"a": deflate(pose.T.tobytes()),
-            b"i": pack_integers(ordered_bits(pose))}
+    ways = {b"r": deflate(pose.tobytes()), b"a": deflate(pose.T.tobytes()), b"i": pack_integers(ordered_bits(pose))}
     way = min(ways, key=lambda name: len(ways[name]))
     return way + ways[way]
 
@@ -567,9 +587,11 @@ def encode_arrays(encode: Callable[[np.ndarray], bytes], values: np.ndarray, lay
     return join([encode(part) for part in arrays_of(values, layout)])
 
 
-def decode_arrays(decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str,
-           shape: tuple[int, int, int]) -> np.ndarray:
+def decode_arrays(
+    decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str, shape: tuple[int, int, int]
+) -> np.ndarray:
     """The inverse of encode_arrays: `decode` gets bytes and a shape."""
     blobs: Iterable[bytes] = split(data)
-    return from_arrays([decode(blob, part) for blob, part in zip(blobs, array_shapes(shape, layout), strict=True)],
-                 layout, shape)
+    return from_arrays(
+        [decode(blob, part) for blob, part in zip(blobs, array_shapes(shape, layout), strict=True)], layout, shape
+    )

@@ -75,9 +75,7 @@ def write_order(writer: Writer, order: VertexOrder) -> None:
 def read_order(reader: Reader) -> VertexOrder:
     if reader.count():
         hierarchy = reader.hierarchy()
-        if (
-            "_vertex_order" not in hierarchy.__dict__
-        ):  # kept, since an encoder reads the same one in every trial
+        if "_vertex_order" not in hierarchy.__dict__:  # kept, since an encoder reads the same one in every trial
             hierarchy.__dict__["_vertex_order"] = VertexOrder(hierarchy.vertex_source, hierarchy)
         return hierarchy.__dict__["_vertex_order"]
     return VertexOrder(np.arange(reader.count()))
@@ -121,9 +119,7 @@ def sums(residual: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
             steps[1:] = np.cumsum(residual[1:], axis=0)
         return np.cumsum(steps, axis=0)
     q = residual.copy()
-    for vertices in (
-        order.generations[1:] if (order.before[order.generations[0]] < 0).all() else order.generations
-    ):
+    for vertices in order.generations[1:] if (order.before[order.generations[0]] < 0).all() else order.generations:
         before, before2 = order.before[vertices], order.before2[vertices]
         q[vertices] += q[before]
         if degree == 2:

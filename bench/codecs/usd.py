@@ -64,9 +64,11 @@ def _crate(samples: Sequence[np.ndarray], kind: str) -> bytes:
     """A .usdc file with one array attribute: time samples, or a single value where there is one."""
     from pxr import Sdf, Usd, Vt
 
-    names = {"float3": (Sdf.ValueTypeNames.Point3fArray, Vt.Vec3fArray),
-             "half3": (Sdf.ValueTypeNames.Point3hArray, Vt.Vec3hArray),
-             "int": (Sdf.ValueTypeNames.IntArray, Vt.IntArray)}
+    names = {
+        "float3": (Sdf.ValueTypeNames.Point3fArray, Vt.Vec3fArray),
+        "half3": (Sdf.ValueTypeNames.Point3hArray, Vt.Vec3hArray),
+        "int": (Sdf.ValueTypeNames.IntArray, Vt.IntArray),
+    }
     type_name, array = names[kind]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "motion.usdc"

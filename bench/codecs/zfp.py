@@ -23,7 +23,8 @@ class Zfp(Program):
         scale = np.float32(1 / strength) if strength else np.float32(1)
         tolerance = {"tolerance": 1.0} if strength else {}  # without one it is reversible
         return struct.pack("<f", scale) + encode_arrays(
-            lambda part: zfpy.compress_numpy(part * scale, **tolerance), values, choice)
+            lambda part: zfpy.compress_numpy(part * scale, **tolerance), values, choice
+        )
 
     def decode_floats(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
         zfpy = self.load()

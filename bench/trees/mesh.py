@@ -37,16 +37,20 @@ def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int) -> 
     for start in range(0, frames, BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
         nodes = skeleton.positions[block]
-        positions[block, :tubes.count] = tubes.at(nodes)
-        positions[block, tubes.count:] = cards.at(nodes, cards.bend[block], cards.roll[block])
-    rest[:tubes.count] = tubes.at(skeleton.rest)
-    rest[tubes.count:] = cards.at(skeleton.rest, np.zeros((leaves, 3)), np.zeros(leaves))
+        positions[block, : tubes.count] = tubes.at(nodes)
+        positions[block, tubes.count :] = cards.at(nodes, cards.bend[block], cards.roll[block])
+    rest[: tubes.count] = tubes.at(skeleton.rest)
+    rest[tubes.count :] = cards.at(skeleton.rest, np.zeros((leaves, 3)), np.zeros(leaves))
     leaf_branch = np.repeat(len(skeleton.branch_parent) + np.arange(leaves), 4)
     return MotionClip(
-        positions=positions, time=skeleton.time, rest=rest, metadata=dict(clip.metadata),
+        positions=positions,
+        time=skeleton.time,
+        rest=rest,
+        metadata=dict(clip.metadata),
         vertex_branch=np.concatenate([tubes.branch, leaf_branch]),
         branch_parent=np.concatenate([skeleton.branch_parent, skeleton.branch[cards.node]]),
-        faces=np.concatenate([tubes.faces, tubes.count + cards.faces]).astype(np.int32))
+        faces=np.concatenate([tubes.faces, tubes.count + cards.faces]).astype(np.int32),
+    )
 
 
 class _Tubes:

@@ -93,8 +93,7 @@ class _Grower:
         # about a tenth of the trunk's length at the last order, however many orders there are
         self.shortening = 0.1 ** (1.0 / max(2, orders))
 
-    def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int,
-             order: int) -> None:
+    def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int, order: int) -> None:
         """A stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
         branch = len(self.branch_parent)
         self.branch_parent.append(below)
@@ -122,8 +121,9 @@ class _Grower:
         ends = np.round(np.cumsum(weights) / weights.sum() * spare).astype(int)
         return count, reserve + np.diff(ends, prepend=0)
 
-    def _elements(self, base: int, branch: int, direction: np.ndarray, length: float, count: int,
-                  order: int) -> tuple[list[int], list[np.ndarray]]:
+    def _elements(
+        self, base: int, branch: int, direction: np.ndarray, length: float, count: int, order: int
+    ) -> tuple[list[int], list[np.ndarray]]:
         """Appends the stem's nodes; gives their numbers and the directions of their elements."""
         nodes, directions = [], []
         for _ in range(count):

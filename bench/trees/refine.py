@@ -21,8 +21,9 @@ TWIG_HERTZ = (1.5, 4.0)
 TWIG_DAMPING = 0.1
 
 
-def refine(clip: MotionClip, wind: Wind, frames: int, factor: int, twigs: int, twig_vertices: int,
-           seed: int) -> MotionClip:
+def refine(
+    clip: MotionClip, wind: Wind, frames: int, factor: int, twigs: int, twig_vertices: int, seed: int
+) -> MotionClip:
     """The first frames of a simulated clip, with `factor` vertices per element, and with twigs."""
     skeleton = Skeleton.of(clip, frames)
     spline = _Splines(skeleton, factor)
@@ -32,16 +33,20 @@ def refine(clip: MotionClip, wind: Wind, frames: int, factor: int, twigs: int, t
     for start in range(0, frames, BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
         nodes = skeleton.positions[block]
-        positions[block, :spline.count] = spline.apply(nodes)
-        positions[block, spline.count:] = riders.at(positions[block], nodes, riders.bend[block])
+        positions[block, : spline.count] = spline.apply(nodes)
+        positions[block, spline.count :] = riders.at(positions[block], nodes, riders.bend[block])
     rest = np.empty((count, 3), np.float32)
-    rest[:spline.count] = spline.apply(skeleton.rest)
-    rest[spline.count:] = riders.at(rest, skeleton.rest, np.zeros((twigs, 3)))
+    rest[: spline.count] = spline.apply(skeleton.rest)
+    rest[spline.count :] = riders.at(rest, skeleton.rest, np.zeros((twigs, 3)))
     return MotionClip(
-        positions=positions, time=skeleton.time, rest=rest,
+        positions=positions,
+        time=skeleton.time,
+        rest=rest,
         vertex_branch=np.concatenate([spline.branch, riders.branch]),
         branch_parent=np.concatenate([skeleton.branch_parent, spline.branch[riders.foot]]),
-        edges=np.concatenate([spline.edges, riders.edges]).astype(np.int32), metadata=dict(clip.metadata))
+        edges=np.concatenate([spline.edges, riders.edges]).astype(np.int32),
+        metadata=dict(clip.metadata),
+    )
 
 
 class _Splines:
@@ -59,7 +64,7 @@ class _Splines:
 
     def apply(self, nodes: np.ndarray) -> np.ndarray:
         """(..., count, 3) vertices from (..., N, 3) nodes."""
-        return sum(nodes[..., self.controls[:, k], :] * self.weights[:, k:k + 1] for k in range(4))
+        return sum(nodes[..., self.controls[:, k], :] * self.weights[:, k : k + 1] for k in range(4))
 
 
 def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,8 +74,9 @@ def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.n
     before = np.where((branch[start] == branch[node]) & (start > 0), parent[start], -1)
     after = np.minimum(node + 1, len(parent) - 1)
     after = np.where((branch[after] == branch[node]) & (after > node), after, -1)
-    weights = 0.5 * np.stack([-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3,
-                              t + 4 * t**2 - 3 * t**3, t**3 - t**2], axis=1)
+    weights = 0.5 * np.stack(
+        [-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2], axis=1
+    )
     # a missing neighbour is the mirror image of the other one, so that a stem leaves in its own direction
     for missing, outer, near, far in ((before < 0, 0, 1, 2), (after < 0, 3, 2, 1)):
         weights[missing, near] += 2 * weights[missing, outer]
@@ -83,8 +89,9 @@ def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.n
 class _Twigs:
     """Straight twigs at random places of the outer stems, each bending about its foot."""
 
-    def __init__(self, skeleton: Skeleton, spline: _Splines, wind: Wind, twigs: int, vertices: int,
-                 rng: np.random.Generator) -> None:
+    def __init__(
+        self, skeleton: Skeleton, spline: _Splines, wind: Wind, twigs: int, vertices: int, rng: np.random.Generator
+    ) -> None:
         self.skeleton = skeleton
         places = np.flatnonzero(np.isin(spline.node, skeleton.outer_nodes()))
         self.foot = np.sort(rng.choice(places, twigs, replace=twigs > len(places)))
@@ -115,5 +122,5 @@ class _Twigs:
 def _carried(skeleton: Skeleton, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """(T, M, 3) vectors of the rest pose as the nodes' elements carry them."""
     starts = range(0, len(skeleton.positions), BLOCK_FRAMES)
-    turns = (skeleton.turns(skeleton.positions[start:start + BLOCK_FRAMES], nodes) for start in starts)
+    turns = (skeleton.turns(skeleton.positions[start : start + BLOCK_FRAMES], nodes) for start in starts)
     return np.concatenate([np.einsum("tmij,mj->tmi", block, vectors) for block in turns])

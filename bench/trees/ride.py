@@ -35,8 +35,15 @@ class Skeleton:
         """The first `frames` frames of a clip as bench.data makes it from a simulation."""
         parent = np.full(clip.vertex_count, -1)
         parent[clip.edges[:, 1]] = clip.edges[:, 0]
-        return cls(clip.block(0, frames), clip.rest, parent, clip.vertex_branch, clip.branch_parent,
-                   clip.attributes["radius"], clip.time[:frames])
+        return cls(
+            clip.block(0, frames),
+            clip.rest,
+            parent,
+            clip.vertex_branch,
+            clip.branch_parent,
+            clip.attributes["radius"],
+            clip.time[:frames],
+        )
 
     @property
     def height(self) -> float:
@@ -105,8 +112,10 @@ def sway(drive: np.ndarray, hertz: np.ndarray, damping: float, step: float) -> n
     for frame, target in enumerate(drive):
         lag = lag - (target - drive[max(0, frame - 1)])
         pull = (speed + damping * omega * lag) / fast
-        lag, speed = (decay * (cosine * lag + sine * pull),
-                      decay * (cosine * speed - sine * (damping * speed + omega * lag) * omega / fast))
+        lag, speed = (
+            decay * (cosine * lag + sine * pull),
+            decay * (cosine * speed - sine * (damping * speed + omega * lag) * omega / fast),
+        )
         response[frame] = target + lag
     return response
 

@@ -57,8 +57,10 @@ def engine() -> ModuleType:
     try:
         return import_module("mujoco")
     except ImportError as error:
-        raise MissingEngine("simulated trees: MuJoCo is not installed, expected `pip install mujoco`; "
-                            "the sample and clips given by their path do without") from error
+        raise MissingEngine(
+            "simulated trees: MuJoCo is not installed, expected `pip install mujoco`; "
+            "the sample and clips given by their path do without"
+        ) from error
 
 
 def simulate(plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: float = 0.05) -> Motion:
@@ -82,11 +84,20 @@ def simulate(plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: 
             positions[frame] = run.nodes()
     if not np.isfinite(positions).all() or run.warned():
         raise Unstable(f"simulation of {len(plant.parent)} nodes: the engine warned of unstable motion")
-    settings = {"engine": f"MuJoCo {mujoco.__version__}: rigid links on hinges, implicitfast",
-                "steps_per_frame": per_frame, "lowest_hz": round(float(lowest) / (2 * np.pi), 4),
-                "damping": damping, "E": YOUNG, "G": SHEAR, "rho": DENSITY, "wind_speed": wind.speed,
-                "turbulence_intensity": wind.intensity, "turbulence_length": wind.length,
-                "wind_direction": "(-1,0,1)/sqrt2, y up", "spectrum": "von Karman, frozen travel"}
+    settings = {
+        "engine": f"MuJoCo {mujoco.__version__}: rigid links on hinges, implicitfast",
+        "steps_per_frame": per_frame,
+        "lowest_hz": round(float(lowest) / (2 * np.pi), 4),
+        "damping": damping,
+        "E": YOUNG,
+        "G": SHEAR,
+        "rho": DENSITY,
+        "wind_speed": wind.speed,
+        "turbulence_intensity": wind.intensity,
+        "turbulence_length": wind.length,
+        "wind_direction": "(-1,0,1)/sqrt2, y up",
+        "spectrum": "von Karman, frozen travel",
+    }
     return Motion(positions, np.arange(frames) / fps, settings)
 
 
@@ -151,8 +162,16 @@ class _Links:
 class _Run:
     """A simulation under way: steps, and where the nodes are."""
 
-    def __init__(self, mujoco: ModuleType, model: Any, data: Any, links: _Links, bodies: np.ndarray,
-                 wind: Wind, mass_factor: float) -> None:
+    def __init__(
+        self,
+        mujoco: ModuleType,
+        model: Any,
+        data: Any,
+        links: _Links,
+        bodies: np.ndarray,
+        wind: Wind,
+        mass_factor: float,
+    ) -> None:
         self.mujoco, self.model, self.data, self.links, self.bodies = mujoco, model, data, links, bodies
         self.damping = mass_factor * links.mass[:, None]
         self.wood = 0.5 * AIR * DRAG_OF_WOOD * (2 * links.plant.radius * links.length)[:, None]

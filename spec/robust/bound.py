@@ -28,8 +28,22 @@ from spec.robust import Row
 
 HIERARCHIES = ("random", "chain", "bush", "roots", "one")
 RESTS = ("grown", "unrelated", "point", "line", "plane", "lattice", "scales")
-ACTIONS = ("spike", "flicker", "step", "explode", "collapse", "shuffle", "walk", "lattice", "leave", "mirror",
-           "flatten", "noise", "spin", "swap axes")
+ACTIONS = (
+    "spike",
+    "flicker",
+    "step",
+    "explode",
+    "collapse",
+    "shuffle",
+    "walk",
+    "lattice",
+    "leave",
+    "mirror",
+    "flatten",
+    "noise",
+    "spin",
+    "swap axes",
+)
 
 
 @dataclass(frozen=True)
@@ -43,12 +57,12 @@ class Attack:
     rest: str = "grown"
     actions: tuple[str, ...] = ()
     frames: int = 20
-    scale: float = 1.0       # of all coordinates
-    squeeze: float = 1.0     # of one axis against the others
-    place: float = 0.0       # distance from the origin, in sizes of the plant
+    scale: float = 1.0  # of all coordinates
+    squeeze: float = 1.0  # of one axis against the others
+    place: float = 0.0  # distance from the origin, in sizes of the plant
     is_float64: bool = False
-    shuffled: bool = False   # vertices in random order
-    bound: float = 1e-3      # of the diagonal
+    shuffled: bool = False  # vertices in random order
+    bound: float = 1e-3  # of the diagonal
     segment_frames: int = 64
     effort: str = "fast"
     exact_rest: bool = False
@@ -73,15 +87,25 @@ class Attack:
         rest, positions = (np.clip(np.nan_to_num(points, nan=0.0), -limit, limit) for points in (rest, positions))
         order = rng.permutation(len(labels)) if self.shuffled else np.arange(len(labels))
         dtype = np.float64 if self.is_float64 else np.float32
-        return MotionClip(positions=positions[:, order].astype(dtype), rest=rest[order].astype(dtype),
-                          time=np.arange(self.frames) / 30, vertex_branch=labels[order], branch_parent=parents)
+        return MotionClip(
+            positions=positions[:, order].astype(dtype),
+            rest=rest[order].astype(dtype),
+            time=np.arange(self.frames) / 30,
+            vertex_branch=labels[order],
+            branch_parent=parents,
+        )
 
     def options(self, clip: MotionClip) -> dict:
         """Keywords of encode(), with a bound in scene units."""
         size = extent(clip) or 1.0
         tam = self.tam and Thresholds(self.tam[0] * size, self.tam[1], self.tam[2] * size, self.tam[3])
-        return {"max_error": self.bound * size, "segment_frames": self.segment_frames, "effort": self.effort,
-                "exact_rest": self.exact_rest, "tam": tam}
+        return {
+            "max_error": self.bound * size,
+            "segment_frames": self.segment_frames,
+            "effort": self.effort,
+            "exact_rest": self.exact_rest,
+            "tam": tam,
+        }
 
 
 def extent(clip: MotionClip) -> float:
@@ -93,8 +117,13 @@ def _hierarchy(rng, kind: str, branches: int, longest: int) -> tuple[np.ndarray,
     if kind == "one":
         branches = 1
     index = np.arange(branches)
-    parents = {"random": np.array([-1, *(rng.integers(0, b) for b in range(1, branches))]), "chain": index - 1,
-               "bush": np.where(index, 0, -1), "roots": np.full(branches, -1), "one": index - 1}[kind]
+    parents = {
+        "random": np.array([-1, *(rng.integers(0, b) for b in range(1, branches))]),
+        "chain": index - 1,
+        "bush": np.where(index, 0, -1),
+        "roots": np.full(branches, -1),
+        "one": index - 1,
+    }[kind]
     return np.repeat(index, rng.integers(1, longest + 1, branches)), parents.astype(np.int64)
 
 
@@ -232,27 +261,36 @@ SCALES = (1.0, 1e-200, 1e-38, 1e-30, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e12, 1e16)
 def attacks(draw, **fixed) -> Attack:
     """Attacks with all fields drawn but the fixed ones. The simplest value comes first in each choice."""
     drawn = dict(
-        seed=draw(st.integers(0, 10**6)), branches=draw(st.integers(1, 12)),
+        seed=draw(st.integers(0, 10**6)),
+        branches=draw(st.integers(1, 12)),
         longest=draw(st.sampled_from([1, 2, 3, 8, 70])),
-        hierarchy=draw(st.sampled_from(HIERARCHIES)), rest=draw(st.sampled_from(RESTS)),
+        hierarchy=draw(st.sampled_from(HIERARCHIES)),
+        rest=draw(st.sampled_from(RESTS)),
         actions=tuple(draw(st.lists(st.sampled_from(ACTIONS), max_size=3))),
         frames=draw(st.sampled_from([1, 2, 3, 15, 16, 17, 31, 33, 64, 100])),
-        scale=draw(st.sampled_from(SCALES)), squeeze=draw(st.sampled_from([1.0, 1e-6, 1e3, 0.0])),
-        place=draw(st.sampled_from([0.0, 1.0, 1e3, 1e5])), is_float64=draw(st.booleans()), shuffled=draw(st.booleans()),
+        scale=draw(st.sampled_from(SCALES)),
+        squeeze=draw(st.sampled_from([1.0, 1e-6, 1e3, 0.0])),
+        place=draw(st.sampled_from([0.0, 1.0, 1e3, 1e5])),
+        is_float64=draw(st.booleans()),
+        shuffled=draw(st.booleans()),
         bound=draw(st.sampled_from([1e-3, 1e-1, 1.0, 10.0, 1e-2, 1e-4, 1e-5, 1e-6])),
-        segment_frames=draw(st.integers(16, 256)), effort=draw(st.sampled_from(["fast", "default", "best"])),
+        segment_frames=draw(st.integers(16, 256)),
+        effort=draw(st.sampled_from(["fast", "default", "best"])),
         exact_rest=draw(st.booleans()),
-        tam=draw(st.sampled_from([None, (0.0, 0, 0.0, 0), (10.0, 0, 10.0, 0), (0.01, 2, 0.02, 3), (0.0, 9, 0.0, 99)])))
+        tam=draw(st.sampled_from([None, (0.0, 0, 0.0, 0), (10.0, 0, 10.0, 0), (0.01, 2, 0.02, 3), (0.0, 9, 0.0, 99)])),
+    )
     return Attack(**drawn | fixed)
 
 
 LARGE = {
     "1,000 branches on one stem": Attack(branches=1001, longest=3, hierarchy="bush", frames=12, actions=("walk",)),
     "a chain of 2,000 branches": Attack(branches=2000, longest=1, hierarchy="chain", frames=6, actions=("walk",)),
-    "a chain of 2,000 that shuffles": Attack(branches=2000, longest=2, hierarchy="chain", frames=4,
-                                             actions=("shuffle", "mirror")),
-    "600 frames in one vertex": Attack(hierarchy="one", longest=1, frames=600, actions=("walk", "spike"),
-                                       segment_frames=256),
+    "a chain of 2,000 that shuffles": Attack(
+        branches=2000, longest=2, hierarchy="chain", frames=4, actions=("shuffle", "mirror")
+    ),
+    "600 frames in one vertex": Attack(
+        hierarchy="one", longest=1, frames=600, actions=("walk", "spike"), segment_frames=256
+    ),
     "a stem of 3,000 vertices": Attack(hierarchy="one", longest=6000, seed=1, frames=6, actions=("noise", "flatten")),
     "1,000 roots": Attack(branches=1000, hierarchy="roots", frames=8, actions=("leave", "flicker")),
 }
@@ -263,8 +301,13 @@ def attack_for(seconds: float, first_seed: int = 0) -> Row:
     row, until, found = Row("the bound, attacked", 0), time.monotonic() + seconds, []
     with tempfile.TemporaryDirectory() as name:
 
-        @settings(max_examples=300, deadline=None, database=None, phases=[Phase.generate],
-                  suppress_health_check=list(HealthCheck))
+        @settings(
+            max_examples=300,
+            deadline=None,
+            database=None,
+            phases=[Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )
         @given(attacks())
         def attack_once(attack: Attack) -> None:
             if time.monotonic() >= until:
@@ -290,8 +333,11 @@ def attack_for(seconds: float, first_seed: int = 0) -> Row:
 def describe(attack: Attack) -> str:
     """The attack as Python code, without default values."""
     default = Attack()
-    given_ = [f"{field.name}={getattr(attack, field.name)!r}" for field in dataclasses.fields(Attack)
-              if getattr(attack, field.name) != getattr(default, field.name)]
+    given_ = [
+        f"{field.name}={getattr(attack, field.name)!r}"
+        for field in dataclasses.fields(Attack)
+        if getattr(attack, field.name) != getattr(default, field.name)
+    ]
     return f"Attack({', '.join(given_)})"
 
 

@@ -60,8 +60,13 @@ class Place:
 
 def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subprocess.Popen:
     """Starts the command, in a process that runs `prepare` first."""
-    return subprocess.Popen([sys.executable, "-m", "athcodec", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True, preexec_fn=prepare)
+    return subprocess.Popen(
+        [sys.executable, "-m", "athcodec", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=prepare,
+    )
 
 
 def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
@@ -178,10 +183,15 @@ def fill_small_disk(place: Place, kilobytes: list[int]) -> Row:
         for verb in VERBS:
             target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
             command = [sys.executable, "-m", "athcodec", *place.words(verb, target)]
-            script = ('mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; '
-                      'exit $code')
-            done = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
-                                  capture_output=True, text=True, timeout=TIMEOUT)
+            script = (
+                'mount -t tmpfs -o size="$2"k none "$1" && cd "$1" && shift 2 && "$@" >&2; code=$?; ls -A .; exit $code'
+            )
+            done = subprocess.run(
+                ["unshare", "-rm", "sh", "-c", script, "sh", str(place.folder), str(size), *command],
+                capture_output=True,
+                text=True,
+                timeout=TIMEOUT,
+            )
             refused = done.returncode == 1 and ONE_LINE.fullmatch(done.stderr) and done.stdout == ""
             row.tried += 1
             row.crashes += done.returncode > 1

@@ -46,8 +46,12 @@ def _coverage_row() -> Row:
     if files is None:
         return Row("lines of the decoder", 0, note=coverage.NO_CLANG)
     whole = coverage.total(files)
-    return Row("lines of the decoder", whole.lines, wrong=int(whole.share < LEAST_COVERAGE),
-               note=f"{100 * whole.share:.1f} % reached, {100 * LEAST_COVERAGE:.0f} % wanted")
+    return Row(
+        "lines of the decoder",
+        whole.lines,
+        wrong=int(whole.share < LEAST_COVERAGE),
+        note=f"{100 * whole.share:.1f} % reached, {100 * LEAST_COVERAGE:.0f} % wanted",
+    )
 
 
 # ---- hours ----

@@ -130,7 +130,7 @@ def checked_bits(data: bytes) -> list[int]:
 
 def _flipped(data: bytes, bit: int) -> bytes:
     place = bit // 8
-    return data[:place] + bytes([data[place] ^ 1 << bit % 8]) + data[place + 1:]
+    return data[:place] + bytes([data[place] ^ 1 << bit % 8]) + data[place + 1 :]
 
 
 def repaired(data: bytes) -> bytes:
@@ -141,7 +141,7 @@ def repaired(data: bytes) -> bytes:
     front, behind = bytearray(data[:at]), data[at:]
     for i in range(ct._HEADER.size, ct._HEADER.size + ct._CHUNK.size * count, ct._CHUNK.size):
         (length,) = struct.unpack_from("<I", front, i + 8)
-        struct.pack_into("<I", front, i + 12, crc32c(data[at: at + length]))
+        struct.pack_into("<I", front, i + 12, crc32c(data[at : at + length]))
         at += length
     struct.pack_into("<Q", front, 16, at)
     return with_checksum(bytes(front)) + behind
@@ -170,24 +170,39 @@ def _tables_end(data: bytes | bytearray) -> int:
 
 def _extremes(code: str) -> list:
     if code[-1] in "fd":
-        return [0.0, 5e-324 if code[-1] == "d" else 1e-45, 1.7e308 if code[-1] == "d" else 3e38, float("inf"),
-                float("nan"), -1.0]
+        return [
+            0.0,
+            5e-324 if code[-1] == "d" else 1e-45,
+            1.7e308 if code[-1] == "d" else 3e38,
+            float("inf"),
+            float("nan"),
+            -1.0,
+        ]
     largest = 256 ** struct.calcsize(code) - 1
     powers = [1 << k for k in range(1, 8 * struct.calcsize(code))]
     return sorted({0, 1, largest - 1, largest, *powers, *(power - 1 for power in powers)})
 
 
 def header_changes(data: bytes) -> list[tuple]:
-    return [(at, code, value, repair) for at, code in struct_fields(ct._HEADER) if code[-1] != "s"
-            for value in _extremes(code) for repair in (False, True)]
+    return [
+        (at, code, value, repair)
+        for at, code in struct_fields(ct._HEADER)
+        if code[-1] != "s"
+        for value in _extremes(code)
+        for repair in (False, True)
+    ]
 
 
 def table_changes(data: bytes) -> list[tuple]:
     """Wrong lengths and positions: every field of the chunk table at its extremes, with a correct checksum."""
     (count,) = struct.unpack_from("<I", data, 24)
     entries = range(ct._HEADER.size, ct._HEADER.size + ct._CHUNK.size * count, ct._CHUNK.size)
-    return [(entry + at, code, value, True) for entry in entries for at, code in struct_fields(ct._CHUNK)[:5]
-            for value in (0, 1, 256 ** struct.calcsize(code) - 2, 256 ** struct.calcsize(code) - 1)]
+    return [
+        (entry + at, code, value, True)
+        for entry in entries
+        for at, code in struct_fields(ct._CHUNK)[:5]
+        for value in (0, 1, 256 ** struct.calcsize(code) - 2, 256 ** struct.calcsize(code) - 1)
+    ]
 
 
 def corrupted(data: bytes, seed: int) -> int:
@@ -271,17 +286,33 @@ def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
         return [("least", name) for name in names]
 
     return [
-        (0.5, Cases("a byte or more too many", files, cases_of(files, lambda _: [b"\0", b"more", bytes(4096)]),
-                    too_long)),
+        (
+            0.5,
+            Cases("a byte or more too many", files, cases_of(files, lambda _: [b"\0", b"more", bytes(4096)]), too_long),
+        ),
         (1, Cases("prefixes, opened strictly", files, cases_of(files, lambda d: range(len(d))), prefix_strictly)),
         (1, Cases("prefixes, as a stream", files, cases_of(files, lambda d: range(len(d))), prefix_as_a_stream)),
         (1.5, Cases("fields of the header at their extremes", small, cases_of(small, header_changes), header_field)),
         (1, Cases("entries of the chunk table at their extremes", small, cases_of(small, table_changes), header_field)),
         (1.5, Cases("flipped bits", small, cases_of(small, checked_bits), flipped_bit)),
-        (2, Cases("flipped bits, checksums repaired", small, cases_of(small, lambda d: range(8 * len(d))),
-                  flipped_bit_repaired)),
-        (1.5, Cases("corrupted fronts and chunks, checksums repaired", small, cases_of(small, lambda _: range(10_000)),
-                    corrupted)),
+        (
+            2,
+            Cases(
+                "flipped bits, checksums repaired",
+                small,
+                cases_of(small, lambda d: range(8 * len(d))),
+                flipped_bit_repaired,
+            ),
+        ),
+        (
+            1.5,
+            Cases(
+                "corrupted fronts and chunks, checksums repaired",
+                small,
+                cases_of(small, lambda _: range(10_000)),
+                corrupted,
+            ),
+        ),
         (0.5, Cases("small files that announce much", files, made(hostile_files.LYING), announces_too_much, few=True)),
         (2, Cases("files made to be slow", files, made(hostile_files.SLOW), slow_file, few=True)),
     ]
@@ -298,7 +329,8 @@ def figures() -> dict[str, str]:
     lines = {}
     for name, make in hostile_files.SLOW.items():
         taken, size = seconds_and_bytes(make(2))
-        lines[name] = (f"{taken:.2f} s, {1e9 * taken / size:.1f} ns per byte of file, positions and memory, "
-                       f"{taken / size / _sample_per_byte():.1f} times the sample's")
+        lines[name] = (
+            f"{taken:.2f} s, {1e9 * taken / size:.1f} ns per byte of file, positions and memory, "
+            f"{taken / size / _sample_per_byte():.1f} times the sample's"
+        )
     return lines
-

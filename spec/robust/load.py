@@ -45,8 +45,13 @@ def job(name: str, *words: object) -> tuple[int, dict]:
     root = str(HERE.parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
-        done = subprocess.run([sys.executable, "-m", "spec.robust.load", name, *map(str, words)], env=environment,
-                              capture_output=True, text=True, timeout=TIMEOUT)
+        done = subprocess.run(
+            [sys.executable, "-m", "spec.robust.load", name, *map(str, words)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
     except subprocess.TimeoutExpired:
         return -1, {"error": "hung"}
     result = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
@@ -82,16 +87,23 @@ def thread_program(folder: Path) -> Path:
     cmake = (CORE / "CMakeLists.txt").read_text()
     names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
-    return compiled(folder, [HERE / "threads.c", *(CORE / name for name in names)], "-fsanitize=thread", *flags,
-                    "-DATH_STATIC", f"-I{CORE}")
+    return compiled(
+        folder,
+        [HERE / "threads.c", *(CORE / name for name in names)],
+        "-fsanitize=thread",
+        *flags,
+        "-DATH_STATIC",
+        f"-I{CORE}",
+    )
 
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
     """(exit code, stderr, result) of one run of threads.c."""
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
-        done = subprocess.run([program, *map(str, words)], env=environment, capture_output=True, text=True,
-                              timeout=TIMEOUT)
+        done = subprocess.run(
+            [program, *map(str, words)], env=environment, capture_output=True, text=True, timeout=TIMEOUT
+        )
     except subprocess.TimeoutExpired:
         return -1, "hung", {}
     return done.returncode, done.stderr, json.loads(done.stdout) if done.stdout else {}
@@ -101,8 +113,9 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
     code, err, result = race(program, threads, rounds, *files)
     row = Row("threads, C core, ThreadSanitizer", result.get("preparations", 0), crashes=int(code < 0))
     row.wrong = result.get("wrong", 0) + err.count("WARNING: ThreadSanitizer")
-    row.note = (f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times "
-                "meanwhile")
+    row.note = (
+        f"{threads} threads, {result.get('frames', 0):,} frames shown, fed {result.get('feeds', 0):,} times meanwhile"
+    )
     return row
 
 
@@ -165,8 +178,12 @@ def seek_at_random(path: str, seeks: int) -> dict:
         before, blocks = resident_bytes(), sys.getallocatedblocks()
         wrong += some(seeks)
         gc.collect()
-        return {"seeks": seeks, "wrong": wrong, "growth": resident_bytes() - before,
-                "objects": sys.getallocatedblocks() - blocks}
+        return {
+            "seeks": seeks,
+            "wrong": wrong,
+            "growth": resident_bytes() - before,
+            "objects": sys.getallocatedblocks() - blocks,
+        }
 
 
 def seeks(path: Path, count: int) -> Row:
@@ -201,8 +218,12 @@ def open_many(path: str, count: int) -> dict:
         for decoder in decoders[: 1 if len(decoders) % 10 else 5]:
             wrong += not _same(decoder, expected, rng)
     gc.collect()
-    return {"decoders": count, "wrong": wrong, "bytes_per_decoder": bytes_per_decoder,
-            "files_left": _open_files() - files}
+    return {
+        "decoders": count,
+        "wrong": wrong,
+        "bytes_per_decoder": bytes_per_decoder,
+        "files_left": _open_files() - files,
+    }
 
 
 def _open_files() -> int:
@@ -259,8 +280,12 @@ def _calls(path: str, out: str) -> dict[str, Call]:
     angle = np.linspace(0, 3, 40)
     rest = np.stack([np.zeros(12), np.linspace(0, 1, 12), np.zeros(12)], 1)
     clip = athcodec.MotionClip(
-        positions=np.float32(rest + 0.1 * np.sin(angle)[:, None, None] * rest[:, 1:2] ** 2), time=np.arange(40) / 30,
-        vertex_branch=np.repeat([0, 1, 2], 4), branch_parent=[-1, 0, 0], rest=rest)
+        positions=np.float32(rest + 0.1 * np.sin(angle)[:, None, None] * rest[:, 1:2] ** 2),
+        time=np.arange(40) / 30,
+        vertex_branch=np.repeat([0, 1, 2], 4),
+        branch_parent=[-1, 0, 0],
+        rest=rest,
+    )
     return {
         "info": opened(lambda decoder: decoder.file.info()),
         "positions": opened(lambda decoder: decoder.positions()),
@@ -283,7 +308,8 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
         out.parent.mkdir()
         expected = lasting.positions()
         calls = _calls(path, str(out)) | {
-            "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]}
+            "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]
+        }
         for which, call in calls.items():
             call()  # fills caches
             files, n, fired, error = _open_files(), 1, True, None
@@ -321,8 +347,13 @@ def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
     code, result = job("allocations", path, seconds)
     row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
-    row.note = "; ".join([f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised",
-                          *result.get("wrong", [])[:3], *result.get("error", "").strip().splitlines()[-1:]])
+    row.note = "; ".join(
+        [
+            f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised",
+            *result.get("wrong", [])[:3],
+            *result.get("error", "").strip().splitlines()[-1:],
+        ]
+    )
     return row
 
 

@@ -219,7 +219,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < thread_count; i++) pthread_create(&threads[i], NULL, wander, (void *)(size_t)i);
     pthread_create(&threads[thread_count], NULL, feed, NULL);
     for (int i = 0; i <= thread_count; i++) pthread_join(threads[i], NULL);
-    printf("{\"preparations\": %ld, \"frames\": %ld, \"feeds\": %ld, \"wrong\": %ld}\n", (long)preparations, (long)frames,
-           (long)feeds, (long)wrong);
+    printf("{\"preparations\": %ld, \"frames\": %ld, \"feeds\": %ld, \"wrong\": %ld}\n", (long)preparations,
+           (long)frames, (long)feeds, (long)wrong);
     return wrong != 0;
 }

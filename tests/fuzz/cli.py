@@ -22,8 +22,9 @@ ALL = (*targets.TARGETS, ROUNDTRIP)
 GRACE = 300
 
 
-def fuzz(target: str, seconds: float, corpus: Path = BUILD / "corpus", sanitizer: str = "address",
-         seed: int = 0) -> Outcome:
+def fuzz(
+    target: str, seconds: float, corpus: Path = BUILD / "corpus", sanitizer: str = "address", seed: int = 0
+) -> Outcome:
     """One target for some time. Raises BuildError."""
     if target == ROUNDTRIP:
         return roundtrip(seconds, seed)
@@ -41,8 +42,7 @@ def roundtrip(seconds: float, seed: int) -> Outcome:
     command = [sys.executable, "-m", "fuzz.roundtrip", str(seconds), str(number)]
     path = {"PYTHONPATH": str(targets.HERE.parent)}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path,
-                              timeout=seconds + GRACE)
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | path, timeout=seconds + GRACE)
     except subprocess.TimeoutExpired as late:
         return Outcome(ROUNDTRIP, 0, "hang", f"no end {GRACE} s after its time: {late}")
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
@@ -57,10 +57,15 @@ def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.split("\n\n")[0])
     parser.add_argument("--seconds", type=float, default=30.0, help="of each target (default: 30)")
     parser.add_argument("--target", action="append", choices=ALL, help="this one alone; may be repeated")
-    parser.add_argument("--sanitizer", choices=[name for name in targets.SANITIZERS if name != "coverage"],
-                        default="address", help="address (with undefined), memory or none (default: address)")
-    parser.add_argument("--corpus", type=Path, default=BUILD / "corpus",
-                        help="folder that grows (default: %(default)s)")
+    parser.add_argument(
+        "--sanitizer",
+        choices=[name for name in targets.SANITIZERS if name != "coverage"],
+        default="address",
+        help="address (with undefined), memory or none (default: address)",
+    )
+    parser.add_argument(
+        "--corpus", type=Path, default=BUILD / "corpus", help="folder that grows (default: %(default)s)"
+    )
     parser.add_argument("--coverage", action="store_true", help="print the lines of the decoder that are reached")
     parser.add_argument("--seed", type=int, default=0, help="0: another one each time")
     return parser.parse_args(argv)

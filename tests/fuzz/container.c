@@ -18,7 +18,8 @@ static void read_front(const uint8_t *bytes, size_t size, const ath_limits *limi
     REQUIRE(memory <= limits->memory_bytes + tables + FIXED, "memory is bounded by the limits");
     for (size_t cut = front; cut-- > 0; cut = cut * 7 / 8) {
         uint8_t *prefix = fuzz_copy(bytes, cut);
-        REQUIRE(ath_front(prefix, cut, limits, &again, &memory, NULL) == ATH_MISSING, "less than the prelude is too little");
+        REQUIRE(ath_front(prefix, cut, limits, &again, &memory, NULL) == ATH_MISSING,
+                "less than the prelude is too little");
         REQUIRE(again > cut && again <= front, "a prefix asks for more, and never for more than the prelude");
         free(prefix);
     }

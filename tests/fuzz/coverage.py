@@ -67,14 +67,18 @@ def measure(corpus: Path = targets.BUILD / "corpus") -> list[Covered] | None:
             files = _files(target, corpus)
             for i in range(0, len(files), AT_ONCE):
                 profile = {"LLVM_PROFILE_FILE": f"{name}/{target}-{i}.profraw"}
-                outcome = targets.replay(target, program, files[i: i + AT_ONCE], profile)
+                outcome = targets.replay(target, program, files[i : i + AT_ONCE], profile)
                 if outcome.kind:
                     raise targets.BuildError(f"{target}: {outcome.log}")
         profile = f"{name}/all.profdata"
         subprocess.run([merge, "merge", "-sparse", *map(str, Path(name).glob("*.profraw")), "-o", profile], check=True)
         objects = [word for program in programs[1:] for word in ("-object", str(program))]
-        done = subprocess.run([show, "export", "-format=lcov", f"-instr-profile={profile}", str(programs[0]), *objects],
-                              check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            [show, "export", "-format=lcov", f"-instr-profile={profile}", str(programs[0]), *objects],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
     return sorted(_parse(done.stdout), key=lambda covered: covered.name)
 
 
@@ -102,5 +106,3 @@ def as_text(files: list[Covered]) -> str:
 
 def total(files: list[Covered]) -> Covered:
     return Covered("all", sum(file.lines for file in files), tuple(line for file in files for line in file.missed))
-
-

@@ -10,7 +10,7 @@ typedef struct {
     const ath_segment *held[HELD + 1]; /* the last is the one in preparation, which is to be passed over */
     const uint8_t *bytes;
     size_t size;
-    void *work, *memory;    /* of the preparation that is under way, if any */
+    void *work, *memory; /* of the preparation that is under way, if any */
 } user;
 
 static void prepare(user *u, int32_t argument)
@@ -78,7 +78,7 @@ static void play(user *u, int32_t argument, int is_float64)
     double at = place(u, argument);
     void *out = fuzz_memory(vertices * stride, 0);
     int result = is_float64 ? ath_positions_float64(u->file, u->held, HELD + 1, at, order, out, stride)
-                      : ath_positions(u->file, u->held, HELD + 1, at, order, out, stride);
+                            : ath_positions(u->file, u->held, HELD + 1, at, order, out, stride);
     REQUIRE(result == ATH_OK || result == ATH_HELD || result == ATH_NOT_PREPARED, "playing gives its codes");
     free(out);
 }
@@ -119,7 +119,8 @@ static void ask(user *u, int32_t argument)
     REQUIRE(ath_ranges(u->file, level, 0, segment, argument & 1, ranges, count) == count, "ranges are counted alike");
     for (int32_t i = 0; i < count; i++)
         REQUIRE(ranges[i].size > 0 && ranges[i].offset + ranges[i].size <= u->info.file_length
-                    && (i == 0 || ranges[i].offset > ranges[i - 1].offset + ranges[i - 1].size), "ranges ascend");
+                    && (i == 0 || ranges[i].offset > ranges[i - 1].offset + ranges[i - 1].size),
+                "ranges ascend");
     free(ranges);
     int32_t ready = ath_ready_level(u->file, segment);
     REQUIRE(ready >= -1 && ready < u->info.level_count, "a ready level is one of the file's");

@@ -60,7 +60,8 @@ size_t fuzz_chunks_at(const uint8_t *file, size_t size)
 
 void fuzz_repair(uint8_t *file, size_t size)
 {
-    static const uint8_t front[12] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
+    static const uint8_t front[12] = {
+        0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
     size_t tables_end = fuzz_chunks_at(file, size), at = tables_end;
     if (tables_end == 0) return;
     for (uint32_t i = 0; i < fuzz_u32(file + CHUNK_COUNT_AT); i++) {
@@ -165,8 +166,10 @@ int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b)
     double *first = fuzz_memory(size, 0), *second = fuzz_memory(size, 0xff);
     int same = 1;
     for (int32_t t = a->start; t < a->start + a->frames && same; t++) {
-        REQUIRE(ath_positions_float64(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK, "it plays");
-        REQUIRE(ath_positions_float64(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK, "it plays");
+        REQUIRE(ath_positions_float64(file, &a, 1, t, ATH_SOURCE_ORDER, first, 3 * sizeof(double)) == ATH_OK,
+                "it plays");
+        REQUIRE(ath_positions_float64(file, &b, 1, t, ATH_SOURCE_ORDER, second, 3 * sizeof(double)) == ATH_OK,
+                "it plays");
         same = memcmp(first, second, size) == 0;
     }
     free(first);

@@ -44,7 +44,7 @@ ath_limits fuzz_limits(uint64_t memory_bytes);
 typedef struct {
     ath_file *file;
     void *bases;
-    size_t memory;  /* bytes of both */
+    size_t memory; /* bytes of both */
 } fuzz_file;
 
 /* Opens and builds; 0 and nothing to close where the file is refused. `available` may be less than the file. */

@@ -121,8 +121,7 @@ static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t 
 static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, const uint8_t *head,
                        double *rest)
 {
-    if (head[6] & 1)
-        return ath_decode_exact_rest(model, body.bytes, body.size, branches, count, head[6] & 2, rest);
+    if (head[6] & 1) return ath_decode_exact_rest(model, body.bytes, body.size, branches, count, head[6] & 2, rest);
     return ath_decode_rest(model, body.bytes, body.size, branches, count, step_from(head + 6), rest);
 }
 
@@ -143,7 +142,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int32_t *branch_source = integers((size_t)branch_count), *vertex_source = integers((size_t)vertices);
     double *rest = fuzz_memory(3 * (size_t)vertices * sizeof *rest, 0xa5);
     if (ath_decode_hierarchy(model, hierarchy.bytes, hierarchy.size, branch_count, vertices, branches, branch_source,
-                             vertex_source) == ATH_OK) {
+                             vertex_source)
+        == ATH_OK) {
         check_branches(branches, branch_count, vertices);
         int result = decode_pose(model, body, branches, branch_count, data, rest);
         int finite = result == ATH_OK && all_finite(rest, 3 * (size_t)vertices);

@@ -18,8 +18,14 @@ from plants import awkward_plants
 from test_roundtrip import assert_comes_back
 
 BATCH = 20
-QUIET = settings(max_examples=BATCH, database=None, deadline=None, suppress_health_check=list(HealthCheck),
-                 phases=[Phase.generate, Phase.shrink], print_blob=True)
+QUIET = settings(
+    max_examples=BATCH,
+    database=None,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    phases=[Phase.generate, Phase.shrink],
+    print_blob=True,
+)
 EFFORTS = ["fast", "fast", "default", "best"]
 
 
@@ -29,8 +35,13 @@ def batch(number: int, folder: Path) -> tuple[int, str]:
 
     @QUIET
     @seed(number)
-    @given(awkward_plants(), st.sampled_from([1e-1, 1e-2, 1e-3, 1e-4, 1e-5]), st.integers(16, 256),
-           st.sampled_from(EFFORTS), st.booleans())
+    @given(
+        awkward_plants(),
+        st.sampled_from([1e-1, 1e-2, 1e-3, 1e-4, 1e-5]),
+        st.integers(16, 256),
+        st.sampled_from(EFFORTS),
+        st.booleans(),
+    )
     def comes_back(clip, fraction, segment_frames, effort, exact_rest):
         nonlocal tried
         tried += 1

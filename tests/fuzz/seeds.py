@@ -50,8 +50,10 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
     "full": (full_clip, {"rel_error": 1e-3, "segment_frames": 16}),
     "exact_rest": (lambda: plant(seed=2, branches=4, frames=9), {"rel_error": 1e-2, "exact_rest": True}),
     "wide": (lambda: plant(seed=3, branches=4, frames=17, dtype=np.float64), {"rel_error": 1e-6}),
-    "wide_exact_rest": (lambda: plant(seed=4, branches=3, frames=5, dtype=np.float64),
-                        {"rel_error": 1e-2, "exact_rest": True}),
+    "wide_exact_rest": (
+        lambda: plant(seed=4, branches=3, frames=5, dtype=np.float64),
+        {"rel_error": 1e-2, "exact_rest": True},
+    ),
     "loose": (lambda: awkward(2, branches=7, roots=3, motion="drift"), {"rel_error": 1e-1}),
     "noise": (lambda: awkward(4, branches=4, longest=5, frames=16, motion="noise"), {"rel_error": 1e-1}),
     "mirrored": (lambda: awkward(6, branches=6, motion="mirror", shuffled=True), {"rel_error": 1e-2}),
@@ -62,11 +64,15 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
     "bush": (lambda: bush(25, frames=5), {"rel_error": 1e-2}),
     "still": (lambda: awkward(9, branches=4, motion="static"), {"rel_error": 1e-2}),
     "point": (_point, {"max_error": 0.01}),
-    "shapes": (lambda: plant(seed=11, branches=5, longest=9, frames=32, rough=0.0),
-               {"rel_error": 1e-5, "segment_frames": 16, "effort": "default"}),
+    "shapes": (
+        lambda: plant(seed=11, branches=5, longest=9, frames=32, rough=0.0),
+        {"rel_error": 1e-5, "segment_frames": 16, "effort": "default"},
+    ),
     "lossless": (lambda: plant(seed=12, branches=4, longest=4, frames=18), {"rel_error": 1e-2, "lossless": True}),
-    "wide_lossless": (lambda: plant(seed=13, branches=3, longest=3, frames=5, dtype=np.float64),
-                      {"rel_error": 1e-2, "lossless": True}),
+    "wide_lossless": (
+        lambda: plant(seed=13, branches=3, longest=3, frames=5, dtype=np.float64),
+        {"rel_error": 1e-2, "lossless": True},
+    ),
     "frames_256": (lambda: plant(seed=10, branches=2, longest=3, frames=257), {"rel_error": 1e-1}),
 }
 
@@ -84,9 +90,12 @@ def _bytes_of(clip: MotionClip, folder: Path, **options) -> bytes:
 @cache
 def valid_files() -> dict[str, bytes]:
     """Small valid files by name."""
-    files = {"least": still_file(), "three_roots": still_file(frames=3, branches=roots(1, 70, 2)),
-             "learned_basis": still_file(frames=9, stems=basis_chunk(_wave(9), 9, 8)),
-             "two_segments": still_file(frames=300)}
+    files = {
+        "least": still_file(),
+        "three_roots": still_file(frames=3, branches=roots(1, 70, 2)),
+        "learned_basis": still_file(frames=9, stems=basis_chunk(_wave(9), 9, 8)),
+        "two_segments": still_file(frames=300),
+    }
     with TemporaryDirectory() as name:
         folder = Path(name)
         for seed, (make, options) in _ENCODED.items():
@@ -143,7 +152,7 @@ def _prelude_inputs(data: bytes) -> Iterator[bytes]:
     for chunk, payload in parts.chunks:
         if chunk.kind == ct.STEMS and payload[5]:
             bits, (length,) = payload[5], struct.unpack_from("<I", payload, 8)
-            stream = payload[12: 12 + length]
+            stream = payload[12 : 12 + length]
             yield _prelude_head(*counts, 8 | bits - 8 << 4 & 255, rest[28:36], 0) + stream
 
 

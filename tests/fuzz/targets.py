@@ -22,16 +22,30 @@ ROOT = HERE.parent.parent
 CORE = ROOT / "athcodec" / "core"
 BUILD = ROOT / "build" / "fuzz"
 TARGETS = ("container", "prelude", "motion", "decode")
-NO_FUZZER = ("no clang with -fsanitize=fuzzer was found (install clang, or name one in FUZZ_CLANG): inputs are tried "
-             "once, not mutated")
+NO_FUZZER = (
+    "no clang with -fsanitize=fuzzer was found (install clang, or name one in FUZZ_CLANG): inputs are tried "
+    "once, not mutated"
+)
 
-COMMON = ["-g", "-O2", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fno-omit-frame-pointer", "-DATH_STATIC",
-          "-Wall", "-Wextra", f"-I{HERE}"]
+COMMON = [
+    "-g",
+    "-O2",
+    "-std=c11",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-omit-frame-pointer",
+    "-DATH_STATIC",
+    "-Wall",
+    "-Wextra",
+    f"-I{HERE}",
+]
 ADDRESS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-SANITIZERS = {"address": [*ADDRESS, "-fsanitize=float-cast-overflow"],
-              "memory": ["-fsanitize=memory", "-fsanitize-memory-track-origins", "-fno-sanitize-recover=all"],
-              "coverage": ["-fprofile-instr-generate", "-fcoverage-mapping"],
-              "none": []}
+SANITIZERS = {
+    "address": [*ADDRESS, "-fsanitize=float-cast-overflow"],
+    "memory": ["-fsanitize=memory", "-fsanitize-memory-track-origins", "-fno-sanitize-recover=all"],
+    "coverage": ["-fprofile-instr-generate", "-fcoverage-mapping"],
+    "none": [],
+}
 RSS_MB, MALLOC_MB, TIMEOUT = 1024, 64, 10
 
 
@@ -51,7 +65,7 @@ class Outcome:
 
     target: str
     tried: int
-    kind: str = ""         # "": nothing went wrong; else crash, hang, over_limit or wrong
+    kind: str = ""  # "": nothing went wrong; else crash, hang, over_limit or wrong
     log: str = ""
     artifact: Path | None = None
     edges: int = 0
@@ -61,10 +75,12 @@ class Outcome:
 def _links_fuzzer(compiler: str) -> bool:
     with TemporaryDirectory() as folder:
         source = Path(folder, "probe.c")
-        source.write_text("int LLVMFuzzerTestOneInput(const char *data, unsigned long size) "
-                          "{ return !data && size; }\n")
-        done = subprocess.run([compiler, "-fsanitize=fuzzer,address", source, "-o", Path(folder, "probe")],
-                              capture_output=True)
+        source.write_text(
+            "int LLVMFuzzerTestOneInput(const char *data, unsigned long size) { return !data && size; }\n"
+        )
+        done = subprocess.run(
+            [compiler, "-fsanitize=fuzzer,address", source, "-o", Path(folder, "probe")], capture_output=True
+        )
     return done.returncode == 0
 
 
@@ -137,31 +153,55 @@ def _number(pattern: str, log: str) -> int:
     return int(found[-1]) if found else 0
 
 
-def fuzz(target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0,
-         runs: int = -1) -> Outcome:
+def fuzz(
+    target: str, program: Path, seconds: float, corpus: Path, finds: Path, *, seed: int = 0, runs: int = -1
+) -> Outcome:
     """Mutates for some time, or so many inputs, from the seeds and what the corpus has, which grows."""
     start = BUILD / "seeds" / target
     seeds.write_inputs(target, start)
     for folder in (corpus, finds):
         folder.mkdir(parents=True, exist_ok=True)
     before = set(finds.iterdir())
-    command = [program, corpus, start, f"-max_total_time={max(1, round(seconds))}", f"-runs={runs}",
-               f"-timeout={TIMEOUT}",
-               f"-rss_limit_mb={RSS_MB}", f"-malloc_limit_mb={MALLOC_MB}", f"-max_len={seeds.LARGEST}", f"-seed={seed}",
-               f"-dict={HERE / 'ath.dict'}", f"-artifact_prefix={finds}/{target}-", "-print_final_stats=1", "-reload=0"]
-    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          env=os.environ | {"ASAN_OPTIONS": "detect_leaks=1"})
+    command = [
+        program,
+        corpus,
+        start,
+        f"-max_total_time={max(1, round(seconds))}",
+        f"-runs={runs}",
+        f"-timeout={TIMEOUT}",
+        f"-rss_limit_mb={RSS_MB}",
+        f"-malloc_limit_mb={MALLOC_MB}",
+        f"-max_len={seeds.LARGEST}",
+        f"-seed={seed}",
+        f"-dict={HERE / 'ath.dict'}",
+        f"-artifact_prefix={finds}/{target}-",
+        "-print_final_stats=1",
+        "-reload=0",
+    ]
+    done = subprocess.run(
+        [str(word) for word in command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env=os.environ | {"ASAN_OPTIONS": "detect_leaks=1"},
+    )
     log = done.stdout.decode(errors="replace")
     found = sorted(set(finds.iterdir()) - before)
-    return Outcome(target, _number(r"stat::number_of_executed_units:\s+(\d+)", log) or _number(r"#(\d+)", log),
-                   _kind(log) if done.returncode else "", log, found[0] if found else None,
-                   _number(r"cov: (\d+)", log), seconds)
+    return Outcome(
+        target,
+        _number(r"stat::number_of_executed_units:\s+(\d+)", log) or _number(r"#(\d+)", log),
+        _kind(log) if done.returncode else "",
+        log,
+        found[0] if found else None,
+        _number(r"cov: (\d+)", log),
+        seconds,
+    )
 
 
 def replay(target: str, program: Path, files: list[Path], env: dict | None = None) -> Outcome:
     """Tries each file once."""
     command = [program, *(["-timeout=60"] if env is None else []), *files]
-    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          env=os.environ | (env or {}))
+    done = subprocess.run(
+        [str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | (env or {})
+    )
     log = done.stdout.decode(errors="replace")
     return Outcome(target, len(files), _kind(log) if done.returncode else "", log)

@@ -57,6 +57,13 @@ for frame in range(actor.getNumFrames("walk")):
         matrices[-1].append([[matrix.getCell(row, cell) for row in range(4)] for cell in range(4)])
 primitive = geom.getPrimitive(0).decompose()
 faces = np.array([primitive.getVertex(i) for i in range(primitive.getNumVertices())]).reshape(-1, 3)
-np.savez(sys.argv[1], positions=np.array(positions, np.float32), faces=faces, joints=joints, weights=weights,
-         rest=np.array(column(geom.getVertexData(), "vertex", point), np.float32), matrices=np.array(matrices),
-         fps=actor.getFrameRate("walk"))
+np.savez(
+    sys.argv[1],
+    positions=np.array(positions, np.float32),
+    faces=faces,
+    joints=joints,
+    weights=weights,
+    rest=np.array(column(geom.getVertexData(), "vertex", point), np.float32),
+    matrices=np.array(matrices),
+    fps=actor.getFrameRate("walk"),
+)

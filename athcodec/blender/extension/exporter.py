@@ -29,17 +29,30 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
 
     filename_ext = ".ath"
     filter_glob: StringProperty(default="*.ath", options={"HIDDEN"})
-    bound: EnumProperty(name="Error", default="RELATIVE", items=(
-        ("RELATIVE", "Relative", "At most a fraction of the diagonal of the box around the whole motion"),
-        ("LENGTH", "Length", "At most a length in the scene's units"),
-        ("LOSSLESS", "Lossless", "Every bit of the positions")))
+    bound: EnumProperty(
+        name="Error",
+        default="RELATIVE",
+        items=(
+            ("RELATIVE", "Relative", "At most a fraction of the diagonal of the box around the whole motion"),
+            ("LENGTH", "Length", "At most a length in the scene's units"),
+            ("LOSSLESS", "Lossless", "Every bit of the positions"),
+        ),
+    )
     rel_error: FloatProperty(name="Fraction", default=1e-4, min=1e-9, max=1.0, precision=6)
     max_error: FloatProperty(name="Length", default=0.001, min=1e-12, precision=6, unit="LENGTH")
-    effort: EnumProperty(name="Effort", default="default", items=(
-        ("fast", "Fast", "Quick, larger"), ("default", "Default", ""), ("best", "Best", "Slow, smaller")))
-    space: EnumProperty(name="Space", default="WORLD", items=(
-        ("WORLD", "World", "With the transforms of the object and of its parents"),
-        ("LOCAL", "Local", "As the mesh has them, for an object that is imported again below the same parents")))
+    effort: EnumProperty(
+        name="Effort",
+        default="default",
+        items=(("fast", "Fast", "Quick, larger"), ("default", "Default", ""), ("best", "Best", "Slow, smaller")),
+    )
+    space: EnumProperty(
+        name="Space",
+        default="WORLD",
+        items=(
+            ("WORLD", "World", "With the transforms of the object and of its parents"),
+            ("LOCAL", "Local", "As the mesh has them, for an object that is imported again below the same parents"),
+        ),
+    )
     attributes: BoolProperty(name="Static Data", default=True, description="Faces, texture coordinates and attributes")
 
     @classmethod
@@ -48,8 +61,15 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
 
     def execute(self, context):
         try:
-            summary = write_object(context, context.active_object, self.filepath, self.space == "WORLD",
-                                   self.effort, self.attributes, **self._bound())
+            summary = write_object(
+                context,
+                context.active_object,
+                self.filepath,
+                self.space == "WORLD",
+                self.effort,
+                self.attributes,
+                **self._bound(),
+            )
         except Exception as error:  # reported in one line
             self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
             return {"CANCELLED"}
@@ -62,8 +82,9 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
         return {"lossless": True} if self.bound == "LOSSLESS" else {"rel_error": self.rel_error}
 
 
-def write_object(context, obj, path: str, world: bool = True, effort: str = "default", attributes: bool = True,
-                 **bound):
+def write_object(
+    context, obj, path: str, world: bool = True, effort: str = "default", attributes: bool = True, **bound
+):
     """Compress the frames of the scene; returns athcodec's Summary. Raises athcodec's errors, OSError."""
     import athcodec
 
@@ -74,9 +95,14 @@ def write_object(context, obj, path: str, world: bool = True, effort: str = "def
     try:
         with tempfile.TemporaryFile() as spool:
             clip = _clip(context, obj, spool, world, lambda done: manager.progress_update(done / 2))
-            return athcodec.encode(clip, bpy.path.abspath(path), effort=effort,
-                                   attributes="all" if attributes else "none",
-                                   progress=lambda stage, done: manager.progress_update(0.5 + done / 2), **bound)
+            return athcodec.encode(
+                clip,
+                bpy.path.abspath(path),
+                effort=effort,
+                attributes="all" if attributes else "none",
+                progress=lambda stage, done: manager.progress_update(0.5 + done / 2),
+                **bound,
+            )
     finally:
         manager.progress_end()
         _set_frame(scene, before)
@@ -109,8 +135,15 @@ def _clip(context, obj, spool, world: bool, report):
         report((i + 1) / len(frames))
     spool.flush()
     positions = np.memmap(spool, np.float32, "r", shape=(len(frames), shape[0], 3))
-    metadata = {"fps": rate, "start_frame": frames[0], "up_axis": "z", **_unit(scene, world), "part_names": [obj.name],
-                "part_kinds": ["mesh"], "domains": static.pop("domains")}
+    metadata = {
+        "fps": rate,
+        "start_frame": frames[0],
+        "up_axis": "z",
+        **_unit(scene, world),
+        "part_names": [obj.name],
+        "part_kinds": ["mesh"],
+        "domains": static.pop("domains"),
+    }
     return MotionClip(positions, np.arange(len(frames)) / rate, metadata=metadata, skin=_skin(obj, shape[0]), **static)
 
 

@@ -18,10 +18,23 @@ from . import player
 from .player import DEEPEST
 
 DOMAINS = {"vertex": "POINT", "corner": "CORNER", "face": "FACE"}
-KINDS = {("f", ()): "FLOAT", ("f", (2,)): "FLOAT2", ("f", (3,)): "FLOAT_VECTOR", ("f", (4,)): "FLOAT_COLOR",
-         ("i", ()): "INT", ("u", ()): "INT", ("b", ()): "BOOLEAN"}
-FIELDS = {"FLOAT": "value", "FLOAT2": "vector", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color", "INT": "value",
-          "BOOLEAN": "value"}
+KINDS = {
+    ("f", ()): "FLOAT",
+    ("f", (2,)): "FLOAT2",
+    ("f", (3,)): "FLOAT_VECTOR",
+    ("f", (4,)): "FLOAT_COLOR",
+    ("i", ()): "INT",
+    ("u", ()): "INT",
+    ("b", ()): "BOOLEAN",
+}
+FIELDS = {
+    "FLOAT": "value",
+    "FLOAT2": "vector",
+    "FLOAT_VECTOR": "vector",
+    "FLOAT_COLOR": "color",
+    "INT": "value",
+    "BOOLEAN": "value",
+}
 PARENTS = "ath_branch_parent"  # a property of the mesh: the branches' parents, one per branch
 NOT_SHOWN = ("face_vertex_counts", "face_vertex_indices", "part_vertex_counts", "curve_vertex_counts")
 
@@ -37,14 +50,22 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(default="*.ath", options={"HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    level: IntProperty(name="Level", default=DEEPEST, min=DEEPEST,
-                       description="Level of detail: 0 is the coarsest, -1 the deepest in the file")
+    level: IntProperty(
+        name="Level",
+        default=DEEPEST,
+        min=DEEPEST,
+        description="Level of detail: 0 is the coarsest, -1 the deepest in the file",
+    )
     clip: StringProperty(name="Clip", description="The motion to play, of a file that has several: else the first")
     loop: BoolProperty(name="Loop", default=False, description="Begin again after the last frame")
-    set_scene: BoolProperty(name="Set Scene", default=True,
-                            description="Give the scene the frame rate and the frames of the motion")
-    use_relative: BoolProperty(name="Relative Path", default=True,
-                               description="Keep the path relative to the .blend, where that has been saved")
+    set_scene: BoolProperty(
+        name="Set Scene", default=True, description="Give the scene the frame rate and the frames of the motion"
+    )
+    use_relative: BoolProperty(
+        name="Relative Path",
+        default=True,
+        description="Keep the path relative to the .blend, where that has been saved",
+    )
 
     def execute(self, context):
         names = [file.name for file in self.files if file.name]
@@ -62,7 +83,6 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
 
-
 class IO_FH_ath(bpy.types.FileHandler):
     """Files that are dropped into a window"""
 
@@ -76,8 +96,15 @@ class IO_FH_ath(bpy.types.FileHandler):
         return context.area is not None and context.area.type in ("VIEW_3D", "OUTLINER")
 
 
-def add_object(context, path: str, level: int = DEEPEST, loop: bool = False, set_scene: bool = True,
-               use_relative: bool = True, clip: str = ""):
+def add_object(
+    context,
+    path: str,
+    level: int = DEEPEST,
+    loop: bool = False,
+    set_scene: bool = True,
+    use_relative: bool = True,
+    clip: str = "",
+):
     """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
     path = os.path.normpath(bpy.path.abspath(path))
     decoder = player.decoder_of(path, clip)

@@ -41,9 +41,11 @@ class OBJECT_PT_ath(bpy.types.Panel):
             return [" ".join(str(error).split())]
         shown = decoder.levels[player.level_of(obj, decoder)]
         unit = decoder.metadata.get("unit", "")
-        return [f"level {shown.level} of 0 to {decoder.deepest}: {shown.nodes:,} nodes",
-                f"largest error {shown.max_error:.3g} {unit}",
-                f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.vertex_count:,} vertices"]
+        return [
+            f"level {shown.level} of 0 to {decoder.deepest}: {shown.nodes:,} nodes",
+            f"largest error {shown.max_error:.3g} {unit}",
+            f"{decoder.frame_count:,} frames, {decoder.fps:.6g} per second, {decoder.vertex_count:,} vertices",
+        ]
 
 
 def register() -> None:

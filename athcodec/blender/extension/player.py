@@ -172,8 +172,12 @@ def _relative(path: str, folder: str) -> str:
         return path
 
 
-HANDLERS = (("frame_change_post", _on_frame), ("load_post", _on_load), ("save_pre", _on_save),
-            ("save_post", _after_save))
+HANDLERS = (
+    ("frame_change_post", _on_frame),
+    ("load_post", _on_load),
+    ("save_pre", _on_save),
+    ("save_post", _after_save),
+)
 
 
 def register() -> None:

@@ -21,22 +21,22 @@ static const double COMFORTABLE = 0.7;          /* a coarser level stays below t
 
 typedef struct {
     FILE *download;
-    uint8_t *bytes;               /* room for the whole file: bytes that were fed must not move */
+    uint8_t *bytes; /* room for the whole file: bytes that were fed must not move */
     size_t length, there, slice;
     ath_file *file;
     ath_info info;
     int32_t clip_index, first_segment, last_segment;
-    const ath_clip *clip;         /* the one that is played */
+    const ath_clip *clip; /* the one that is played */
     void *bases;
     ath_work *work;
     size_t file_size, build_size, work_size, segments_size;
-    ath_segment *playing, *next;  /* null: none. `next` is prepared while `playing` plays */
+    ath_segment *playing, *next; /* null: none. `next` is prepared while `playing` plays */
     int preparing;
-    int32_t steps, spread;        /* of the preparation in all, and over how many drawn frames it is spread */
-    int32_t level, bound_level;   /* that the camera asks for; that `binding` is for */
+    int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
+    int32_t level, bound_level; /* that the camera asks for; that `binding` is for */
     int32_t *binding;
     float *matrices, *positions;
-    double drawn_per_frame;       /* frames on the screen for one of the file */
+    double drawn_per_frame; /* frames on the screen for one of the file */
     long drawn, held;
     double preparing_time, playing_time, longest;
 } player;
@@ -121,7 +121,7 @@ static void choose_clip(player *p, const char *name)
 
 static void close_file(player *p)
 {
-    void *const memories[] = {p->playing, p->next, p->work, p->bases, p->file,
+    void *const memories[] = {p->playing, p->next,     p->work,      p->bases, p->file,
                               p->binding, p->matrices, p->positions, p->bytes};
     for (size_t i = 0; i < sizeof memories / sizeof *memories; i++) free(memories[i]);
     fclose(p->download);
@@ -132,8 +132,7 @@ static void close_file(player *p)
 static void choose_level(player *p, double distance)
 {
     int32_t at_least = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, PIXELS);
-    int32_t at_most = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN,
-                                    COMFORTABLE);
+    int32_t at_most = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, COMFORTABLE);
     if (p->level < at_least) p->level = at_least;
     if (p->level > at_most) p->level = at_most;
 }
@@ -297,9 +296,8 @@ static void walk(player *p, double seconds, double fps)
             draw_frame(p, (double)p->drawn / fps);
         }
         double frames = (double)(p->drawn - begin);
-        printf("%6d %10.4g %6d %6d %10zu %23.1f %10.1f\n", second, distance, (int)p->level,
-               (int)level_of(p->playing), p->there, (p->preparing_time - preparing) / frames,
-               (p->playing_time - playing) / frames);
+        printf("%6d %10.4g %6d %6d %10zu %23.1f %10.1f\n", second, distance, (int)p->level, (int)level_of(p->playing),
+               p->there, (p->preparing_time - preparing) / frames, (p->playing_time - playing) / frames);
         preparing = p->preparing_time;
         playing = p->playing_time;
     }
@@ -319,8 +317,10 @@ int main(int argc, char **argv)
             clip = argv[i + 1];
             continue;
         }
-        double *option = !strcmp(argv[i], "--slices") ? &slices : !strcmp(argv[i], "--seconds") ? &seconds
-                         : !strcmp(argv[i], "--fps") ? &fps : NULL;
+        double *option = !strcmp(argv[i], "--slices")    ? &slices
+                         : !strcmp(argv[i], "--seconds") ? &seconds
+                         : !strcmp(argv[i], "--fps")     ? &fps
+                                                         : NULL;
         if (!option) fail(argv[i], "no such option");
         *option = atof(argv[i + 1]);
         if (!(*option >= 1.0 && *option <= 1e6)) fail(argv[i], "expected a number from 1 to 1e6");
@@ -329,8 +329,8 @@ int main(int argc, char **argv)
     choose_clip(&p, clip);
     set_pace(&p, fps);
     walk(&p, seconds, fps);
-    printf("bytes of memory: file %zu, opened %zu, built %zu, work %zu, segments at most %zu\n", p.length,
-           p.file_size, p.build_size, p.work_size, p.segments_size);
+    printf("bytes of memory: file %zu, opened %zu, built %zu, work %zu, segments at most %zu\n", p.length, p.file_size,
+           p.build_size, p.work_size, p.segments_size);
     printf("ranges missing at the end: %d\n",
            (int)ath_ranges(p.file, p.info.level_count - 1, p.first_segment, p.last_segment, 0, NULL, 0));
     close_file(&p);
