@@ -5,7 +5,7 @@ FORMAT.md computes vertex by vertex and frame by frame, arrays take all frames a
 result, because every sum still runs in the order written (`in_order`). It decodes whole levels of whole
 files, slowly; it does not play, write or repair them.
 
-    python spec/reference_decoder.py FILE [--depth D] [--strict] [--out positions.npy] [--checksum]
+    python spec/reference_decoder.py FILE [--level L] [--strict] [--out positions.npy] [--checksum]
 """
 
 from __future__ import annotations
@@ -2060,7 +2060,7 @@ def raw(file: AthFile, what: str) -> bytes:
 
 def show(options: argparse.Namespace, data: bytes) -> None:
     file = AthFile(data, strict=options.strict)
-    level = file.deepest if options.depth is None else options.depth
+    level = file.deepest if options.level is None else options.level
     positions = file.positions(level)
     frames, vertices, _ = positions.shape
     print(f"{frames} frames of {vertices} vertices, {positions.dtype}, level {level} of {file.header.level_count - 1}")
@@ -2076,7 +2076,7 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Decodes a level of an .ath file as FORMAT.md says.")
     parser.add_argument("file")
     parser.add_argument("what", nargs="?", help=argparse.SUPPRESS)
-    parser.add_argument("--depth", type=int, help="level; by default the deepest complete one")
+    parser.add_argument("--level", type=int, help="by default the deepest complete one")
     parser.add_argument("--strict", action="store_true", help="the file has to be as long as it says")
     parser.add_argument("--out", help="write the positions, (frames, vertices, 3), to this .npy file")
     parser.add_argument("--checksum", action="store_true", help="print their CRC-32C, little-endian, source order")

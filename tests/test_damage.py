@@ -799,11 +799,11 @@ def test_the_smallest_steps_play(kind, parts):
 def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matrices(kind, finite, parts):
     """The positions are no plant, but numbers or infinities."""
     decoder = opened(with_step(parts, kind, 1e38))
-    decoder.check()
+    decoder.file.check()
     found = []
     for level in range(decoder.level_count):
         positions = decoder.positions(0, level)
-        assert not np.isnan(decoder.positions(depth=level)).any()
+        assert not np.isnan(decoder.positions(level=level)).any()
         if np.isfinite(positions).all():
             found.append(level)
             assert np.isfinite(decoder.affines(0, level).matrices).all()

@@ -238,7 +238,7 @@ def run(*words) -> subprocess.CompletedProcess:
 
 
 def test_the_command_shows_a_level_and_writes_it(bushy_ath, tmp_path):
-    done = run(bushy_ath, "--depth", 1, "--out", tmp_path / "positions.npy", "--checksum")
+    done = run(bushy_ath, "--level", 1, "--out", tmp_path / "positions.npy", "--checksum")
     assert done.returncode == 0, done.stderr
     with athcodec.open(bushy_ath) as decoder:
         expected = decoder.positions(level=1)
@@ -248,7 +248,7 @@ def test_the_command_shows_a_level_and_writes_it(bushy_ath, tmp_path):
 
 
 def test_the_command_lists_clips():
-    done = run(VECTORS / "clips-loops.ath", "--depth", 0)
+    done = run(VECTORS / "clips-loops.ath", "--level", 0)
     assert done.stdout.splitlines()[1:] == ["'calm': 3 frames, a loop", "'once': 2 frames", "'storm': 4 frames, a loop"]
 
 
@@ -257,7 +257,7 @@ def test_the_command_names_what_is_wrong_and_fails(bushy_ath, tmp_path):
     done = run("--strict", tmp_path / "cut.ath")
     assert done.returncode == 1 and done.stderr.startswith("TRUNCATED: ") and "\n" not in done.stderr.strip()
     assert run(tmp_path / "none.ath").returncode == 1
-    assert run(bushy_ath, "--depth", 99).returncode == 1
+    assert run(bushy_ath, "--level", 99).returncode == 1
 
 
 def test_it_needs_numpy_and_zstandard_alone():

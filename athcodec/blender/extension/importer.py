@@ -119,7 +119,7 @@ def add_object(
     settings = obj.ath
     settings.level, settings.loop, settings.frame_offset, settings.clip = level, loop, first, decoder.clip.name
     relative = use_relative and bpy.data.is_saved
-    settings.filepath = player._relative(path, os.path.dirname(bpy.data.filepath)) if relative else path
+    settings.filepath = player.relative_path(path, os.path.dirname(bpy.data.filepath)) if relative else path
     player.show(obj, context.scene)
     return obj
 

@@ -142,7 +142,7 @@ def _on_save(target=None, *_) -> None:
         for obj in bpy.data.objects:
             before = obj.ath.filepath
             if obj.library is None and before and (before.startswith("//") or relative):
-                after = _relative(path_of(obj), folder)
+                after = relative_path(path_of(obj), folder)
                 if after != before:
                     _moved[obj.name_full] = before
                     obj.ath.filepath = after
@@ -165,7 +165,7 @@ def _after_save(*_) -> None:
         _moved.clear()
 
 
-def _relative(path: str, folder: str) -> str:
+def relative_path(path: str, folder: str) -> str:
     try:
         return bpy.path.relpath(path, start=folder)
     except ValueError:  # on another drive
