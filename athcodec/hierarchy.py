@@ -121,11 +121,6 @@ class Hierarchy:
         """Number of branches, B."""
         return len(self.branch_parent)
 
-    @property
-    def is_source_order(self) -> bool:
-        """True where both permutations are the identity."""
-        return all(np.array_equal(p, np.arange(len(p))) for p in (self.vertex_source, self.branch_source))
-
     def vertex_branch(self) -> np.ndarray:
         """(N,) int32: the branch of each vertex, both in file order."""
         return np.repeat(np.arange(self.branch_count, dtype=np.int32), self.stem_count)

@@ -138,17 +138,6 @@ def compare_clips(reference: MotionClip, decoded: MotionClip) -> ErrorMeter:
     return meter
 
 
-def bounding_box(clip: MotionClip) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates of any vertex in any frame, two (3,) float64 arrays; one pass over the
-    clip.
-    """
-    low, high = np.full(3, inf), np.full(3, -inf)
-    for _, frames in clip.blocks():
-        low = np.minimum(low, frames.min(axis=(0, 1)))
-        high = np.maximum(high, frames.max(axis=(0, 1)))
-    return low, high
-
-
 def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:
     """Size in bits per vertex and frame."""
     return 8.0 * byte_count / (frame_count * vertex_count)

@@ -203,7 +203,8 @@ def test_coincident_vertices_and_a_branch_on_a_first_vertex_work():
 
 def test_the_sample_is_stored_as_it_stands(sample_clip):
     h = hierarchy_of(sample_clip)
-    assert h.is_source_order and h.branch_depth.max() == 2 and h.branch_count == 99
+    assert all(np.array_equal(source, np.arange(len(source))) for source in (h.vertex_source, h.branch_source))
+    assert h.branch_depth.max() == 2 and h.branch_count == 99
     assert np.array_equal(derived_edges(h), sample_clip.edges)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from athcodec import metrics
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.metrics import ErrorMeter, bounding_box, compare_clips
+from athcodec.metrics import ErrorMeter, compare_clips
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.integers(1, 9), st.integers(1, 12), st.integers(3, 60))
@@ -85,9 +85,3 @@ def test_clips_are_compared_frame_by_frame(forked, forked_clip):
     shorter = MotionClip(**(forked | {"positions": forked["positions"][:3], "time": [0, 1, 2]}))
     with pytest.raises(ClipError, match=r"got \(3, 6\) .* expected \(5, 6\)"):
         compare_clips(forked_clip, shorter)
-
-
-def test_the_bounding_box_holds_every_frame(forked, forked_clip):
-    low, high = bounding_box(forked_clip)
-    points = forked["positions"].reshape(-1, 3)
-    assert np.array_equal(low, points.min(0)) and np.array_equal(high, points.max(0))
