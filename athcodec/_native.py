@@ -72,7 +72,8 @@ class Integers(ctypes.Structure):
     _fields_ = [
         (name, c_void_p)
         for name in (
-            "coefficients tracks node_tracks node_steps predicted predicted_tracks shape_counts shape_first shapes duals"
+            "coefficients tracks node_tracks node_steps predicted predicted_tracks "
+            "shape_counts shape_first shapes duals"
         ).split()
     ]
 

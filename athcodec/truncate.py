@@ -5,16 +5,25 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 
+import numpy as np
+
 from athcodec import container as ct
 from athcodec.ath_file import AthFile
 from athcodec.atomic_files import new_file
 from athcodec.errors import LevelUnavailable, Truncated
 
 
-def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], level: int) -> int:
-    """Write the levels 0 to `level` of an .ath file as a complete file, whose error bound is that of `level`.
+def truncate(
+    source: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    level: int | None = None,
+    *,
+    max_error: float | None = None,
+    target_size: int | None = None,
+) -> int:
+    """Write the first levels of an .ath file as a complete file, whose error bound is that of the last of them.
 
-    Static data is kept. Nothing is decoded.
+    Static data is kept. Nothing is decoded. One of `level`, `max_error` and `target_size` is given.
 
     Parameters
     ----------
@@ -22,8 +31,12 @@ def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], lev
         The file to shorten.
     target : str or path-like
         The file to write; it appears when it is complete.
-    level : int
+    level : int, optional
         The last level to keep.
+    max_error : float, optional
+        Scene units: keep the levels down to the first whose largest error this is or less.
+    target_size : int, optional
+        Bytes: keep as many levels as fit.
 
     Returns
     -------
@@ -38,26 +51,60 @@ def truncate(source: str | os.PathLike[str], target: str | os.PathLike[str], lev
         Where the source is damaged, or was cut off before that level.
     OSError
         Where a file cannot be read or written.
+    TypeError
+        Where not one of `level`, `max_error` and `target_size` is given.
     """
+    if sum(option is not None for option in (level, max_error, target_size)) != 1:
+        raise TypeError("truncate: expected one of level, max_error and target_size")
     with open(os.fspath(source), "rb") as opened, AthFile(opened) as file:
-        if not 0 <= level < file.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
-        chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
+        if max_error is not None:
+            last = _first_within(file, max_error)
+        elif target_size is not None:
+            last = _last_within(file, target_size)
+        else:
+            last = _present(file, level)
+        front, chunks = _shortened(file, last)
         for chunk in chunks:
             if not file.is_available(chunk):
                 raise Truncated(
                     f"{chunk}: got a file of {file.available_length} bytes; expected at least "
                     f"{chunk.offset + chunk.length}"
                 )
-        errors = file.errors[: level + 1]
-        whole = level + 1 == file.full_level_count
-        header = replace(
-            file.header,
-            level_count=level + 1,
-            max_error=file.max_error_bound if whole else float(errors[level, :, 0].max()),
-        )
         with new_file(target) as out:
-            out.write(ct.pack_front(header, chunks, errors))
+            out.write(front)
             for chunk in chunks:
                 out.write(file.payload(chunk))
             return out.tell()
+
+
+def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
+    """The front of the file that ends with a level, and what follows it."""
+    chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
+    whole = level + 1 == file.full_level_count
+    header = replace(
+        file.header,
+        level_count=level + 1,
+        max_error=file.max_error_bound if whole else float(file.errors[level, :, 0].max()),
+    )
+    return ct.pack_front(header, chunks, file.errors[: level + 1]), chunks
+
+
+def _present(file: AthFile, level: int | None) -> int:
+    if level is None or not 0 <= level < file.level_count:
+        raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
+    return level
+
+
+def _first_within(file: AthFile, max_error: float) -> int:
+    largest = file.errors[:, :, 0].max(axis=1)
+    if not (within := np.flatnonzero(largest <= max_error)).size:
+        raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")
+    return int(within[0])
+
+
+def _last_within(file: AthFile, target_size: int) -> int:
+    parts = (_shortened(file, level) for level in range(file.level_count))
+    sizes = [len(front) + sum(chunk.length for chunk in chunks) for front, chunks in parts]
+    if sizes[0] > target_size:
+        raise LevelUnavailable(f"target_size: got {target_size}; expected at least {sizes[0]} bytes")
+    return max(level for level, size in enumerate(sizes) if size <= target_size)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,11 +67,11 @@ def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> Non
 
 
 @contextmanager
-def encoded(path: Path, rel_error: float, effort: str = "default") -> Iterator[Encoded]:
+def encoded(path: Path, rel_error: float, effort: str = "default", ladder: Sequence[float] = ()) -> Iterator[Encoded]:
     """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
         file = Path(folder) / "clip.ath"
-        summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", effort=effort)
+        summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", effort=effort, ladder=ladder)
         with athcodec.open(file, strict=True) as decoder:
             yield Encoded(clip, summary, decoder)
 

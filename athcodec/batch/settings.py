@@ -24,6 +24,7 @@ from typing import Any
 from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.atomic_files import is_url
+from athcodec.encoding.layers import ladder_of
 from athcodec.encoding.search import EFFORTS
 from athcodec.errors import ClipError
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
@@ -249,6 +250,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "weights": _TEXT,
     "attributes": _one_of("all", "none"),
     "effort": _one_of(*EFFORTS),
+    "ladder": lambda value: list(ladder_of(value)),
     "source_format": _format,
     "rest": _one_of("auto", "first", "mean"),
     "fps": _rate,

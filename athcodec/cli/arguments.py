@@ -12,6 +12,7 @@ import athcodec
 from athcodec import discovery
 from athcodec.cli import verbs
 from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
+from athcodec.encoding.layers import ladder_of
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
 
@@ -278,6 +279,14 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--effort", choices=EFFORTS, default="default", help="how long to look for a smaller file (default: default)"
     )
     verb.add_argument(
+        "--ladder",
+        metavar="ERROR,...",
+        type=_argument(ladder_of),
+        default=(),
+        help="layers of precision to stop at, by their largest errors as fractions of the diagonal, such as 1e-2,1e-3; "
+        "decades: 1e-2, 1e-3 and so on down to the bound (default: none)",
+    )
+    verb.add_argument(
         "--rest",
         choices=("auto", "first", "mean"),
         default="auto",
@@ -404,8 +413,19 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
 def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath")
     verb.add_argument("output", metavar="OUT.ath", help=WRITTEN)
-    verb.add_argument(
-        "--level", "--depth", metavar="LEVEL", type=_argument(_whole), required=True, help="the last level to keep"
+    kept = verb.add_mutually_exclusive_group(required=True)
+    kept.add_argument("--level", "--depth", metavar="LEVEL", type=_argument(_whole), help="the last level to keep")
+    kept.add_argument(
+        "--max-error",
+        metavar="LENGTH",
+        type=_argument(_positive_length),
+        help="keep the levels down to the first whose largest error this is or less, in scene units or such as 1mm",
+    )
+    kept.add_argument(
+        "--target-size",
+        metavar="SIZE",
+        type=_argument(parse_size),
+        help="keep as many levels as fit: bytes, 50kB, 1.5MB, 48KiB",
     )
 
 

@@ -68,6 +68,7 @@ def encode(args: argparse.Namespace) -> int:
             weights=args.weights,
             attributes=args.attributes,
             effort=args.effort,
+            ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
             **bound(args, unit),
@@ -122,6 +123,8 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
         for name, usual in (("attributes", "all"), ("effort", "default"))
         if getattr(args, name) != usual
     }
+    if args.ladder:
+        given["ladder"] = list(args.ladder)
     if given.get("rest") == "auto":
         del given["rest"]
     if args.max_error is not None:
@@ -212,9 +215,15 @@ def verify(args: argparse.Namespace) -> int:
 def truncate(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
     with naming(args.input):
-        athcodec.truncate(args.input, args.output, args.level)
+        max_error = args.max_error
+        if max_error is not None:
+            with open_file(args.input) as decoder:
+                max_error = max_error.in_scene_units(decoder.metadata.get("unit"))
+        athcodec.truncate(args.input, args.output, args.level, max_error=max_error, target_size=args.target_size)
+    with open_file(args.output) as decoder:
+        last = decoder.level_count - 1
     before, after = (os.path.getsize(path) for path in (args.input, args.output))
-    print(f"{args.output}: levels 0 to {args.level}, {after:,} of {before:,} bytes")
+    print(f"{args.output}: levels 0 to {last}, {after:,} of {before:,} bytes")
     return 0
 
 

@@ -55,7 +55,7 @@ class _Trial:
         clip, lossless = with_branches(self._clip, branches), self._option.lossless
         hierarchy = hierarchy_of(clip)
         source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=lossless)
-        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless, ladder=()))
+        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         return self._job_size(job, self._option.in_scene_units(source, job.file_size))

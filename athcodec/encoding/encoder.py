@@ -21,6 +21,7 @@ from athcodec.clip import MotionClip
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
+from athcodec.encoding.layers import ladder_of
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
@@ -41,7 +42,7 @@ def encode(
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
     effort: str = "default",
-    ladder: Sequence[float] | None = None,
+    ladder: str | Sequence[float] = "none",
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Summary:
@@ -79,9 +80,10 @@ def encode(
         "none" drops faces, edges and named arrays.
     effort : {"fast", "default", "best"}
         How long settings are searched.
-    ladder : sequence of float, optional
-        Largest errors over the diagonal, each about that of a layer of precision, at which a decoder can stop. By default
-        a few decades down to the bound; empty: a single layer, for archives.
+    ladder : {"none", "decades"} or sequence of float
+        Largest errors over the diagonal at which a decoder can stop, each about that of a layer of precision: one file
+        for several distances, a few percent larger than "none", a single layer. "decades" is 1e-2, 1e-3 and so on, down
+        to the bound.
     jobs : int, optional
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.
@@ -114,7 +116,7 @@ def encode(
         attributes=attributes,
         effort=effort,
         jobs=jobs,
-        ladder=None if ladder is None else tuple(ladder),
+        ladder=ladder_of(ladder),
     )
     check_target(path)  # before any work
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
@@ -139,7 +141,7 @@ def draft(
     ClipError, BoundError, ValueError
         As `encode`.
     """
-    checked = EncodingOptions.of(**options)
+    checked = EncodingOptions.of(**options | {"ladder": ladder_of(options.get("ladder", "none"))})
     option = BoundOption(max_error, rel_error, target_size, checked.lossless)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))

@@ -55,7 +55,7 @@ class EncodingOptions:
     attributes: str = "all"
     effort: str = "default"
     jobs: int | None = None
-    ladder: tuple[float, ...] | None = None  # largest errors over the diagonal; (): a single layer
+    ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
 
     @classmethod
     def of(cls, *, segment_frames: int | None = None, **options) -> EncodingOptions:

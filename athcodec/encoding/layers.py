@@ -1,7 +1,8 @@
 """Layers of precision: the plant at a coarse step, and refinements of it down to the step of the file's bound.
 
-The first layer has the levels of the branch hierarchy; each further one is one level of the file that refines all of it,
-motion, rest pose and learned modes. A refinement is coded about the positions of the layer before (FORMAT.md, "Layers").
+The first layer has the levels of the branch hierarchy; each further one is one level of the file that refines all of
+it, motion, rest pose and learned modes. A refinement is coded about the positions of the layer before (FORMAT.md,
+"Layers").
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_error
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, analyse, correct, stem_streams, stems_head
 
-DEFAULT_LADDER = (1e-2, 1e-3, 1e-4, 1e-5)  # largest errors over the diagonal
+LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 LEAST_RATIO = 4  # of the steps of neighbouring layers
 MOST_DIGITS = 14  # binary, between neighbouring layers
 
@@ -48,14 +49,30 @@ class Layer:
     rest: ct.Rest | streams.CodedRest | None = None
 
 
-def layer_digits(ladder: Sequence[float] | None, bound: float, diagonal: float) -> list[int]:
+def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
+    """Largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas between them.
+
+    Raises ValueError.
+    """
+    if isinstance(ladder, str) and ladder in LADDERS:
+        return LADDERS[ladder]
+    try:
+        errors = tuple(sorted(map(float, ladder.split(",") if isinstance(ladder, str) else ladder), reverse=True))
+    except (TypeError, ValueError):
+        errors = (math.nan,)
+    if not all(0 < error < 1 for error in errors):
+        raise ValueError(f"ladder: got {ladder!r}; expected {', '.join(LADDERS)} or errors between 0 and 1")
+    return errors
+
+
+def layer_digits(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
     """Binary digits by which the step of each layer is coarser than that of the last, descending to 0.
 
-    ladder: largest errors over the diagonal, None: DEFAULT_LADDER; those close to the bound, or to each other, make no
-    layer of their own.
+    ladder: largest errors over the diagonal, descending; those close to the bound, or to each other, make no layer of
+    their own.
     """
     digits: list[int] = []
-    for error in sorted(DEFAULT_LADDER if ladder is None else ladder, reverse=True):
+    for error in ladder:
         ratio = error * diagonal / bound
         coarser = int(np.ceil(np.log2(ratio))) if ratio > 1 else 0
         if 2**coarser >= LEAST_RATIO and (not digits or digits[-1] - coarser >= 2):
