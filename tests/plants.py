@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from athcodec import MotionClip
 from athcodec.clip import source_stem_index
+from athcodec.encoding.quantise import least_bound
 
 
 def random_hierarchy(rng: np.random.Generator, branches: int, longest: int, roots: int = 1):
@@ -239,3 +240,14 @@ def awkward_plants(draw, **fixed):
         dtype=draw(st.sampled_from([np.float32, np.float64])),
     )
     return awkward(**drawn | fixed)
+
+
+def diagonal(clip: MotionClip) -> float:
+    return float(np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0)))
+
+
+def bound_for(clip: MotionClip, fraction: float) -> float:
+    """A fraction of the diagonal, but something that the source's numbers and 30-bit steps can express."""
+    low, high = clip.positions.min(axis=(0, 1)), clip.positions.max(axis=(0, 1))
+    away = float(np.abs(clip.positions - clip.rest).max())
+    return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype), 1e-6 * away)

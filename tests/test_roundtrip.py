@@ -9,31 +9,19 @@ import pytest
 from files import opened, still_file
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bush, chain_plant, clip_of, plant, tube
+from plants import MOTIONS, SHAPES, STEADY, awkward, awkward_plants, bound_for, bush, chain_plant, clip_of, plant, tube
 
 import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec import container as ct
 from athcodec.encoding import streams
 from athcodec.encoding.job import time_chunk
-from athcodec.encoding.quantise import least_bound
 from athcodec.hierarchy import derived_edges, hierarchy_of
 
 
 def largest_error(decoded: np.ndarray, clip: MotionClip) -> float:
     source = clip.block(0, clip.frame_count).astype(np.float64)
     return float(np.linalg.norm(decoded.astype(np.float64) - source, axis=2).max())
-
-
-def diagonal(clip: MotionClip) -> float:
-    return float(np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0)))
-
-
-def bound_for(clip: MotionClip, fraction: float) -> float:
-    """A fraction of the diagonal, but something that the source's numbers and 30-bit steps can express."""
-    low, high = clip.positions.min(axis=(0, 1)), clip.positions.max(axis=(0, 1))
-    away = float(np.abs(clip.positions - clip.rest).max())
-    return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype), 1e-6 * away)
 
 
 def assert_comes_back(clip: MotionClip, folder, fraction: float = 1e-3, **options) -> None:

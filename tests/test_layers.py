@@ -1,0 +1,184 @@
+"""Files with layers of precision: every level within what its table says, prefixes that cost little, the bound kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plants import STEADY, awkward_plants, bound_for, plant
+
+import athcodec
+from athcodec.encoding import encoder
+from athcodec.encoding.layers import layer_digits
+from athcodec.errors import LevelUnavailable
+
+LADDER = (1e-1, 1e-2, 1e-3)
+ROUNDING = 1e-6  # the error table holds float32
+
+
+@pytest.fixture(scope="module")
+def sample_files(tmp_path_factory):
+    """(summary without, with layers) of the sample at the default bound."""
+    folder = tmp_path_factory.mktemp("layers")
+    clip = athcodec.read_hdf5(athcodec.sample_path())
+    return [
+        athcodec.encode(clip, folder / f"{ladder}.ath", ladder=ladder, attributes="none", effort="fast")
+        for ladder in ("none", "decades")
+    ]
+
+
+@pytest.fixture(scope="module")
+def layered(bushy_clip, tmp_path_factory):
+    """The bushy clip in four segments and layers."""
+    path = tmp_path_factory.mktemp("layered") / "bushy.ath"
+    athcodec.encode(bushy_clip, path, rel_error=1e-5, segment_frames=16, ladder=LADDER)
+    return path
+
+
+def check_levels(clip, path, name: str | None = None) -> None:
+    """Every level has the errors of the table, the last one those of the bound."""
+    source = clip.block(0, clip.frame_count).astype(np.float64)
+    with athcodec.open(path, strict=True) as decoder:
+        played = decoder.play(name) if name else decoder
+        for level in played.levels:
+            errors = np.linalg.norm(played.positions(level=level.level).astype(np.float64) - source, axis=2)
+            assert errors.max() <= level.max_error * (1 + ROUNDING)
+            assert np.sqrt(np.mean(errors**2)) <= level.rms_error * (1 + ROUNDING)
+        assert errors.max() <= decoder.max_error_bound
+
+
+# ---- what a ladder is ----
+
+
+def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
+    assert layer_digits((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [7, 4, 0]
+    assert layer_digits((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [5, 0]
+    assert layer_digits((1e-2, 9e-3), 1e-4, 1.0) == [7, 0]
+    assert layer_digits((), 1e-4, 1.0) == layer_digits((1e-4, 1e-5), 1e-4, 1.0) == [0]
+
+
+@pytest.mark.parametrize("ladder", ["", "some", "1e-2,", (0.0,), (1e-2, 1.0), ("nan",), (None,), 1e-2])
+def test_what_is_no_ladder_is_refused(ladder, bushy_clip, tmp_path):
+    with pytest.raises(ValueError, match=r"ladder: got .*; expected none, decades or errors between 0 and 1"):
+        athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder)
+
+
+def test_errors_may_be_given_in_any_order_and_as_text(bushy_clip, tmp_path):
+    files = [
+        athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, effort="fast").path.read_bytes()
+        for ladder in ((1e-3, 1e-2), "1e-2,0.001")
+    ]
+    assert files[0] == files[1]
+
+
+# ---- what it gives ----
+
+
+def test_prefixes_of_a_file_with_layers_are_a_fraction_and_the_whole_little_more(sample_files):
+    alone, layers = sample_files
+    assert layers.bytes < 1.06 * alone.bytes
+    with athcodec.open(alone.path) as one, athcodec.open(layers.path) as several:
+        assert several.level_count == one.level_count + 2
+        least, first = several.levels[0], several.levels[one.level_count - 1]
+        assert least.bytes < 0.6 * one.levels[0].bytes
+        assert first.bytes < 0.2 * one.levels[-1].bytes
+        assert first.max_error < 2e-2 * alone.max_error_bound / alone.relative_bound
+
+
+def test_all_vertices_move_finer_with_each_layer(layered):
+    with athcodec.open(layered) as decoder:
+        largest = [level.max_error for level in decoder.levels[-3:]]
+    assert largest[0] > 3 * largest[1] > 9 * largest[2] > 0
+
+
+def test_levels_have_the_errors_of_the_table(bushy_clip, layered):
+    check_levels(bushy_clip, layered)
+
+
+def test_layers_play_alike_whatever_was_played_before(layered):
+    with athcodec.open(layered) as decoder:
+        last = decoder.level_count - 1
+        down = {level: decoder.positions(20, level) for level in range(last, -1, -1)}
+        up = {level: decoder.positions(20, level) for level in range(last + 1)}
+        assert all((down[level] == up[level]).all() for level in up)
+    for level in (last, last - 1):
+        with athcodec.open(layered) as decoder:
+            assert (decoder.positions(20, level) == up[level]).all()
+
+
+def test_a_file_cut_after_a_layer_plays_that_layer(layered, tmp_path):
+    with athcodec.open(layered) as decoder:
+        for level in range(decoder.level_count):
+            athcodec.truncate(layered, tmp_path / "cut.ath", level)
+            with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
+                assert cut.level_count == level + 1
+                assert (cut.positions() == decoder.positions(level=level)).all()
+
+
+def test_three_steps_of_encoding_make_the_same_file(bushy_clip, layered, tmp_path):
+    draft = encoder.draft(bushy_clip, rel_error=1e-5, segment_frames=16, ladder=LADDER)
+    coded = list(encoder.code_segments(bushy_clip, draft, range(draft.segment_count)))
+    encoder.write(bushy_clip, draft, coded, tmp_path / "steps.ath")
+    assert (tmp_path / "steps.ath").read_bytes() == layered.read_bytes()
+
+
+@pytest.mark.parametrize("options", [{"lossless": True}, {"exact_rest": True}, {"effort": "best"}, {"weights": "all"}])
+def test_layers_go_with_every_option(options, tmp_path):
+    clip = plant(seed=3, branches=6, longest=6, frames=40)
+    if "weights" in options:
+        options = {"weights": np.linspace(1, 3, clip.vertex_count)}
+    path = athcodec.encode(clip, tmp_path / "a.ath", **{"effort": "fast", "ladder": LADDER} | options).path
+    check_levels(clip, path)
+    if "lossless" in options:
+        with athcodec.open(path) as decoder:
+            assert decoder.positions().tobytes() == clip.block(0, clip.frame_count).tobytes()
+
+
+def test_several_clips_share_the_layers_of_their_rest_pose(medley_clips, tmp_path):
+    path = tmp_path / "medley.ath"
+    athcodec.encode(athcodec.join(medley_clips), path, rel_error=1e-4, segment_frames=16, ladder="decades")
+    for name, clip in medley_clips.items():
+        check_levels(clip, path, name)
+
+
+@settings(STEADY, max_examples=25)
+@given(clip=awkward_plants(), fraction=st.sampled_from([1e-3, 1e-5, 1e-6]))
+def test_awkward_plants_keep_their_bound(clip, fraction, scratch):
+    bound = bound_for(clip, fraction)
+    athcodec.encode(clip, scratch / "a.ath", max_error=bound, segment_frames=16, effort="fast", ladder=LADDER)
+    check_levels(clip, scratch / "a.ath")
+
+
+# ---- which level to keep ----
+
+
+def test_truncate_keeps_the_first_level_within_an_error(layered, tmp_path):
+    with athcodec.open(layered) as decoder:
+        levels = decoder.levels
+    for level in levels:
+        athcodec.truncate(layered, tmp_path / "cut.ath", max_error=level.max_error)
+        with athcodec.open(tmp_path / "cut.ath") as cut:
+            kept = cut.level_count - 1
+        assert levels[kept].max_error <= level.max_error
+        assert all(before.max_error > level.max_error for before in levels[:kept])
+
+
+def test_truncate_keeps_as_many_levels_as_fit(layered, tmp_path):
+    sizes = [athcodec.truncate(layered, tmp_path / "cut.ath", level) for level in range(6)]
+    for size in sizes:
+        assert athcodec.truncate(layered, tmp_path / "cut.ath", target_size=size) == size
+    assert athcodec.truncate(layered, tmp_path / "cut.ath", target_size=sizes[3] - 1) == sizes[2]
+
+
+@pytest.mark.parametrize("option", [{"max_error": 1e-9}, {"target_size": 10}])
+def test_what_no_level_has_is_refused(option, layered, tmp_path):
+    with pytest.raises(LevelUnavailable, match="expected at least"):
+        athcodec.truncate(layered, tmp_path / "cut.ath", **option)
+    assert not (tmp_path / "cut.ath").exists()
+
+
+@pytest.mark.parametrize("options", [{}, {"level": 1, "max_error": 1.0}])
+def test_truncate_takes_one_of_its_options(options, layered, tmp_path):
+    with pytest.raises(TypeError, match="expected one of level, max_error and target_size"):
+        athcodec.truncate(layered, tmp_path / "cut.ath", **options)
