@@ -82,9 +82,10 @@ static void open_and_build(opened *clip)
     double middle = now_ms();
     clip->build_bytes = ath_build_size(clip->file);
     expect_ok("ath_build", ath_build(clip->file, memory_of(clip->build_bytes), clip->build_bytes));
+    ath_get_info(clip->file, &clip->info);
+    clip->build_bytes += refine(clip->file, clip->info.level_count - 1);
     clip->build_ms = now_ms() - middle;
     clip->open_ms = middle - start;
-    ath_get_info(clip->file, &clip->info);
     clip->work_bytes = ath_work_size(clip->file);
     clip->work = memory_of(clip->work_bytes);
 }

@@ -25,13 +25,14 @@ static const double HASTE = 1.25; /* preparations go on so much faster than they
  * itself and all of its segments; clips that share a file would share `file` and have some each. */
 typedef struct {
     uint8_t *bytes;
-    size_t size, memory;
+    size_t size, memory; /* memory: of the file and what its segments share */
     ath_file *file;
     ath_info info;
     int32_t frame, segment; /* that play: the later one of those that are blended */
     int32_t shortest;       /* frames of the shortest segment */
     long number;            /* of the segment that plays, counted on from loop to loop */
     double ahead, loop;     /* seconds that the clip is ahead of the clock; of one round */
+    int32_t refined;        /* the deepest level whose layers of precision are built */
     int used[LEVELS];
     ath_segment *slots[LEVELS][SLOTS];
 } clip;
@@ -124,8 +125,8 @@ static void open_clip(const char *path, clip *clip)
     }
 }
 
-/* Feeds what a segment lacks for a level; how many bytes that are. */
-static double feed(const clip *clip, int32_t segment, int32_t level)
+/* Feeds what a segment lacks for a level, and builds what the level's segments share; how many bytes were lacking. */
+static double feed(clip *clip, int32_t segment, int32_t level)
 {
     int32_t count = ath_ranges(clip->file, level, segment, segment, 0, 0, 0);
     ath_range *ranges = (ath_range *)memory_of((size_t)count * sizeof *ranges);
@@ -136,6 +137,10 @@ static double feed(const clip *clip, int32_t segment, int32_t level)
         bytes += (double)ranges[i].size;
     }
     free(ranges);
+    if (level > clip->refined) {
+        clip->memory += refine(clip->file, level);
+        clip->refined = level;
+    }
     return bytes;
 }
 
@@ -329,7 +334,6 @@ static size_t plan_slots(forest *forest)
 {
     size_t bytes = 0;
     for (clip *clip = forest->clips; clip < forest->clips + forest->clip_count; clip++) {
-        bytes += clip->memory;
         if (ath_work_size(clip->file) > forest->work_bytes) forest->work_bytes = ath_work_size(clip->file);
         for (int32_t level = 0; level < clip->info.level_count; level++)
             for (int slot = 0; clip->used[level] && slot < SLOTS && slot < clip->info.segment_count; slot++) {
@@ -475,7 +479,10 @@ static void play(const char *scene, double seconds, double rate)
     size_t bytes = plan_slots(&forest);
     int pictures = (int)ceil(seconds * rate);
     double *whole = (double *)memory_of((size_t)pictures * sizeof(double)), start = now_ms();
-    for (int32_t c = 0; c < forest.clip_count; c++) start_clip(&forest, forest.clips + c, 0.0);
+    for (int32_t c = 0; c < forest.clip_count; c++) {
+        start_clip(&forest, forest.clips + c, 0.0);
+        bytes += forest.clips[c].memory;
+    }
     put("{", "start_ms", now_ms() - start);
     put(", ", "start_bytes", forest.fed);
     set_pace(&forest, rate);

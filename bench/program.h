@@ -41,6 +41,16 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Builds what the layers of precision up to a level share; its bytes, which stay as long as the file. */
+static size_t refine(ath_file *file, int32_t level)
+{
+    size_t size;
+    ath_fault_info fault;
+    expect_no_fault("ath_refine_size", ath_refine_size(file, level, &size, &fault), &fault);
+    expect_ok("ath_refine", ath_refine(file, level, size > 0 ? memory_of(size) : NULL, size));
+    return size;
+}
+
 /* The value below which `share` of them lie; sorts them. */
 static double quantile(double *values, int count, double share)
 {

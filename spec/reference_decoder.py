@@ -92,14 +92,14 @@ def crc32c(data: bytes) -> int:
 # ---- the front: header, chunk table, error table -----------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 4)
+VERSION = (0, 5)
 HEADER_BYTES, ENTRY_BYTES, ERROR_BYTES = 64, 16, 8
-SEGMENT_FRAMES, MOST_LEVELS, NO_LEVEL = 256, 32, 255
+SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, NO_LEVEL = 256, 32, 8, 255
 
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES, CLIPS = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7
-STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT = 16, 17, 18, 19, 20
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
 ATTRIBUTE = OPTIONAL | 32
 KINDS = {
     HIERARCHY: "HIERARCHY",
@@ -114,6 +114,7 @@ KINDS = {
     CORRECTIONS: "CORRECTIONS",
     SHAPES: "SHAPES",
     EXACT: "EXACT",
+    REFINED_REST: "REFINED_REST",
     ATTRIBUTE: "ATTRIBUTE",
 }
 
@@ -132,6 +133,7 @@ class Header:
     clip_count: int
     is_float64: bool
     max_error: float
+    layer_count: int
 
     @property
     def error_table_at(self) -> int:
@@ -195,6 +197,7 @@ def read_header(data: bytes, limits: Limits) -> Header:
         data[46],
         bool(data[47] & 1),
         f64(data, 48),
+        data[56],
     )
     for name, count, most in (
         ("Vertex_Count", header.vertex_count, limits.vertices),
@@ -214,7 +217,8 @@ def read_header(data: bytes, limits: Limits) -> Header:
         ("Clip_Count", header.clip_count > 0),
         ("Flags", data[47] < 2),
         ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
-        ("Reserved", u64(data, 56) == 0),
+        ("Layer_Count", 1 <= header.layer_count <= MOST_LAYERS),
+        ("Reserved", u64(data, 56) >> 8 == 0),
     ):
         require(valid, f"{name} is out of range", "BAD_HEADER")
     return header
@@ -578,36 +582,89 @@ def measure_subtrees(branches: list[Branch]) -> None:
 # ---- rest pose ---------------------------------------------------------------------------------------------
 
 RUN_VERTICES = 32
+MOST_STEPS = 1073741823
 
 
-def decode_rest(stream: bytes, branches: list[Branch], step: float) -> list[list[float]]:
-    """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex."""
-    coder, rows = RangeDecoder(stream), CoefficientModel()
-    models = [NumberModel(), NumberModel()]  # from the third vertex of a stem on; its first two
+@dataclass
+class RestLayer:
+    """A rest pose, and the integers that its stream holds, three for each vertex; those of a run's modes stand
+    with its vertices: number i of the run's 3 n, axis by axis, at vertex i // 3 and place i % 3."""
+
+    rest: list[list[float]]
+    steps: list[list[int]]
+
+
+def decode_rest(stream: bytes, branches: list[Branch], step: float, before: RestLayer | None = None) -> RestLayer:
+    """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex; of a refinement,
+    about the rest pose of the layer before."""
+    coder, rows = RangeDecoder(stream), RefinementModel() if before else CoefficientModel()
+    models = [NumberModel() for _ in range(4)]
     mean = [[64, 64, 64], [64, 64, 64]]
-    rest = []
+    rest: list[list[float]] = []
+    all_steps: list[list[int]] = []
     for branch in branches:
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
             predicted = predict_rest(branch, rest, i)
-            start = 1 if i < 2 else 0
-            m, point = mean[start], []
+            m, steps = mean[1 if i < 2 else 0], []
             for k in range(3):
-                steps = code_signed(coder, models[start], (m[k] + (m[0] + m[1] + m[2])) // 4)
-                point.append(predicted[k] + float(steps) * step)
-                m[k] = m[k] - (m[k] + 7) // 8 + clipped(steps) * 2
-            rest.append(point)
+                about, model = 0, models[1 if i < 2 else 0]
+                if before:
+                    known, place = before.steps[len(rest)][k], before.rest[len(rest)][k]
+                    about = steps_in(place - predicted[k], step) if known != 0 else 0
+                    model = models[3 if known != 0 else 2]
+                difference = code_signed(coder, model, (m[k] + (m[0] + m[1] + m[2])) // 4)
+                steps.append(about + difference)
+                m[k] = m[k] - (m[k] + 7) // 8 + clipped(difference) * 2
+            rest.append([predicted[k] + float(steps[k]) * step for k in range(3)])
+            all_steps.append(steps)
         left = branch.count - single_vertices
         runs = (left + RUN_VERTICES - 1) // RUN_VERTICES
         for r in range(runs):
             n = left * (r + 1) // runs - left * r // runs
             base = rest[branch.attach] if len(rest) == branch.first else rest[-1]
-            row, _ = decode_row(coder, rows, RUN_VERTICES, n, 0)
             modes = cantilever((1,) * n, 100.0, 0.0)
+            if before:
+                row = decode_refined_run(coder, rows, modes, step, base, before, len(rest))
+            else:
+                row, _ = decode_row(coder, rows, RUN_VERTICES, n, 0)
             moved = [in_order(modes * np.array(row[k][:n], float)[:, None]) * step for k in range(3)]
             rest += [[base[k] + float(moved[k][i]) for k in range(3)] for i in range(n)]
+            numbers = [row[k][m] for k in range(3) for m in range(n)]
+            all_steps += [numbers[3 * i : 3 * i + 3] for i in range(n)]
     coder.finish()
-    return rest
+    return RestLayer(rest, all_steps)
+
+
+def steps_in(value: float, step: float) -> int:
+    """The nearest number of steps."""
+    units = float(np.divide(value, step))
+    if not units > -MOST_STEPS:
+        return -MOST_STEPS
+    if not units < MOST_STEPS:
+        return MOST_STEPS
+    return -int(0.5 - units) if units < 0.0 else int(0.5 + units)
+
+
+def decode_refined_run(
+    coder: RangeDecoder,
+    model: RefinementModel,
+    modes: np.ndarray,
+    step: float,
+    base: list[float],
+    before: RestLayer,
+    first: int,
+) -> list[list[int]]:
+    """The row of a run whose vertices, from `first` on, the layer before has placed."""
+    n = len(modes)
+    run = np.array(before.rest[first : first + n]) - np.array(base)
+    numbers = [number for steps in before.steps[first : first + n] for number in steps]
+    predicted, coarse = zero_row(RUN_VERTICES), zero_row(RUN_VERTICES)
+    for k in range(3):
+        sums = in_order((modes * run[:, k]).T)
+        coarse[k][:n] = numbers[k * n : k * n + n]
+        predicted[k][:n] = [steps_in(total, step) if known != 0 else 0 for total, known in zip(sums, coarse[k])]
+    return decode_refined_row(coder, model, n, 0, predicted, magnitudes(coarse)).row
 
 
 def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
@@ -787,34 +844,141 @@ def at_frequency(axis: list[int], k: int) -> int:
     return clipped(axis[k]) if 0 <= k < len(axis) else 0
 
 
+def common_magnitude(row: list[list[int]], above, k: int) -> int:
+    """What is near in frequency on all axes, and in the row above."""
+    before = over = 0
+    for axis in row:
+        before += 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2)
+    for axis in above or ():
+        over += 2 * at_frequency(axis, k) + at_frequency(axis, k - 1) + at_frequency(axis, k + 1)
+    return before * 2 + over
+
+
+def expected_magnitude(row: list[list[int]], common: int, history: int, axis: int, k: int) -> int:
+    """How large a number is expected to be, in 1/16: by that, the axis itself, those before it, and rows of the
+    same slot."""
+    own = row[axis]
+    near = 2 * at_frequency(own, k - 1) + at_frequency(own, k - 2) + at_frequency(own, k - 3)
+    beside = sum(clipped(row[a][k]) for a in range(axis))
+    around = history if axis == 0 else (beside * 16 // axis + history) // 2
+    return (near * 16 + common + around * 8) // 16
+
+
+def remember(history: list[int], row: list[list[int]]) -> None:
+    """Adds a row to the magnitudes of its slot."""
+    for k in range(len(row[0])):
+        total = clipped(row[0][k]) + clipped(row[1][k]) + clipped(row[2][k])
+        history[k] = history[k] - (history[k] + 3) // 4 + total * 4 // 3
+
+
+def zero_row(frames: int) -> list[list[int]]:
+    return [[0] * frames for _ in range(3)]
+
+
 def decode_row(
     coder: RangeDecoder, model: CoefficientModel, frames: int, rank: int, slot: int, above=None, above_count: int = 0
 ):
-    """Three axes of `frames` integers over frequency, and how many frequencies were coded.
-
-    What is near in frequency, on the other axes, in the row above and in rows of the same slot tells how
-    large a number is expected to be.
-    """
+    """Three axes of `frames` integers over frequency, and how many frequencies were coded."""
     history = model.history[slot]
     count = decode_count(coder, model, model.history_count[slot], above_count, rank)
-    row = [[0] * frames for _ in range(3)]
+    row = zero_row(frames)
     for k in range(count):
-        before = over = beside = 0
-        for axis in row:
-            before += 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2)
-        for axis in above or ():
-            over += 2 * at_frequency(axis, k) + at_frequency(axis, k - 1) + at_frequency(axis, k + 1)
-        for a, axis in enumerate(row):
-            near = 2 * at_frequency(axis, k - 1) + at_frequency(axis, k - 2) + at_frequency(axis, k - 3)
-            around = history[k] if a == 0 else (beside * 16 // a + history[k]) // 2
-            expected = (near * 16 + before * 2 + over + around * 8) // 16
-            axis[k] = code_signed(coder, model.number, expected)
-            beside += clipped(axis[k])
+        common = common_magnitude(row, above, k)
+        for axis in range(3):
+            expected = expected_magnitude(row, common, history[k], axis, k)
+            row[axis][k] = code_signed(coder, model.number, expected)
     model.history_count[slot] = count
-    for k in range(frames):
-        total = clipped(row[0][k]) + clipped(row[1][k]) + clipped(row[2][k])
-        history[k] = history[k] - (history[k] + 3) // 4 + total * 4 // 3
+    remember(history, row)
     return row, count
+
+
+# ---- refined rows ------------------------------------------------------------------------------------------
+
+
+class RefinementModel:
+    def __init__(self):
+        self.differences = CoefficientModel()  # counts, and magnitudes of the differences
+        self.history = [[0] * SEGMENT_FRAMES for _ in range(SLOTS)]  # of the integers
+        self.numbers = [[NumberModel() for _ in range(3)] for _ in range(4)]
+        self.sign = [Context(32768) for _ in range(3)]
+
+
+@dataclass
+class RefinedRow:
+    row: list[list[int]]
+    differences: list[list[int]]  # from the prediction
+    coded: list[list[int]]  # the row's integers, but 0 from `count` on
+    count: int  # frequencies of which differences are coded
+
+
+def magnitudes(coarse: list[list[int]]) -> list[list[int]]:
+    return [[clipped(number) for number in axis] for axis in coarse]
+
+
+def loudness(steps: list[list[int]], below, axis: int, k: int) -> int:
+    """How large the integers of the layer before are around one that is 0, where no neighbour that is decoded says
+    so: behind it in frequency, on the axes after it, and in the row below."""
+    loud = 4 * at_frequency(steps[axis], k + 1) + 2 * at_frequency(steps[axis], k + 2)
+    for other in range(3):
+        loud += at_frequency(steps[other], k + 1)
+        loud += at_frequency(steps[other], k) if other > axis else 0
+    if below is not None:
+        loud += 2 * sum(at_frequency(below[other], k) for other in range(3)) + at_frequency(below[axis], k + 1)
+    return loud
+
+
+def decode_refined_row(
+    coder: RangeDecoder,
+    model: RefinementModel,
+    rank: int,
+    slot: int,
+    predicted: list[list[int]],
+    steps: list[list[int]],
+    below=None,
+    above: RefinedRow | None = None,
+) -> RefinedRow:
+    """Integers that are known about. `steps`: magnitudes of the row in steps of the layer before, `below`: those of
+    the row that follows."""
+    frames, history, own_history = len(predicted[0]), model.differences.history[slot], model.history[slot]
+    count = decode_count(
+        coder, model.differences, model.differences.history_count[slot], above.count if above else 0, rank
+    )
+    differences, coded = zero_row(frames), zero_row(frames)
+    for k in range(count):
+        common = common_magnitude(differences, above and above.differences, k)
+        own_common = common_magnitude(coded, above and above.coded, k)
+        for axis in range(3):
+            of_differences = expected_magnitude(differences, common, history[k], axis, k)
+            of_integers = expected_magnitude(coded, own_common, own_history[k], axis, k)
+            size = steps[axis][k]
+            if size == 0:
+                loud = loudness(steps, below, axis, k)
+                expected, around = of_integers + 2 * loud, 0 if loud == 0 else 1 if loud < 3 else 2
+            else:
+                expected, around = of_differences, 0 if of_integers < 12 * size else 1 if of_integers < 40 * size else 2
+            difference = decode_difference(
+                coder, model, model.numbers[min(size, 3)][around], expected, predicted[axis][k]
+            )
+            differences[axis][k] = difference
+            coded[axis][k] = predicted[axis][k] + difference
+    model.differences.history_count[slot] = count
+    remember(history, differences)
+    remember(own_history, coded)
+    row = [coded[axis][:count] + predicted[axis][count:] for axis in range(3)]
+    return RefinedRow(row, differences, coded, count)
+
+
+def decode_difference(
+    coder: RangeDecoder, model: RefinementModel, number: NumberModel, expected: int, predicted: int
+) -> int:
+    magnitude = code_unsigned(coder, number, expected)
+    if magnitude == 0:
+        return 0
+    if predicted == 0:
+        negative = coder.raw_bit()
+    else:  # the bit: against the sign of the prediction
+        negative = (predicted < 0) ^ coder.bit(model.sign[0 if magnitude == 1 else 1 if magnitude < 4 else 2])
+    return -magnitude if negative else magnitude
 
 
 # ---- plan: what all segments share -------------------------------------------------------------------------
@@ -935,6 +1099,11 @@ class Plan:
     def has_affines(self, level: int, shown: int) -> bool:
         """Whether playing `shown` needs the maps of `level`."""
         return any(node.coded and node.level == level and shown <= node.last for node in self.nodes)
+
+    def refine(self, level: int) -> None:
+        """Makes it that of a refinement: all pieces come with its level."""
+        for piece in self.pieces:
+            piece.level, piece.low_level, piece.low_modes = level, -1, 0
 
     # From here on the rest pose is needed.
 
@@ -1178,6 +1347,7 @@ class LevelStream:
     step: float
     rotation_step_factor: float
     waves: np.ndarray  # (rank, frames)
+    learned: bool  # else they are cosines
 
 
 @dataclass
@@ -1188,6 +1358,7 @@ class Motion:
     cosines: np.ndarray
     streams: dict[int, LevelStream] = field(default_factory=dict)  # by level
     shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
+    shape_rows: dict[int, list] = field(default_factory=dict)  # by piece: their integers
     coefficients: dict[int, list] = field(default_factory=dict)  # by piece.first + mode
     shift: dict[int, list] = field(default_factory=dict)  # by piece
     rotation: dict[int, list] = field(default_factory=dict)  # by piece
@@ -1205,9 +1376,9 @@ def decode_shapes(stream: bytes, plan: Plan, motion: Motion, level: int) -> None
     for piece in plan.pieces:
         if level not in (piece.base_level, piece.level):
             continue
-        own, most, part = motion.shapes_of(piece), plan.base_shapes(piece), 0
+        rows, most, part = motion.shape_rows.get(piece.number, []), plan.base_shapes(piece), 0
         if level != piece.base_level:
-            if len(own) < most:
+            if len(rows) < most:
                 continue
             part, most = 1, 3 * plan.shape_modes(piece) - most
         before[part] = count = code_unsigned(coder, counts, before[part] * 16)
@@ -1215,13 +1386,44 @@ def decode_shapes(stream: bytes, plan: Plan, motion: Motion, level: int) -> None
         above, above_count = None, 0
         for _ in range(count):
             above, above_count = decode_row(
-                coder, model, SHAPE_MODES, plan.shape_modes(piece), len(own), above, above_count
+                coder, model, SHAPE_MODES, plan.shape_modes(piece), len(rows), above, above_count
             )
-            numbers = np.array(above, float).T.ravel()  # axis a of mode m at 3 m + a
-            length2 = in_order(numbers * numbers)
-            require(length2 > 0.0, "a shape is all 0")
-            own = [*own, (numbers * (1.0 / np.sqrt(length2))).reshape(SHAPE_MODES, 3)]
-        motion.shapes[piece.number] = own
+            rows = [*rows, above]
+        set_shapes(motion, piece, rows)
+    coder.finish()
+
+
+def set_shapes(motion: Motion, piece: Piece, rows: list) -> None:
+    motion.shape_rows[piece.number] = rows
+    motion.shapes[piece.number] = [unit_shape(row) for row in rows]
+
+
+def unit_shape(row: list[list[int]]) -> np.ndarray:
+    """(16, 3) of unit length."""
+    numbers = np.array(row, float).T.ravel()  # axis a of mode m at 3 m + a
+    length2 = in_order(numbers * numbers)
+    require(length2 > 0.0, "a shape is all 0")
+    return (numbers * (1.0 / np.sqrt(length2))).reshape(SHAPE_MODES, 3)
+
+
+def decode_refined_shapes(chunk: bytes, plan: Plan, motion: Motion, before: Motion) -> None:
+    """All shapes of a refinement, about those of the layer before."""
+    require(len(chunk) >= 1 and chunk[0] <= 15, "Shift of SHAPES is out of range")
+    coder, model, counts, shift = RangeDecoder(chunk[1:]), RefinementModel(), NumberModel(), chunk[0]
+    most = 0x3FFFFFFF >> shift
+    for piece in plan.pieces:
+        known = before.shape_rows.get(piece.number, [])
+        count = code_unsigned(coder, counts, len(known) * 16)
+        require(count <= 3 * plan.shape_modes(piece), "a piece has more shapes than modes and axes")
+        above, rows = None, []
+        for s in range(count):
+            coarse = known[s] if s < len(known) else zero_row(SHAPE_MODES)
+            predicted = [[min(max(number, -most), most) << shift for number in axis] for axis in coarse]
+            above = decode_refined_row(
+                coder, model, plan.shape_modes(piece), s, predicted, magnitudes(coarse), None, above
+            )
+            rows.append(above.row)
+        set_shapes(motion, piece, rows)
     coder.finish()
 
 
@@ -1239,7 +1441,7 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
         require(len(body) >= 4 and u32(body, 0) <= len(body) - 4, "Basis_Length is more than the chunk holds")
         stream, body = body[4 : 4 + u32(body, 0)], body[4 + u32(body, 0) :]
         waves = np.array(decode_temporal(stream, rank, motion.frames, bits), float) * 2.0 ** -(bits - 1)
-    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves)
+    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves, learned=bits > 0)
     return body
 
 
@@ -1366,6 +1568,8 @@ def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) 
 # Vectors over time have the shape (3, frames), matrices (3, 3, frames); vertices come first: (count, 3,
 # frames).
 
+MOST_PREDICTED = 536870911
+
 
 def mat_vec(R: np.ndarray, x: np.ndarray) -> np.ndarray:
     """R x of one vector or of many."""
@@ -1428,16 +1632,18 @@ def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
 
 
 class Pose:
-    """All vertices of one segment at one level, placed piece by piece and node by node."""
+    """All vertices of one segment, placed piece by piece and node by node."""
 
-    def __init__(self, plan: Plan, motion: Motion, level: int):
+    def __init__(self, plan: Plan, motion: Motion):
         self.plan, self.motion, self.frames = plan, motion, motion.frames
         self.placed = np.empty((len(plan.rest), 3, motion.frames))
         self.kept: dict[int, tuple] = {}  # (c, R) of the pieces placed
-        for piece in plan.pieces:
+
+    def place_level(self, level: int) -> None:
+        for piece in self.plan.pieces:
             if piece.level <= level:
                 self.place_piece(piece)
-        for node in plan.nodes:
+        for node in self.plan.nodes:
             if node.level <= level <= node.last:
                 self.place_node(node)
 
@@ -1462,15 +1668,27 @@ class Pose:
         tangent = tangent * (1.0 / np.sqrt(length2))
         return c, follow_tangent(R, tangent[:, None], end - start)
 
+    def base_stream(self, piece: Piece) -> LevelStream:
+        return self.motion.streams[piece.base_level]
+
+    def shift_track(self, piece: Piece) -> np.ndarray:
+        """(3, frames); 0.0 where none is coded."""
+        stream = self.base_stream(piece)
+        return over_time(self.motion.shift.get(piece.number), shift_step(piece, stream), stream.waves)
+
+    def rotation_track(self, piece: Piece) -> np.ndarray:
+        """(3, frames); 0.0 where none is coded."""
+        stream = self.base_stream(piece)
+        step = rotation_step(self.plan, piece, stream)
+        return over_time(self.motion.rotation.get(piece.number), step, stream.waves)
+
     def turned_frames(self, piece: Piece):
         """The attach frame, moved and turned by the piece's own tracks."""
-        stream = self.motion.streams[piece.base_level]
         c, R = self.attach_frame(piece)
         if piece.has_shift:
-            c = c + over_time(self.motion.shift.get(piece.number), shift_step(piece, stream), stream.waves)
-        step = rotation_step(self.plan, piece, stream)
-        if step > 0.0:
-            x, y, z = 0.25 * over_time(self.motion.rotation.get(piece.number), step, stream.waves)
+            c = c + self.shift_track(piece)
+        if rotation_step(self.plan, piece, self.base_stream(piece)) > 0.0:
+            x, y, z = 0.25 * self.rotation_track(piece)
             R = mat_mul(R, rotation(x, y, z))
         return c, R
 
@@ -1596,6 +1814,143 @@ class Pose:
     def map_of_shape(self, node: Node, piece: Piece, shape: np.ndarray) -> np.ndarray:
         modes = self.plan.basis(piece)[: self.plan.shape_modes(piece)]
         return in_order(np.array([shape[m][:, None] * self.affine_part(node, mode) for m, mode in enumerate(modes)]))
+
+
+def row_extent(row) -> int:
+    """The frequencies up to which a row is not all 0; None: no row."""
+    return max((k + 1 for axis in row or () for k, number in enumerate(axis) if number != 0), default=0)
+
+
+def predict_row(
+    stream: LevelStream, frequencies: int, step: float, ratio: int, track: np.ndarray, coarse
+) -> list[list[int]]:
+    """Integers that a track, (3, frames), would have. None for `coarse`: not known; else predicted is what is not 0
+    there."""
+    frames = track.shape[1]
+    count, least = min(frequencies, len(stream.waves)), 0.5 * ratio if coarse is None else 0.5
+    units = in_order(stream.waves[:count].T[:, :, None] * track.T[:, None, :]) / step  # (count, 3)
+    row = zero_row(frames)
+    for k in range(count):
+        for axis in range(3):
+            size = abs(float(units[k, axis]))
+            if size >= least and (coarse is None or coarse[axis][k] != 0):
+                nearest = MOST_PREDICTED if size >= MOST_PREDICTED else int(size + 0.5)
+                row[axis][k] = -nearest if units[k, axis] < 0.0 else nearest
+    return row
+
+
+class Refinement(Pose):
+    """All vertices of one segment in a layer that refines another. What a piece's rows are about is known once the
+    pieces that it hangs on are placed: decoding and placing take turns."""
+
+    def __init__(self, plan: Plan, motion: Motion, before: Pose):
+        super().__init__(plan, motion)
+        self.before = before
+
+    def decode_stems(self, chunk: bytes, level: int) -> None:
+        require(len(chunk) >= 2 and u16(chunk, 0) >= 1, "Ratio of STEMS is 0")
+        self.ratio = u16(chunk, 0)
+        self.coder = RangeDecoder(read_stems_head(chunk[2:], self.motion, level))
+        self.model, self.stream = RefinementModel(), self.motion.streams[level]
+        for piece in self.plan.pieces:
+            self.decode_piece(piece)
+            self.place_piece(piece)
+        self.coder.finish()
+
+    def decode_piece(self, piece: Piece) -> None:
+        n, before, motion = piece.number, self.before, self.before.motion
+        coarse_piece = before.plan.pieces[n]
+        modes = range(len(before.plan.basis(coarse_piece)))
+        rows = {m: motion.coefficients.get(piece.first + m) or zero_row(self.frames) for m in range(piece.count)}
+        reach = [row_extent(rows[m]) for m in modes]
+        frequencies = max(row_extent(motion.shift.get(n)), row_extent(motion.rotation.get(n)), *reach)
+        streams = [self.stream, before.base_stream(coarse_piece), *(before.mode_stream(coarse_piece, m) for m in modes)]
+        cosines = not any(stream.learned for stream in streams)
+        if frequencies > 0 and not cosines:
+            frequencies = self.frames
+        self.decode_tracks(piece, frequencies, cosines)
+        known = max((m + 1 for m in modes if reach[m] > 0), default=0)
+        if known > 0 and motion.shapes_of(piece):
+            known = max(known, before.plan.shape_modes(coarse_piece))
+        alike = bool(motion.shapes_of(piece)) == bool(self.motion.shapes_of(piece))
+        self.decode_modes(
+            piece, frequencies, min(known, len(self.plan.basis(piece))), rows if cosines and alike else None
+        )
+
+    def magnitudes(self, predicted, coarse):
+        """In steps of the layer before."""
+        if coarse is not None:
+            return magnitudes(coarse)
+        return [[clipped((abs(number) + self.ratio // 2) // self.ratio) for number in axis] for axis in predicted]
+
+    def decode_tracks(self, piece: Piece, frequencies: int, cosines: bool) -> None:
+        before, n = self.before, piece.number
+        coarse_piece = before.plan.pieces[n]
+        if piece.has_shift:
+            self.motion.shift[n] = self.decode_track(
+                SHIFT_SLOT,
+                frequencies,
+                shift_step(piece, self.stream),
+                before.shift_track(coarse_piece),
+                before.motion.shift.get(n),
+                cosines,
+            )
+        step = rotation_step(self.plan, piece, self.stream)
+        if step > 0.0:
+            self.motion.rotation[n] = self.decode_track(
+                ROTATION_SLOT,
+                frequencies,
+                step,
+                before.rotation_track(coarse_piece),
+                before.motion.rotation.get(n),
+                cosines,
+            )
+
+    def decode_track(self, slot: int, frequencies: int, step: float, track: np.ndarray, row, cosines: bool):
+        coarse = (row or zero_row(self.frames)) if cosines else None
+        predicted = predict_row(self.stream, frequencies, step, self.ratio, track, coarse)
+        return decode_refined_row(
+            self.coder, self.model, len(self.stream.waves), slot, predicted, self.magnitudes(predicted, coarse)
+        ).row
+
+    def decode_modes(self, piece: Piece, frequencies: int, known: int, coarse) -> None:
+        """Rows of modes and shapes; `known`: modes that the layer before has, `coarse`: its rows, or None."""
+        shapes, rank = self.motion.shapes_of(piece), len(self.plan.basis(piece))
+        predicted = self.predict_modes(piece, frequencies, known, coarse)
+        steps = [self.magnitudes(predicted[m], coarse and coarse[m]) for m in range(rank)]
+        above = None
+        for m in range(rank):
+            if shapes and len(shapes) <= 3 * m < 3 * self.plan.shape_modes(piece):
+                continue
+            below = steps[m + 1] if m + 1 < rank else None
+            above = decode_refined_row(
+                self.coder, self.model, len(self.stream.waves), m, predicted[m], steps[m], below, above
+            )
+            self.motion.coefficients[piece.first + m] = above.row
+
+    def predict_modes(self, piece: Piece, frequencies: int, known: int, coarse) -> list:
+        """A row for each mode, from the vertices of the layer before, seen from the attach frame."""
+        plan, basis, shapes = self.plan, self.plan.basis(piece), self.motion.shapes_of(piece)
+        predicted = [zero_row(self.frames) for _ in basis]
+        if known == 0:
+            return predicted
+        if shapes:
+            known = max(known, plan.shape_modes(piece))
+        c, R = self.turned_frames(piece)
+        local = mat_vec(R.transpose(1, 0, 2), self.before.placed[piece.vertices] - c)
+        local = local - plan.from_attach(piece)[:, :, None]
+        tracks = np.array([in_order(mode[:, None, None] * local) for mode in basis[:known]])
+        for m in range(known):
+            track = tracks[m]
+            if shapes and m < plan.shape_modes(piece):
+                track = np.zeros((3, self.frames))
+                for axis, shape in enumerate(shapes[3 * m : 3 * m + 3]):
+                    weights = shape[: plan.shape_modes(piece)]
+                    track[axis] = in_order((weights[:, :, None] * tracks[: len(weights)]).reshape(-1, self.frames))
+            predicted[m] = predict_row(
+                self.stream, frequencies, self.row_step(piece, m), self.ratio, track, coarse and coarse[m]
+            )
+        return predicted
 
 
 def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -1857,8 +2212,8 @@ class AthFile:
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
         self.plan = Plan(self.branches)
         require(
-            self.header.full_level_count - self.plan.height in (2, 3),
-            "Full_Level_Count is not that of the hierarchy",
+            self.header.full_level_count in (self.lossy_levels, self.lossy_levels + 1),
+            "Full_Level_Count is not that of the hierarchy and its layers",
             "BAD_HEADER",
         )
 
@@ -1867,11 +2222,12 @@ class AthFile:
         plan, wanted, allowed = self.plan, set(), set()
         for level in range(self.header.level_count):
             for s in range(self.header.segment_count):
-                wanted |= {(STEMS, level, s)} if plan.has_stems(level) else set()
+                wanted |= {(STEMS, level, s)} if self._has_stems(level) else set()
                 wanted |= {(AFFINES, level, s)} if plan.has_affines(level, level) else set()
-                wanted |= {(EXACT, level, s)} if level == plan.height + 2 else set()
-                allowed |= {(CORRECTIONS, level, s)} if level == plan.height + 1 else set()
-            allowed |= {(SHAPES, level, 0)} if plan.has_stems(level) else set()
+                wanted |= {(EXACT, level, s)} if level == self.lossy_levels else set()
+                allowed |= {(CORRECTIONS, level, s)} if plan.height < level < self.lossy_levels else set()
+            allowed |= {(SHAPES, level, 0)} if self._has_stems(level) else set()
+            allowed |= {(REFINED_REST, level, 0)} if plan.height + 1 < level < self.lossy_levels else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
         require(
             wanted <= there <= wanted | allowed,
@@ -1886,15 +2242,50 @@ class AthFile:
         step = f64(chunk, 28)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
         self.rest_type = np.dtype("<f8" if chunk[1] else "<f4")
+        self._rests: list[RestLayer] = []  # of the layers that refine it; none where it is exact
         if chunk[0] == 0:
-            rest = np.array(decode_rest(chunk[36:], self.branches, step))
+            coded = decode_rest(chunk[36:], self.branches, step)
+            self._rests = [coded]
+            rest = np.array(coded.rest)
             shown = rest + self.origin
         else:
             shown = np.array(decode_exact_rest(chunk[36:], self.branches, bool(chunk[1])))
             rest = shown - self.origin
         require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
         self.plan.rest = rest
+        self._plans = [self.plan]
         self._shown_rest = shown.astype(self.rest_type)
+
+    # Layers: level h + 1 + q is that of layer q, those below are of layer 0 as well.
+
+    @property
+    def lossy_levels(self) -> int:
+        return self.plan.height + 1 + self.header.layer_count
+
+    def _layer_of(self, level: int) -> int:
+        return max(min(level, self.lossy_levels - 1) - self.plan.height - 1, 0)
+
+    def _has_stems(self, level: int) -> bool:
+        return self.plan.has_stems(level) or self.plan.height + 1 < level < self.lossy_levels
+
+    def _plan_of(self, q: int) -> Plan:
+        """That of a layer, on its own rest pose."""
+        for layer in range(len(self._plans), q + 1):
+            level, plan = self.plan.height + 1 + layer, Plan(self.branches)
+            plan.refine(level)
+            plan.rest = self._plans[-1].rest
+            if self.find(REFINED_REST, level):
+                plan.rest = self._refined_rest(self.content(REFINED_REST, level))
+            self._plans.append(plan)
+        return self._plans[q]
+
+    def _refined_rest(self, chunk: bytes) -> np.ndarray:
+        require(len(chunk) >= 8 and finite(f64(chunk, 0)) and f64(chunk, 0) > 0.0, "Rest_Step is out of range")
+        require(self._rests != [], "a rest pose that is exact is refined")
+        self._rests.append(decode_rest(chunk[8:], self.branches, f64(chunk, 0), self._rests[-1]))
+        rest = np.array(self._rests[-1].rest)
+        require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
+        return rest
 
     def rest(self) -> np.ndarray:
         """(vertices, 3) of Rest_Type, source order."""
@@ -1933,28 +2324,29 @@ class AthFile:
         """(vertices, 3, frames) in file order."""
         for chunk in self._needed(s, level):
             require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
-        motion = self._motion(s, self._segment_lengths[s], level)
-        placed = Pose(self.plan, motion, level).placed
-        positions = (placed + self.origin[:, None]).astype(self.position_type)
-        last = self.plan.height + 1
-        if level >= last and self.find(CORRECTIONS, last, s):
-            chunk = self.content(CORRECTIONS, last, s)
+        frames, shown = self._segment_lengths[s], min(level, self.lossy_levels - 1)
+        pose = self._first_layer(s, frames, min(shown, self.plan.height + 1))
+        for q in range(1, self._layer_of(level) + 1):
+            pose = self._refinement(s, frames, q, pose)
+        positions = (pose.placed + self.origin[:, None]).astype(self.position_type)
+        if self.find(CORRECTIONS, shown, s):
+            chunk = self.content(CORRECTIONS, shown, s)
             require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Correction_Step is not above 0")
-            q = decode_corrections(chunk[4:], self.header.vertex_count, motion.frames)
+            q = decode_corrections(chunk[4:], self.header.vertex_count, frames)
             corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
             positions = np.where(q != 0, corrected, positions)
-        return decode_exact(self.content(EXACT, level, s), positions) if level > last else positions
+        return decode_exact(self.content(EXACT, level, s), positions) if level > shown else positions
 
     def _needed(self, s: int, level: int) -> list[Chunk]:
         """Chunks that playing a segment at a level takes."""
-        places = [(CORRECTIONS, level, s)]
+        places = [(CORRECTIONS, min(level, self.lossy_levels - 1), s), (EXACT, level, s)]
         for d in range(level + 1):
-            places += [(SHAPES, d, 0), (STEMS, d, s)]
+            places += [(SHAPES, d, 0), (REFINED_REST, d, 0), (STEMS, d, s)]
             places += [(AFFINES, d, s)] if self.plan.has_affines(d, level) else []
         return [self._places[place] for place in places if place in self._places]
 
-    def _motion(self, s: int, frames: int, level: int) -> Motion:
-        """All integers that playing a segment at a level takes."""
+    def _first_layer(self, s: int, frames: int, level: int) -> Pose:
+        """All vertices of a segment at a level of the branch hierarchy."""
         plan, motion = self.plan, Motion(frames, cosine_waves(frames))
         for d in range(level + 1):
             if self.find(SHAPES, d):
@@ -1963,7 +2355,19 @@ class AthFile:
                 decode_stems(read_stems_head(self.content(STEMS, d, s), motion, d), plan, motion, d)
             if plan.has_affines(d, level):
                 decode_affines(self.content(AFFINES, d, s), plan, motion, d)
-        return motion
+        pose = Pose(plan, motion)
+        pose.place_level(level)
+        return pose
+
+    def _refinement(self, s: int, frames: int, q: int, before: Pose) -> Refinement:
+        """All vertices of a segment in a layer, from those of the layer before."""
+        plan, level = self._plan_of(q), self.plan.height + 1 + q
+        motion = Motion(frames, cosine_waves(frames))
+        if self.find(SHAPES, level):
+            decode_refined_shapes(self.content(SHAPES, level), plan, motion, before.motion)
+        pose = Refinement(plan, motion, before)
+        pose.decode_stems(self.content(STEMS, level, s), level)
+        return pose
 
     # Static data.
 

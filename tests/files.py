@@ -22,7 +22,7 @@ from athcodec.segmentation import balanced_segments
 
 HEADER_FIELDS = (
     "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-    "segment_count level_count full_level_count clip_count flags max_error reserved"
+    "segment_count level_count full_level_count clip_count flags max_error layer_count"
 ).split()
 CHECKSUM_AT = 12
 
@@ -135,8 +135,8 @@ def still_hierarchy(plan: Plan) -> bytes:
 
 
 def still_rest(plan: Plan) -> bytes:
-    stream, _ = streams.encode_rest(plan.branches, 1.0, plan.rest)
-    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream))
+    coded = streams.encode_rest(plan.branches, 1.0, plan.rest)
+    return ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), coded.stream))
 
 
 def add_still_segment(store: ct.ChunkStore, plan: Plan, index: int, frames: int, stems: bytes | None) -> None:

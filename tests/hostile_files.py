@@ -75,7 +75,7 @@ def stems_with_gaps(gaps: np.ndarray) -> bytes:
     rest = np.zeros((1 + gaps.size, 3))
     rest[1:, 0] = np.cumsum(gaps, axis=1).ravel()
     plan = Plan(branches, len(rest))
-    stream, _ = streams.encode_rest(plan.branches, 1.0, rest)
+    stream = streams.encode_rest(plan.branches, 1.0, rest).stream
     return still_file(branches=branches, rest=ct.pack_rest(ct.Rest(np.zeros(3), 1.0, np.dtype(np.float32), stream)))
 
 

@@ -53,7 +53,8 @@ class Info(ctypes.Structure):
         (name, c_int32)
         for name in (
             "vertex_count branch_count frame_count segment_count clip_count "
-            "level_count full_level_count node_count chunk_count is_float64"
+            "level_count full_level_count layer_count depth_levels node_count chunk_count "
+            "is_float64"
         ).split()
     ]
     _fields_ += [
@@ -129,6 +130,8 @@ _SIGNATURES = {
     "ath_fault_text": (c_size_t, [POINTER(Fault), c_char_p, c_size_t]),
     "ath_build_size": (c_size_t, [c_void_p]),
     "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
+    "ath_refine_size": (c_int, [c_void_p, c_int32, POINTER(c_size_t), POINTER(Fault)]),
+    "ath_refine": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
     "ath_get_info": (None, [c_void_p, POINTER(Info)]),
     "ath_vertex_source": (POINTER(c_int32), [c_void_p]),
     "ath_times": (POINTER(c_double), [c_void_p]),
@@ -136,6 +139,7 @@ _SIGNATURES = {
     "ath_clip_named": (c_int32, [c_void_p, c_char_p]),
     "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
     "ath_rest": (None, [c_void_p, c_int, c_void_p, c_size_t]),
+    "ath_level_rest": (c_int, [c_void_p, c_int32, c_int, c_void_p, c_size_t]),
     "ath_level_error": (None, [c_void_p, c_int32, c_int32, c_int32, POINTER(c_double), POINTER(c_double)]),
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_segment_of": (c_int32, [c_void_p, c_int32]),
@@ -252,6 +256,7 @@ class Player:
             self.bases = Memory(core.ath_build_size(self.address))
             assert core.ath_build(self.address, self.bases.address, self.bases.size) == OK
         self.memory.check()
+        self.refusal = Fault()
 
     @property
     def address(self) -> int:
@@ -288,8 +293,24 @@ class Player:
         """For a segment."""
         return Memory(core.ath_segment_size(self.address, level))
 
+    def refine(self, level: int) -> int:
+        """Builds what the layers of a level share; the result of the first call that fails, `refusal` says why."""
+        size = c_size_t()
+        result = core.ath_refine_size(self.address, level, byref(size), byref(self.refusal))
+        if result != OK:
+            return result
+        self.kept.append(memory := Memory(size.value))
+        result = core.ath_refine(self.address, level, memory.address, size.value)
+        memory.check()
+        return result
+
     def try_to_prepare(self, segment: int, level: int, work: Memory, into: Memory, call=core.ath_prepare) -> int:
-        return call(work.address, work.size, self.address, segment, level, into.address, into.size)
+        refined = self.refine(level)
+        return (
+            refined
+            if refined != OK
+            else call(work.address, work.size, self.address, segment, level, into.address, into.size)
+        )
 
     def start(self, segment: int, level: int, work: Memory, into: Memory) -> int:
         return self.try_to_prepare(segment, level, work, into, core.ath_prepare_start)
@@ -440,7 +461,8 @@ def parts(full_ath) -> Parts:
         ({"full_level_count": 3, "level_count": 4}, "BAD_HEADER header: got Level_Count 4; expected 1 to 3"),
         ({"clip_count": 0}, "BAD_HEADER header: got Clip_Count 0; expected 1 to 255"),
         ({"flags": 2}, "BAD_HEADER header: got Flags 2; expected 0 to 1"),
-        ({"reserved": 2**52}, "BAD_HEADER header: got Reserved 4503599627370496; expected 0"),
+        ({"layer_count": 1 | 2**52}, "BAD_HEADER header: got Reserved 17592186044416; expected 0"),
+        ({"layer_count": 9}, "BAD_HEADER header: got Layer_Count 9; expected 1 to 8"),
         ({"max_error": float("nan")}, "BAD_HEADER header: got Max_Error nan; expected a finite length"),
         ({"max_error": -1.25e-7}, "BAD_HEADER header: got Max_Error -1.25000e-7; expected a finite length"),
         ({"max_error": float("-inf")}, "BAD_HEADER header: got Max_Error -inf; expected a finite length"),
@@ -456,7 +478,7 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     length, tables_end = len(data), parts.chunks[0][0].offset
     assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
     assert refusal(data[:8] + b"\1\0\5\0" + data[12:]) == (
-        "UNSUPPORTED_VERSION file: got format version 1.5; expected 0.4"
+        "UNSUPPORTED_VERSION file: got format version 1.5; expected 0.5"
     )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 64"
     assert refusal(data[:100]) == f"MISSING chunk table: got 36 bytes; expected {tables_end - 64}"
@@ -625,15 +647,15 @@ def test_ranges_beyond_the_capacity_are_counted_and_not_written(data):
 
 
 def test_a_damaged_chunk_is_named_and_its_segment_is_not_prepared(data, player):
-    level = player.levels[-1]
-    offset, size = player.ranges(level, 0, 0, fed_too=True)[-1]
+    level, last = player.levels[-1], player.segments[-1]
+    offset, size = player.ranges(level, last, last, fed_too=True)[-1]
     broken = Player(data[: offset + size - 1] + bytes([data[offset + size - 1] ^ 1]) + data[offset + size :])
     work, segment = broken.work(), broken.room(level)
-    assert broken.try_to_prepare(0, level, work, segment) == BAD_CHECKSUM
+    assert broken.try_to_prepare(last, level, work, segment) == BAD_CHECKSUM
     fault = Fault()
     core.ath_work_fault(work.address, byref(fault))
     chunk = core.ath_chunks(broken.address)[fault.chunk]
-    assert (chunk.offset + chunk.length, chunk.segment) == (offset + size, 0)
+    assert (chunk.offset + chunk.length, chunk.segment) == (offset + size, last)
     assert core.ath_segment_index(segment.address) == core.ath_segment_level(segment.address) == -1
     assert broken.show([segment], 0)[0] == NOT_PREPARED
 
@@ -729,7 +751,7 @@ def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
     for level in player.levels:
         parts, nodes, exact = cut(player, level)
         assert [v for p in parts for v in range(p.first, p.first + p.count)] == list(range(len(rest)))
-        assert (nodes == 0) == (level == player.info.full_level_count - 1) and (exact == 0) == (level == 0)
+        assert (nodes == 0) == (level >= player.info.depth_levels - 1) and (exact == 0) == (level == 0)
         prepared = player.prepare_all(level)
         for frame in (0.0, 1.5, player.info.frame_count - 1.0, player.info.frame_count - 0.25):
             matrices, points = Memory(48 * nodes), Memory(12 * exact)

@@ -527,6 +527,6 @@ def test_infinite_positions_have_no_matrices_whatever_the_shape_of_the_plant(cli
 
 def test_a_rest_pose_beyond_float32_is_infinite_without_a_warning():
     head = ct.Rest(np.array([1e39, -1e39, 0.0]), 1.0, np.dtype(np.float32))
-    head.stream, _ = streams.encode_rest(roots(1), 1.0, np.zeros((1, 3)))
+    head.stream = streams.encode_rest(roots(1), 1.0, np.zeros((1, 3))).stream
     with opened(still_file(rest=ct.pack_rest(head))) as decoder:
         assert decoder.rest.tolist() == [[np.inf, -np.inf, 0.0]]

@@ -792,8 +792,9 @@ class HandMade:
             self.plan.set_rest(pose.astype(np.float64) - self.origin)
             times = container.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
-            head.stream, decoded = streams.encode_rest(self.branches, 0.01, self.rest)
-            self.plan.set_rest(decoded)
+            coded = streams.encode_rest(self.branches, 0.01, self.rest)
+            head.stream = coded.stream
+            self.plan.set_rest(coded.decoded)
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)
         self.shapes = self._some_shapes()

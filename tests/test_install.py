@@ -42,6 +42,9 @@ int main(int argc, char **argv)
     ath_info info;
     ath_get_info(file, &info);
     int32_t deepest = info.level_count - 1;
+    size_t refinements;
+    if (result == ATH_OK) result = ath_refine_size(file, deepest, &refinements, NULL);
+    if (result == ATH_OK) result = ath_refine(file, deepest, malloc(refinements), refinements);
     size_t work_size = ath_work_size(file), segment_size = ath_segment_size(file, deepest);
     void *work = malloc(work_size), *segment = malloc(segment_size);
     float *xyz = (float *)malloc((size_t)info.vertex_count * 3 * sizeof(float));

@@ -22,7 +22,7 @@ from athcodec._library import load_library
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
-MOST_BYTES = 80_000
+MOST_BYTES = 92_000
 OK, HELD, NOT_PREPARED = 0, 65, 67
 
 
@@ -85,6 +85,8 @@ class Info(ctypes.Structure):
             "clip_count",
             "level_count",
             "full_level_count",
+            "layer_count",
+            "depth_levels",
             "node_count",
             "chunk_count",
             "is_float64",
@@ -129,6 +131,9 @@ class Native:
 
     def prepare(self, level: int):
         """Pointers to all segments."""
+        needed = c_size_t()
+        assert self.lib.ath_refine_size(self.file, c_int32(level), byref(needed), None) == OK
+        assert self.lib.ath_refine(self.file, c_int32(level), self.block(needed.value), needed) == OK
         work, size = (
             c_size_t(self.lib.ath_work_size(self.file)),
             c_size_t(self.lib.ath_segment_size(self.file, c_int32(level))),
@@ -506,7 +511,7 @@ OPEN = "answer(thrown(() => AthFile.open(read(path))));"
     "at, name, in_chunk, sentence",
     [
         (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
-        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.4; expected 0.4"),
+        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.5; expected 0.5"),
         (70, "BAD_CHECKSUM", False, "header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
         (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
     ],

@@ -2,6 +2,7 @@
  *
  *     ath_front -> ath_open -> ath_build        once per file: header, hierarchy, rest pose
  *     ath_fault_text                            why a file is refused, in a sentence
+ *     ath_refine                                once per level that refines another
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
@@ -12,8 +13,9 @@
  * pointers into the bytes that it was fed: these stay where they are until they are fed anew or dropped.
  *
  * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time; any
- * number of them may prepare segments of one ath_file while others play. ath_feed and ath_drop run alone among those
- * that look at bytes: preparations and the functions on chunks and ranges; playing may go on.
+ * number of them may prepare segments of one ath_file while others play. ath_feed, ath_drop, ath_refine_size and
+ * ath_refine run alone among those that look at bytes: preparations and the functions on chunks and ranges; playing may
+ * go on.
  *
  * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need no
  * more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over are
@@ -203,9 +205,12 @@ ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
 /* Levels 0 to info.depth_levels - 1 are the branch hierarchy's, at the precision of the first layer; each further level refines
  * all of it by one layer, some of which refine the rest pose too. Before such a level is prepared, what its layers share is
- * built, in memory of their own, once ath_build has run and the REFINED_REST chunks are fed, which ath_ranges names.
- * *memory_bytes: what ath_refine needs for the layers up to the level; 0: there is nothing left to build. ATH_MISSING; errors of
- * the file. */
+ * built, once ath_build has run, in memory that stays as long as the file's:
+ *     ath_refine_size reads the rest poses of the layers up to the level's from their REFINED_REST chunks, which ath_ranges names
+ * until they are read, and says how much memory ath_refine needs: 0 where little or nothing is left to do. ATH_MISSING,
+ * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
+ *     ath_refine builds what is not built yet. The same, ATH_NO_MEMORY.
+ * Levels of the first layer, and what is built already, need neither, but allow both. */
 ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
 ATH_API int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes);
 
@@ -276,7 +281,8 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
  * were floats: what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
-/* The rest pose of a level's layer: the one above for levels of the first layer. ATH_BAD_ARGUMENT where it is not built. */
+/* The rest pose of a level's layer, from which the exact vertices of the level were moved: the one above for levels of the first
+ * layer. ATH_BAD_ARGUMENT for no level of the file, and where ath_refine_size has not read it. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result
@@ -400,8 +406,8 @@ ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const
                                   double frame, ath_order order, double *xyz, size_t stride);
 
 /* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
- * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level
- * there are no matrices, at level 0 nothing but. */
+ * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level of the
+ * hierarchy and at those beyond there are no matrices, at level 0 nothing but. */
 ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                          float *matrices, size_t stride);
 ATH_API int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,

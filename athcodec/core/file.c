@@ -487,6 +487,8 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     ath_file counted = *file;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
+    ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
+                     (int32_t *)file->scratch); /* gaps may be a layer's */
     ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
     file->plan.bases = file->bases;
     for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
@@ -534,31 +536,34 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
         return ATH_OK;
     }
     ath_bytes content = {chunk->bytes, chunk->length};
-    int result = ath_check_chunk(file, (int32_t)(chunk - file->chunks), fault);
+    int32_t index = (int32_t)(chunk - file->chunks);
+    int result = ath_check_chunk(file, index, fault);
     if (result != ATH_OK) return result;
-    if (file->stored_rest || decode_layer_rest(file, q, content) != ATH_OK)
-        return ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
+    if (file->stored_rest || decode_layer_rest(file, q, content) != ATH_OK) {
+        ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
+        return ath_fault_at(fault, chunk, index);
+    }
     layer->plan.rest = layer->rest;
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);
     return ATH_OK;
 }
 
-static int32_t last_layer(const ath_file *file, int32_t level) { return ath_layer_of(file, level); }
-
 int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
 {
-    ath_fault_info unwanted;
-    uint64_t size = 0;
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    ath_arena counted = {0, 0};
     *memory_bytes = 0;
-    for (int32_t q = 1; q <= last_layer(file, level); q++) {
+    why->code = ATH_OK;
+    if (level < 0 || level >= file->info.level_count) return ath_refuse(why, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
+    for (int32_t q = 1; q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
-        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, fault ? fault : &unwanted);
+        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
         if (result != ATH_OK) return result;
         layer->rest_known = 1;
-        if (!layer->plan.bases) size += layer->bases_count * sizeof(double) + 16;
+        if (!layer->plan.bases) ath_take(&counted, layer->bases_count * sizeof(double));
     }
-    *memory_bytes = ath_size_or_most(size);
+    *memory_bytes = ath_size_or_most(counted.used);
     return ATH_OK;
 }
 
@@ -569,10 +574,10 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
     int result = ath_refine_size(file, level, &needed, 0);
     if (result != ATH_OK) return result;
     if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
-    for (int32_t q = 1; q <= last_layer(file, level); q++) {
+    for (int32_t q = 1; q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         if (layer->plan.bases) continue;
-        double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double) + 16);
+        double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
         if (layer->bases_count > 0) {
             ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (int32_t *)file->scratch);
             ath_basis_fill(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps, (double *)file->scratch,
@@ -593,9 +598,9 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
 
 int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride)
 {
-    int32_t layer = last_layer(file, level);
-    if (level < 0 || level >= file->info.level_count || (layer > 0 && !file->layers[layer].rest_known))
-        return ATH_BAD_ARGUMENT;
+    if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
+    int32_t layer = ath_layer_of(file, level);
+    if (layer > 0 && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
     if (layer == 0 || layer_rest(file, layer) == file->rest) {
         ath_rest_float64(file, order, xyz, stride);
         return ATH_OK;

@@ -757,7 +757,7 @@ static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
 {
-    int32_t T = motion->frames, modes = before->frequencies > 0 ? before->modes : 0;
+    int32_t T = motion->frames, modes = before->frequencies > 0 ? ath_min(before->modes, piece->rank) : 0;
     if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
     if (modes > 0) {
         ath_to_local(plan, T, piece, &scratch->at, before->placed, scratch->placed);

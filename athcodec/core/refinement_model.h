@@ -30,10 +30,11 @@ ATH_INLINE int32_t shifted(int32_t coarse, int32_t shift)
     return (coarse > most ? most : coarse < -most ? -most : coarse) * (1 << shift);
 }
 
-/* Steps of the layer before that a prediction stands for. */
+/* Steps of the layer before that a prediction stands for, as contexts see them. */
 ATH_INLINE uint32_t coarse_steps(int32_t predicted, uint32_t ratio)
 {
-    return (magnitude_of(predicted) + ratio / 2) / ratio;
+    uint32_t steps = (magnitude_of(predicted) + ratio / 2) / ratio;
+    return steps < MAGNITUDE_CLIP ? steps : (uint32_t)MAGNITUDE_CLIP;
 }
 
 /* Predictions of a row and of the one that follows it, null: none, in steps of the layer before. */

@@ -70,6 +70,10 @@ export interface AthInfo {
   /** Levels in this file, 0 to levelCount - 1; those that encoding made. */
   readonly levelCount: number;
   readonly fullLevelCount: number;
+  /** Layers of precision of the file as encoded; 1: no level refines another. */
+  readonly layerCount: number;
+  /** Levels of the first layer: those from depthLevels on refine the whole plant. */
+  readonly depthLevels: number;
   readonly nodeCount: number;
   readonly chunkCount: number;
   /** Whether positions are double in the file's own arithmetic; a Float64Array then holds more than a

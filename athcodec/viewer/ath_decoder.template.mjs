@@ -14,10 +14,10 @@ const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
   vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
-  levelCount: "i32", fullLevelCount: "i32", nodeCount: "i32", chunkCount: "i32", isFloat64: "i32",
-  epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
+  levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
+  chunkCount: "i32", isFloat64: "i32", epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
 };
-const INFO_SIZE = 112;
+const INFO_SIZE = 120;
 const CLIP = {
   name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
   loop: "i32",
@@ -593,6 +593,7 @@ export class AthFile {
     };
     this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
     try {
+      this.#refine(level);
       at = core.take(size);
       const code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
       if (code === MISSING) this.#checkWork(code, work);
@@ -602,6 +603,18 @@ export class AthFile {
       throw error;
     }
     return new Preparation(segment, level, step, fail);
+  }
+
+  // Builds what the layers of precision up to a level's share, in memory that stays as long as the file.
+  #refine(level) {
+    const c = this.#c, core = this.#core;
+    if (level < this.info.depthLevels) return;
+    const size = core.with(4, (at) => {
+      this.#checkFault((fault) => c.ath_refine_size(this.#at, level, at, fault));
+      return core.copy(Uint32Array, at, 1)[0];
+    });
+    const code = c.ath_refine(this.#at, level, size > 0 ? core.take(size) : 0, size);
+    this.#check(code, `the layers of level ${level}, ${size} bytes`);
   }
 
   #prepared(index, level, at) {

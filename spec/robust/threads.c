@@ -84,6 +84,8 @@ static void open_plant(plant *p)
     expect(ath_open(p->file, size, p->bytes, p->size, NULL, NULL), "open");
     expect(ath_build(p->file, memory_of(ath_build_size(p->file)), ath_build_size(p->file)), "build");
     ath_get_info(p->file, &p->info);
+    expect(ath_refine_size(p->file, p->info.level_count - 1, &size, NULL), "refine size");
+    expect(ath_refine(p->file, p->info.level_count - 1, memory_of(size), size), "refine");
     pthread_rwlock_init(&p->feeding, NULL);
 }
 

@@ -5,6 +5,7 @@
 enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 10 };
 
 typedef struct {
+    fuzz_file *opened;
     const ath_file *file;
     ath_info info;
     const ath_segment *held[HELD + 1]; /* the last is the one in preparation, which is to be passed over */
@@ -16,7 +17,7 @@ typedef struct {
 static void prepare(user *u, int32_t argument)
 {
     int32_t level = argument % u->info.level_count, segment = argument / 3 % u->info.segment_count;
-    ath_segment *made = fuzz_prepare(u->file, segment, level, 1 + argument, MOST_MEMORY, argument);
+    ath_segment *made = fuzz_prepare(u->opened, segment, level, 1 + argument, MOST_MEMORY, argument);
     free((void *)(uintptr_t)u->held[argument % HELD]);
     u->held[argument % HELD] = made;
 }
@@ -44,7 +45,7 @@ static void begin(user *u, int32_t argument)
     int32_t level = argument % u->info.level_count, segment = argument / 5 % u->info.segment_count;
     size_t work_size = ath_work_size(u->file), size = ath_segment_size(u->file, level);
     abandon(u);
-    if (work_size > MOST_MEMORY || size > MOST_MEMORY) return;
+    if (work_size > MOST_MEMORY || size > MOST_MEMORY || !fuzz_refine(u->opened, level, MOST_MEMORY, 0xff)) return;
     u->work = fuzz_memory(work_size, 0xff);
     u->memory = fuzz_memory(size, 0xff);
     if (ath_prepare_start(u->work, work_size, u->file, segment, level, u->memory, size) != ATH_OK) abandon(u);
@@ -179,6 +180,13 @@ static void rest(user *u, int32_t argument)
     ath_rest(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, floats, 3 * sizeof *floats);
     for (size_t i = 0; i < 3 * vertices; i++)
         REQUIRE(floats[i] == (float)doubles[i] || doubles[i] != doubles[i], "both widths hold the same rest pose");
+    int32_t level = argument % u->info.level_count;
+    int result = ath_level_rest(u->file, level, ATH_FILE_ORDER, doubles, 3 * sizeof *doubles);
+    REQUIRE(result == ATH_OK || (result == ATH_BAD_ARGUMENT && level >= u->info.depth_levels),
+            "levels have a rest pose");
+    REQUIRE(ath_level_rest(u->file, u->info.level_count, ATH_FILE_ORDER, doubles, 3 * sizeof *doubles)
+                == ATH_BAD_ARGUMENT,
+            "no such level");
     free(floats);
     free(doubles);
 }
@@ -196,10 +204,11 @@ static void call(user *u, int32_t which, int32_t argument)
     if (which == 9) misuse(u, argument);
 }
 
-static void use(const fuzz_file *opened, const uint8_t *bytes, size_t size, const uint8_t *options)
+static void use(fuzz_file *opened, const uint8_t *bytes, size_t size, const uint8_t *options)
 {
     user u;
     memset(&u, 0, sizeof u);
+    u.opened = opened;
     u.file = opened->file;
     u.bytes = bytes;
     u.size = size;

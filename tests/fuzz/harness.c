@@ -116,6 +116,7 @@ int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const a
     }
     size_t build = ath_build_size(opened->file);
     opened->memory = size + build;
+    opened->layer_count = 0;
     opened->bases = fuzz_memory(build, fill);
     REQUIRE(ath_build(opened->file, opened->bases, build) == ATH_OK, "ath_build takes the size it asked for");
     return 1;
@@ -125,12 +126,38 @@ void fuzz_close(fuzz_file *opened)
 {
     free(opened->file);
     free(opened->bases);
+    for (int32_t i = 0; i < opened->layer_count; i++) free(opened->layers[i]);
 }
 
-ath_segment *fuzz_prepare(const ath_file *file, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill)
+int fuzz_refine(fuzz_file *opened, int32_t level, uint64_t most, int fill)
 {
+    size_t size, left;
+    ath_fault_info fault;
+    int result = ath_refine_size(opened->file, level, &size, &fault);
+    if (result != ATH_OK) {
+        check_fault(&fault, result);
+        REQUIRE(result == ATH_MISSING || result == ATH_BAD_CHECKSUM || result == ATH_BAD_CHUNK,
+                "refining gives its codes");
+        REQUIRE(fault.kind == ATH_REFINED_REST && fault.chunk >= 0, "a refusal names its chunk");
+        return 0;
+    }
+    if (size > most) return 0;
+    void *memory = fuzz_memory(size, fill);
+    REQUIRE(size == 0 || ath_refine(opened->file, level, memory, size - 1) == ATH_NO_MEMORY, "too little is seen");
+    REQUIRE(ath_refine(opened->file, level, memory, size) == ATH_OK, "ath_refine takes the size it asked for");
+    REQUIRE(ath_refine_size(opened->file, level, &left, NULL) == ATH_OK && left == 0, "what is built is built");
+    if (size > 0)
+        opened->layers[opened->layer_count++] = memory;
+    else
+        free(memory);
+    return 1;
+}
+
+ath_segment *fuzz_prepare(fuzz_file *opened, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill)
+{
+    const ath_file *file = opened->file;
     size_t work_size = ath_work_size(file), size = ath_segment_size(file, level);
-    if (work_size > most || size > most) return NULL;
+    if (work_size > most || size > most || !fuzz_refine(opened, level, most, fill)) return NULL;
     void *work = fuzz_memory(work_size, fill), *memory = fuzz_memory(size, fill);
     int64_t left = ath_prepare_steps(file, segment, level);
     int at_once = steps == INT32_MAX;

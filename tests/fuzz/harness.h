@@ -44,15 +44,20 @@ ath_limits fuzz_limits(uint64_t memory_bytes);
 typedef struct {
     ath_file *file;
     void *bases;
-    size_t memory; /* bytes of both */
+    void *layers[ATH_LAYERS]; /* of ath_refine, as many as it asked for */
+    int32_t layer_count;
+    size_t memory; /* bytes of file and bases */
 } fuzz_file;
 
 /* Opens and builds; 0 and nothing to close where the file is refused. `available` may be less than the file. */
 int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const ath_limits *limits, int fill);
 void fuzz_close(fuzz_file *opened);
 
+/* Builds what the layers up to a level's share; 0 where their chunks are missing or refused, or it is more than `most`. */
+int fuzz_refine(fuzz_file *opened, int32_t level, uint64_t most, int fill);
+
 /* One segment at one level, prepared `steps` steps at a time; null where it is refused or larger than `most`. */
-ath_segment *fuzz_prepare(const ath_file *file, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill);
+ath_segment *fuzz_prepare(fuzz_file *opened, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill);
 
 /* Whether both show the same bits. */
 int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b);

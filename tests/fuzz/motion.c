@@ -5,12 +5,12 @@
 
 enum { MOST_MEMORY = 8 << 20, MOST_SEGMENTS = 8 };
 
-static void decode_level(const ath_file *file, int32_t segment, int32_t level, const uint8_t *options)
+static void decode_level(fuzz_file *opened, int32_t segment, int32_t level, const uint8_t *options)
 {
-    ath_segment *whole = fuzz_prepare(file, segment, level, INT32_MAX, MOST_MEMORY, 0xa5);
-    ath_segment *stepped = fuzz_prepare(file, segment, level, 1 + options[1] % 7, MOST_MEMORY, options[2]);
+    ath_segment *whole = fuzz_prepare(opened, segment, level, INT32_MAX, MOST_MEMORY, 0xa5);
+    ath_segment *stepped = fuzz_prepare(opened, segment, level, 1 + options[1] % 7, MOST_MEMORY, options[2]);
     REQUIRE((whole != NULL) == (stepped != NULL), "steps decode what one go does");
-    if (whole) REQUIRE(fuzz_same(file, whole, stepped), "a level is a function of the file's bytes");
+    if (whole) REQUIRE(fuzz_same(opened->file, whole, stepped), "a level is a function of the file's bytes");
     free(whole);
     free(stepped);
 }
@@ -49,7 +49,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         ath_get_info(opened.file, &info);
         uint8_t **copies = feed_copies(opened.file, file, size - OPTIONS);
         for (int32_t s = 0; s < ath_min(info.segment_count, MOST_SEGMENTS); s++)
-            for (int32_t level = 0; level < info.level_count; level++) decode_level(opened.file, s, level, options);
+            for (int32_t level = 0; level < info.level_count; level++) decode_level(&opened, s, level, options);
         drop_copies(copies, info.chunk_count);
         fuzz_close(&opened);
     }

@@ -26,6 +26,8 @@ VECTORS = CORPUS.parent.parent / "spec" / "vectors" / "valid"
 MANY_FEATURES = ("everything", "exact-empty", "shapes*", "clips-loops", "clips-steps", "clips-names", "encoded-*")
 """Of the vectors; the others try one rule each."""
 LARGEST = 64 << 10
+LAYERED: dict = {"rel_error": 1e-4, "ladder": (1e-2, 1e-3)}
+"""Options that give a file three layers of precision."""
 OPTIONS = 16
 """Bytes behind a file that tell a target how to use it (harness.h)."""
 
@@ -73,6 +75,14 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
         lambda: plant(seed=13, branches=3, longest=3, frames=5, dtype=np.float64),
         {"rel_error": 1e-2, "lossless": True},
     ),
+    "layers": (lambda: plant(seed=11, branches=5, longest=9, frames=32, rough=0.0), LAYERED | {"segment_frames": 16}),
+    "layers_loose": (lambda: awkward(2, branches=7, longest=5, roots=3, motion="drift"), LAYERED),
+    "layers_learned": (lambda: tube(10, 7, 9), LAYERED | {"effort": "best"}),
+    "layers_lossless": (lambda: plant(seed=12, branches=4, longest=4, frames=18), LAYERED | {"lossless": True}),
+    "layers_exact_rest": (
+        lambda: plant(seed=4, branches=3, frames=5, dtype=np.float64),
+        LAYERED | {"exact_rest": True},
+    ),
     "frames_256": (lambda: plant(seed=10, branches=2, longest=3, frames=257), {"rel_error": 1e-1}),
 }
 
@@ -104,6 +114,7 @@ def valid_files() -> dict[str, bytes]:
             files["sample"] = _bytes_of(clip, folder, rel_error=1e-2)
         files |= {path.stem: path.read_bytes() for name in MANY_FEATURES for path in VECTORS.glob(name + ".ath")}
         files["cut_to_a_level"] = _truncated(files["full"], folder, 1)
+        files["cut_to_a_layer"] = _truncated(files["layers"], folder, 4)
     parts = Parts.of(files["full"])
     unknown = ct.Chunk(0x8009, ct.NO_LEVEL, 0, 0, 0), b"from the future"
     place = parts.index(ct.AFFINES)

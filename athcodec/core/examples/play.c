@@ -26,10 +26,11 @@ typedef struct {
     ath_file *file;
     ath_info info;
     int32_t clip_index, first_segment, last_segment;
-    const ath_clip *clip; /* the one that is played */
-    void *bases;
+    const ath_clip *clip;  /* the one that is played */
+    void *bases, **layers; /* of ath_build; of ath_refine, `layer_count` of them */
+    int32_t layer_count;
     ath_work *work;
-    size_t file_size, build_size, work_size, segments_size;
+    size_t file_size, build_size, layers_size, work_size, segments_size;
     ath_segment *playing, *next; /* null: none. `next` is prepared while `playing` plays */
     int preparing;
     int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
@@ -103,6 +104,7 @@ static void open_file(player *p, const char *path, size_t slices)
     p->work_size = ath_work_size(p->file);
     p->work = allocate(p->work_size);
     ath_get_info(p->file, &p->info);
+    p->layers = allocate((size_t)p->info.layer_count * sizeof *p->layers);
     p->binding = allocate((size_t)p->info.vertex_count * sizeof(int32_t));
     p->matrices = allocate((size_t)p->info.node_count * 12 * sizeof(float));
     p->positions = allocate((size_t)p->info.vertex_count * 3 * sizeof(float));
@@ -121,8 +123,9 @@ static void choose_clip(player *p, const char *name)
 
 static void close_file(player *p)
 {
-    void *const memories[] = {p->playing, p->next,     p->work,      p->bases, p->file,
-                              p->binding, p->matrices, p->positions, p->bytes};
+    void *const memories[] = {p->playing, p->next,    p->work,     p->bases,     p->layers,
+                              p->file,    p->binding, p->matrices, p->positions, p->bytes};
+    for (int32_t i = 0; i < p->layer_count; i++) free(p->layers[i]);
     for (size_t i = 0; i < sizeof memories / sizeof *memories; i++) free(memories[i]);
     fclose(p->download);
 }
@@ -149,6 +152,18 @@ static int32_t level_for(const player *p, int32_t segment)
 static int32_t index_of(const ath_segment *segment) { return segment ? ath_segment_index(segment) : -1; }
 static int32_t level_of(const ath_segment *segment) { return segment ? ath_segment_level(segment) : -1; }
 
+/* What the segments of a level share that refines another, as soon as the first of them can be prepared. */
+static void refine(player *p, int32_t level)
+{
+    size_t size;
+    ath_fault_info fault;
+    ath_refine_size(p->file, level, &size, &fault);
+    check_fault(&fault, "refining");
+    void *memory = size > 0 ? p->layers[p->layer_count++] = allocate(size) : NULL;
+    check(ath_refine(p->file, level, memory, size), "refining");
+    p->layers_size += size;
+}
+
 /* Memory is for the level, so that a plant far away takes little. */
 static int start(player *p, int32_t segment, int32_t level)
 {
@@ -157,6 +172,7 @@ static int start(player *p, int32_t segment, int32_t level)
     if (p->segments_size < both) p->segments_size = both;
     free(p->next);
     p->next = allocate(size);
+    refine(p, level);
     check(ath_prepare_start(p->work, p->work_size, p->file, segment, level, p->next, size), "preparing");
     p->steps = ath_prepare_steps(p->file, segment, level);
     return p->preparing = 1;
@@ -330,7 +346,7 @@ int main(int argc, char **argv)
     set_pace(&p, fps);
     walk(&p, seconds, fps);
     printf("bytes of memory: file %zu, opened %zu, built %zu, work %zu, segments at most %zu\n", p.length, p.file_size,
-           p.build_size, p.work_size, p.segments_size);
+           p.build_size + p.layers_size, p.work_size, p.segments_size);
     printf("ranges missing at the end: %d\n",
            (int)ath_ranges(p.file, p.info.level_count - 1, p.first_segment, p.last_segment, 0, NULL, 0));
     close_file(&p);

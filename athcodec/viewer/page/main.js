@@ -237,10 +237,15 @@ show.set("mesh");
 compare.set("off");
 $("scale").querySelector("i").style.background = heatGradient;
 
+const levelName = (motion, level) => `Level ${level}${motion.refines(level) ? " · refined" : ""}`;
+const within = ({ ath, motion }, level) => lengthText(motion.error(level).max, ath.metadata.unit);
+
 function levelControls() {
   const most = Math.max(...plants.map(({ motion }) => motion.levelCount)) - 1;
   const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
-  if (values.length <= 9) level.fill(values, ["Auto", ...values.slice(1)]);
+  const deepest = plants.find(({ motion }) => motion.levelCount > most);
+  const titles = values.slice(1).map((value) => `${levelName(deepest.motion, value)}, within ${within(deepest, value)}`);
+  if (values.length <= 9) level.fill(values, ["Auto", ...values.slice(1)], ["Automatic", ...titles]);
   else level.fill(["auto"], ["Automatic"]);
   for (const id of ["level", "compare-level"]) $(id).max = most;
   $("compare-level").value = Math.min(1, most);
@@ -264,7 +269,7 @@ $("compare-level").addEventListener("input", () => setLevel(level.value));
 
 function labels() {
   const names = plants.length < 2 ? [] : plants.map(({ ath, motion }) => (compare.value === "file" ? `${ath.fileName}, level ${motion.level}`
-    : `Level ${Math.max(motion.level, 0)} · ${rateText(motion.bitRate())}`));
+    : `${levelName(motion, Math.max(motion.level, 0))} · ${rateText(motion.bitRate())}`));
   const text = names.join("|");
   if (labels.text === text) return;
   labels.text = text;
@@ -526,19 +531,19 @@ function tell() {
   const main = plants.at(-1), { motion, ath } = main, { unit } = ath.metadata, share = motion.bytesFetched / motion.bytesTotal;
   $("progress").firstElementChild.style.width = `${100 * Math.min(1, share)}%`;
   $("progress").setAttribute("aria-valuenow", String(Math.round(100 * Math.min(1, share))));
-  const shown = Math.max(motion.level, 0), error = motion.error(shown).max;
+  const shown = Math.max(motion.level, 0);
   rows($("facts"), [
     ["Fetched", `${bytesText(motion.bytesFetched)} of ${bytesText(motion.bytesTotal)}`],
     ["This view", `${rateText(motion.bitRate(shown))}`],
-    ["Level", `${shown} of ${motion.levelCount - 1}`],
-    ["Within", lengthText(error, unit)],
+    ["Level", `${shown} of ${motion.levelCount - 1}${motion.refines(shown) ? " · refined" : ""}`],
+    ["Within", within(main, shown)],
     ...(motion.clip.loop ? [["Loop seam", lengthText(motion.seamError(shown), unit)]] : []),
     ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
     ["Frames", `${counters.fps.toFixed(0)} per second`],
     ["Vertices", countText(state.forest ? state.forest.vertices : plants.reduce((sum, plant) => sum + plant.vertices, 0))],
   ]);
   $("level-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
-    : motion.level < motion.target ? `Level ${motion.target} is still on its way` : `No vertex is further off than ${lengthText(error, unit)}`;
+    : motion.level < motion.target ? `Level ${motion.target} is still on its way` : `No vertex is further off than ${within(main, shown)}`;
   if (motion.automatic) $("level").value = motion.target;
   $("scale-title").textContent = "Distance from the deepest level";
   $("scale-middle").textContent = lengthText(main.heatMost / 4, unit);

@@ -39,9 +39,9 @@ export class Choice {
     return [...this.element.querySelectorAll("button")];
   }
 
-  fill(values, labels) {
+  fill(values, labels, titles = []) {
     this.element.replaceChildren(...values.map((value, i) =>
-      Object.assign(document.createElement("button"), { textContent: labels[i] })));
+      Object.assign(document.createElement("button"), { textContent: labels[i], title: titles[i] ?? "" })));
     this.buttons.forEach((button, i) => { button.dataset.value = values[i]; });
     this.mark();
   }

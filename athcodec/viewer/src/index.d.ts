@@ -127,7 +127,7 @@ export interface ATHMotionEvents {
 export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Of the file: see AthInfo in ath_decoder.d.ts. */
   readonly info: { vertexCount: number; branchCount: number; frameCount: number; segmentCount: number; levelCount: number;
-    fileLength: number; maxError: number; [name: string]: unknown };
+    depthLevels: number; fileLength: number; maxError: number; [name: string]: unknown };
   /** At least one. */
   readonly clips: readonly ATHClip[];
   /** The clip that plays. */
@@ -142,6 +142,8 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
   readonly levelCount: number;
+  /** Whether a level refines all of the plant, rather than showing more of its branches: those from info.depthLevels on. */
+  refines(level: number): boolean;
 
   /** Seconds, as asked for; those of the clip's first frame. */
   readonly time: number;
