@@ -40,6 +40,8 @@ from spec.scripted import (
     grown,
     hierarchy_chunk,
     hierarchy_script,
+    refined_rest_chunk,
+    refined_row,
     rest_chunk,
     row,
     steady_time,
@@ -861,8 +863,8 @@ valid(
         Entry(0x8000, FUTURE),
         Entry(0x8008, FUTURE),
         Entry(0x800F, b""),
-        Entry(0x8015, FUTURE, 0, 1),
-        Entry(0x8015, FUTURE, 1, 1),
+        Entry(0x8016, FUTURE, 0, 1),
+        Entry(0x8016, FUTURE, 1, 1),
         Entry(0x801F, FUTURE, 1, 1),
         Entry(0x801F, b"", 2, 0),
         Entry(0x8021, FUTURE),
@@ -1216,16 +1218,18 @@ def everything() -> Draft:
     }
     plant = Plant(
         EVERYTHING,
-        clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.0), rd.Clip(5, 1, "down")),
+        clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0), rd.Clip(5, 1, "down")),
         rest=coded_rest(EVERYTHING, Chance(71), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
         vertex_source=random.permutation(vertices).tolist(),
         is_float64=True,
-        heads=HEADS | bases,
-        scripts={(rd.STEMS, level): lambda level=level: Chance(72 + level) for level in range(5)}
+        layers=2,
+        heads=HEADS | bases | {5: stems_head(0.01, 3)},
+        scripts={(rd.STEMS, level): lambda level=level: Chance(72 + level) for level in range(6)}
         | {(rd.AFFINES, level): lambda level=level: Chance(80 + level, large=3) for level in range(5)}
-        | {(rd.CORRECTIONS, 4): lambda: Chance(90)}
+        | {(rd.CORRECTIONS, level): lambda level=level: Chance(86 + level) for level in (4, 5)}
+        | {(rd.REFINED_REST, 5, 0): lambda: Chance(92, large=4)}
         | {
             (rd.SHAPES, 1, 0): [
                 2,
@@ -1239,19 +1243,20 @@ def everything() -> Draft:
                 *(n for i in range(9) for n in row((i, 1, -i), (0, 2, 0))),
             ],
             (rd.SHAPES, 2, 0): [1, *row((0, 1, 0)), 0, 2, *row((1, 0, 0), (0, 0, 1)), *row((0, 0, 8))],
+            (rd.SHAPES, 5, 0): [2, *refined_row((0, -1, 0)), *refined_row((3, 0, 0), (0, 0, -1))],
         },
     )
     return (
         plant.draft()
-        .with_header(level_count=6, full_level_count=6)
+        .with_header(level_count=7, full_level_count=7)
         .add(
-            Entry(rd.EXACT, b"", 5, 0),
-            Entry(rd.EXACT, b"", 5, 1),
+            Entry(rd.EXACT, b"", 6, 0),
+            Entry(rd.EXACT, b"", 6, 1),
             Entry(rd.METADATA, b"\1" + WIND_FRAME),
             Entry(rd.FACES, numbers(FACES_3)),
             Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
             Entry(0x8009, FUTURE),
-            Entry(0x8015, FUTURE, 1, 1),
+            Entry(0x8016, FUTURE, 1, 1),
             Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
             Entry(rd.ATTRIBUTE, element(NESTED_16, b"\1", "a")),
             Entry(0x8040, FUTURE),
@@ -1275,6 +1280,8 @@ def encoded(name: str) -> bytes:
         "encoded-clips": [Stem(-1, 4), Stem(0, 3, 2)],
         "encoded-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
         "encoded-lossless-wide": [Stem(-1, 3), Stem(0, 2, 1)],
+        "encoded-layers": [Stem(-1, 9), Stem(0, 6, 4), Stem(1, 5, 3), Stem(0, 5, 8), Stem(3, 3, 2)],
+        "encoded-layers-lossless": [Stem(-1, 4), Stem(0, 3, 1)],
     }[name]
     random = np.random.default_rng(7)
     rest = np.array(grown(stems, 7)) * 0.1
@@ -1298,6 +1305,7 @@ def encoded(name: str) -> bytes:
             target,
             rel_error=2e-3,
             segment_frames=20,
+            ladder=(1e-1, 2e-2) if "layers" in name else (),
             exact_rest=name == "encoded-exact-rest",
             lossless="lossless" in name,
         )
@@ -1312,9 +1320,183 @@ for name, why in (
     ("encoded-clips", "two clips, one of them a loop"),
     ("encoded-lossless", "every bit of the source at the last level"),
     ("encoded-lossless-wide", "every bit of binary64 positions at the last level"),
+    ("encoded-layers", "three layers of precision"),
+    ("encoded-layers-lossless", "three layers of precision, then every bit of the source"),
 ):
     valid(name, f"what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
 
+
+# ---- valid: layers -----------------------------------------------------------------------------------------
+
+
+def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
+    """The fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`: scripts."""
+    more = {"scripts": {}} | fields
+    scripts = forked().scripts | {
+        (rd.SHAPES, 3, 0): [
+            3,
+            *refined_row((1, 0, -2), (0, 3, 0)),
+            0,
+            *refined_row((0, 0, 5)),
+            1,
+            *refined_row((2, 0, 0)),
+        ],
+        (rd.SHAPES, 4, 0): [2, *refined_row((-1, 1, 0), (0, 0, 7), (1, 0, 0)), *refined_row((0, 0, 1)), 0],
+    }
+    for q in range(1, layers):
+        scripts |= {
+            (rd.STEMS, 2 + q): lambda q=q: Chance(10 + q),
+            (rd.CORRECTIONS, 2 + q): lambda q=q: Chance(20 + q),
+            (rd.REFINED_REST, 2 + q, 0): lambda q=q: Chance(30 + q, large=4),
+        }
+    scripts = {place: script for place, script in scripts.items() if place not in left_out}
+    return forked(**{"layers": layers, "heads": LAYER_HEADS} | more | {"scripts": scripts | more["scripts"]})
+
+
+LAYER_HEADS = {level: stems_head(0.5 / 4 ** max(level - 2, 0), level % 5) for level in range(12)}
+MIXED = [
+    Stem(-1, 4),
+    Stem(0, 3, 2, SHEET),
+    Stem(1, 2, 1, LOOSE),
+    Stem(0, 70, 3),
+    Stem(3, 5, 66, SHEET | LOOSE),
+    Stem(-1, 6, 0, SHEET),
+    Stem(5, 3, 4, WHOLE),
+    Stem(6, 2, 1),
+]
+BEAMS = [
+    Stem(-1, 36, lag=0),
+    Stem(0, 5, 20, lag=0),
+    Stem(0, 1, 35, lag=0),
+    Stem(0, 40, 7, SHEET, lag=2),
+    Stem(-1, 1, lag=0),
+]
+
+
+def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:
+    """Three layers of random rows and rest poses."""
+    plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
+    plant.scripts |= {
+        (rd.STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
+    }
+    plant.scripts |= {
+        (rd.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6) for level in range(40)
+    }
+    return plant
+
+
+def learned(*levels: int) -> dict:
+    """Heads with learned time bases for some levels, in segments of two frames."""
+    random = np.random.default_rng(5)
+    return LAYER_HEADS | {
+        level: stems_head(
+            0.5 / 4 ** max(level - 2, 0), level % 5, 10, 1 + level % 2, basis_by_chance(random, 1 + level % 2, 2, 10)
+        )
+        for level in levels
+    }
+
+
+def lossless_layers() -> Draft:
+    """An additional last level with empty streams."""
+    return (
+        layered()
+        .draft()
+        .with_header(level_count=6, full_level_count=6)
+        .add(Entry(rd.EXACT, b"", 5, 0), Entry(rd.EXACT, b"", 5, 1))
+    )
+
+
+valid("layers-smallest", "one vertex in two layers, all of it empty", lone(layers=2))
+valid("layers-eight", "as many layers as there may be", refinements([Stem(-1, 2), Stem(0, 2, 1)], 31, layers=8))
+valid(
+    "layers-two",
+    "a refinement of motion alone: the rest pose is that of the layer before, and no piece has shapes",
+    layered(2, (rd.REFINED_REST, 3, 0), (rd.SHAPES, 3, 0), (rd.CORRECTIONS, 3)),
+)
+valid("layers-three", "refinements with REFINED_REST, SHAPES and CORRECTIONS", layered())
+valid(
+    "layers-rest-of-last",
+    "the second refinement refines the rest pose of the layer before the one before",
+    layered(3, (rd.REFINED_REST, 3, 0)),
+)
+valid(
+    "layers-rest-of-first", "the second refinement has the rest pose of the first", layered(3, (rd.REFINED_REST, 4, 0))
+)
+valid("layers-shapes-of-last", "shapes in a refinement alone", layered(3, (rd.SHAPES, 1, 0), (rd.SHAPES, 3, 0)))
+valid("layers-shapes-of-first", "shapes in the first layer alone", layered(3, (rd.SHAPES, 3, 0), (rd.SHAPES, 4, 0)))
+valid(
+    "layers-learned-first",
+    "learned time bases in the first layer: predictions in cosines are of all frequencies",
+    layered(heads=learned(1, 2)),
+)
+valid("layers-learned-one", "a learned time basis in one refinement", layered(heads=learned(3)))
+valid(
+    "layers-learned-low",
+    "a learned time basis of a level that holds the first modes of a piece",
+    layered(heads=learned(1)),
+)
+valid("layers-learned-all", "learned time bases in all layers", layered(heads=learned(1, 2, 3, 4)))
+valid(
+    "layers-mixed",
+    "rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
+    refinements(MIXED, 32, frames=9, segments=2),
+)
+valid(
+    "layers-still",
+    "refinements whose rows are all predictions",
+    layered(scripts={(rd.STEMS, 3): [], (rd.STEMS, 4): [], (rd.REFINED_REST, 3, 0): [], (rd.REFINED_REST, 4, 0): []}),
+)
+valid(
+    "layers-beams",
+    "runs of beams, some of two, and steps, in all rest poses",
+    refinements(BEAMS, 33, rest=coded_rest(BEAMS, Chance(61, large=4))),
+)
+valid("layers-large", "large integers in all streams", refinements(MIXED[:3], 34, large=29, frames=5, wide=True))
+valid(
+    "layers-ratio-1",
+    "Ratio 1",
+    refinements(
+        MIXED[:3],
+        35,
+        frames=5,
+        ratio=1,
+        heads=learned(2) | {3: stems_head(0.5, 1), 4: stems_head(0.5, 1)},
+        segments=2,
+        clips=(rd.Clip(2, 1, "a"), rd.Clip(2, 1, "b")),
+    ),
+)
+valid("layers-ratio-largest", "Ratio 65535", layered(ratio=65535, heads=learned(1, 2)))
+valid(
+    "layers-shift-15",
+    "Shift 15: what it takes beyond 30 bits is kept there",
+    layered(
+        shift=15,
+        scripts={(rd.SHAPES, 1, 0): [2, *row((1 << 20, 0, -(1 << 14)), (0, -(1 << 29), 0)), *row((0, 0, 1)), 0]},
+    ),
+)
+valid(
+    "layers-exact-rest",
+    "refinements of an exact rest pose",
+    layered(
+        3,
+        (rd.REFINED_REST, 3, 0),
+        (rd.REFINED_REST, 4, 0),
+        rest=exact_rest(FORK, [float(i * i % 7) for i in range(15)], False),
+    ),
+)
+valid("layers-wide", "binary64 positions", layered(wide=True))
+valid(
+    "layers-clips",
+    "two clips, one of them a loop",
+    layered(clips=(loop(rd.Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), rd.Clip(2, 1, "down"))),
+)
+valid("layers-lossless", "EXACT behind three layers", lossless_layers)
+for level_ in range(5):
+    valid(
+        f"layers-upto-{level_}",
+        f"three layers, shortened after level {level_}",
+        lambda level=level_: layered().draft().upto(level),
+    )
 
 # ---- invalid: the header -----------------------------------------------------------------------------------
 
@@ -1418,7 +1600,7 @@ for bit in range(1, 8):
 header("max-error-nan", "BAD_HEADER", "Max_Error is NaN", max_error=NAN)
 header("max-error-infinite", "BAD_HEADER", "Max_Error is infinite", max_error=INFINITY)
 header("max-error-negative", "BAD_HEADER", "Max_Error is below 0", max_error=-TINY)
-header("reserved", "BAD_HEADER", "Reserved is 2^63", reserved=1 << 63)
+header("reserved", "BAD_HEADER", "the top bit of Reserved is set", reserved=bytes(6) + b"\x80")
 header(
     "first-rule-counts",
     "BAD_HEADER",
@@ -1500,7 +1682,7 @@ def inserted(at: int, *entries: Entry) -> Draft:
 for kind, level, why in (
     (0x0000, 255, "kind 0"),
     (0x0008, 255, "in the prelude"),
-    (0x0015, 0, "of motion"),
+    (0x0016, 0, "of motion"),
     (0x0021, 255, "behind the motion"),
     (0x7FFF, 255, "the last one"),
 ):
@@ -1515,6 +1697,7 @@ for kind, level, name in (
     (0x0004, 255, "METADATA"),
     (0x8010, 1, "STEMS"),
     (0x8013, 1, "SHAPES"),
+    (0x8015, 1, "REFINED_REST"),
     (0x8007, 255, "CLIPS"),
     (0x0020, 255, "ATTRIBUTE"),
 ):
@@ -1556,7 +1739,7 @@ table(
     "unknown-without-level",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind with Level 255",
-    lambda: fork().add(Entry(0x8015, b"")),
+    lambda: fork().add(Entry(0x8016, b"")),
 )
 table(
     "unknown-segment",
@@ -1573,7 +1756,7 @@ table(
     "order-optional",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind before the known ones of its level: bit 15 counts",
-    lambda: inserted(3, Entry(0x8015, b"", 0, 0)),
+    lambda: inserted(3, Entry(0x8016, b"", 0, 0)),
 )
 table(
     "order-attributes",
@@ -1610,7 +1793,7 @@ table(
     "twice-unknown-motion",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind twice",
-    lambda: fork().add(Entry(0x8015, b"", 0, 0), Entry(0x8015, b"", 0, 0)),
+    lambda: fork().add(Entry(0x8016, b"", 0, 0), Entry(0x8016, b"", 0, 0)),
 )
 table(
     "length-limit",
@@ -1690,9 +1873,9 @@ table(
 # ---- invalid: ends and checksums ---------------------------------------------------------------------------
 
 
-def cut(short: Callable[[Draft], int]) -> bytes:
-    """The first chunks of the fork, less some bytes."""
-    draft = fork()
+def cut(short: Callable[[Draft], int], draft: Draft | None = None) -> bytes:
+    """The first chunks of a file, of the fork if none is given, less some bytes."""
+    draft = draft or fork()
     return draft.file()[: short(draft)]
 
 
@@ -2472,6 +2655,195 @@ motion(
     lambda: fork().content(rd.CORRECTIONS, 2, 1) + b"\1" * 12,
     1,
 )
+
+# ---- invalid: layers ---------------------------------------------------------------------------------------
+
+header("layers-0", "BAD_HEADER", "Layer_Count 0", layer_count=0)
+header("layers-9", "BAD_HEADER", "Layer_Count 9", layer_count=9, level_count=10, full_level_count=10)
+header("layers-not-those", "BAD_HEADER", "Layer_Count 4: a file of h = 0 has 5 levels, or 6 with EXACT", layer_count=4)
+for place in range(7):
+    header(
+        f"reserved-{place}",
+        "BAD_HEADER",
+        f"byte {place} of Reserved is 1",
+        reserved=bytes(place) + b"\1" + bytes(6 - place),
+    )
+for count in (1, 4):
+    invalid(
+        f"layers-count-{count}",
+        "BAD_HEADER",
+        "open",
+        f"Layer_Count {count}, Full_Level_Count is that of 3 layers",
+        lambda count=count: layered().draft().with_header(layer_count=count),
+    )
+table(
+    "layers-exact-taken",
+    "BAD_CHUNK_TABLE",
+    "Layer_Count 2 makes the last level the lossless one: EXACT is missing",
+    lambda: layered().draft().with_header(layer_count=2),
+)
+table(
+    "layers-no-stems",
+    "BAD_CHUNK_TABLE",
+    "a refinement lacks the STEMS of a segment",
+    lambda: layered().draft().without(rd.STEMS, 3, 1),
+)
+table(
+    "layers-affines",
+    "BAD_CHUNK_TABLE",
+    "AFFINES of a refinement",
+    lambda: layered().draft().add(Entry(rd.AFFINES, b"", 3, 0)),
+)
+table(
+    "layers-exact-early",
+    "BAD_CHUNK_TABLE",
+    "EXACT at the level of the last refinement",
+    lambda: layered().draft().add(Entry(rd.EXACT, b"", 4, 0)),
+)
+table(
+    "layers-corrections-low",
+    "BAD_CHUNK_TABLE",
+    "CORRECTIONS below level h + 1",
+    lambda: layered().draft().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 1, 0)),
+)
+table(
+    "layers-corrections-exact",
+    "BAD_CHUNK_TABLE",
+    "CORRECTIONS of the lossless level behind three layers",
+    lambda: lossless_layers().add(Entry(rd.CORRECTIONS, struct.pack("<f", 1.0), 5, 0)),
+)
+table(
+    "layers-shapes-of-segment-1",
+    "BAD_CHUNK_TABLE",
+    "SHAPES of a refinement stands with segment 0",
+    lambda: layered().draft().add(Entry(rd.SHAPES, b"\0", 3, 1)),
+)
+for level_, why in ((1, "a level of the hierarchy"), (2, "the first layer"), (5, "the lossless level")):
+    table(
+        f"refined-rest-{level_}",
+        "BAD_CHUNK_TABLE",
+        f"REFINED_REST of {why}",
+        lambda level=level_: lossless_layers().add(Entry(rd.REFINED_REST, b"", level, 0)),
+    )
+table(
+    "refined-rest-of-segment-1",
+    "BAD_CHUNK_TABLE",
+    "REFINED_REST stands with segment 0",
+    lambda: layered(3, (rd.REFINED_REST, 3, 0)).draft().add(Entry(rd.REFINED_REST, b"", 3, 1)),
+)
+
+
+def refinement(name: str, kind: int, reason: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
+    """Other content for a chunk of level 3; a function gets what it has."""
+
+    def make() -> Draft:
+        draft = layered().draft()
+        made = content(draft.content(kind, 3, segment)) if callable(content) else content
+        return draft.change(kind, 3, segment, content=made)
+
+    invalid(f"refined-{rd.KINDS[kind].lower().removeprefix('refined_')}-{name}", "BAD_CHUNK", 3, reason, make)
+
+
+def scripted_refinement(name: str, place: tuple, reason: str, *script) -> None:
+    """Another script for a stream of level 3, of which it is the last that is written."""
+    invalid(name, "BAD_CHUNK", 3, reason, lambda: layered(2, scripts={place: list(script)}).draft())
+
+
+refinement("ratio-0", rd.STEMS, "Ratio is 0", lambda content: bytes(2) + content[2:])
+refinement("empty", rd.STEMS, "STEMS of a refinement without bytes", b"")
+refinement("ratio-alone", rd.STEMS, "nothing behind Ratio", b"\4\0")
+refinement("step-zero", rd.STEMS, "Step of a refinement is 0", lambda content: content[:2] + bytes(4) + content[6:])
+refinement("zero-behind", rd.STEMS, "a zero byte behind the stream of refined stems", lambda content: content + b"\0")
+refinement(
+    "bytes-behind", rd.STEMS, "bytes behind the stream of refined stems", lambda content: content + b"\1" * 12, 1
+)
+scripted_refinement("refined-stems-frequencies", (rd.STEMS, 3, 0), "a refined row codes three frequencies of two", 3)
+refinement("empty", rd.SHAPES, "SHAPES of a refinement without bytes", b"")
+refinement("shift-16", rd.SHAPES, "Shift is 16", lambda content: b"\x10" + content[1:])
+refinement("zero-behind", rd.SHAPES, "a zero byte behind the stream of refined shapes", lambda content: content + b"\0")
+refinement("bytes-behind", rd.SHAPES, "bytes behind the stream of refined shapes", lambda content: content + b"\1" * 12)
+scripted_refinement(
+    "refined-shapes-too-many", (rd.SHAPES, 3, 0), "a piece of three modes has ten shapes in a refinement", 10
+)
+scripted_refinement(
+    "refined-shapes-modes", (rd.SHAPES, 3, 0), "a refined shape has numbers for four modes of three", 1, 4
+)
+scripted_refinement(
+    "refined-shapes-all-zero", (rd.SHAPES, 3, 0), "a shape that the layer before lacks is all 0", 3, 0, 0, 0
+)
+scripted_refinement(
+    "refined-shapes-cancelled", (rd.SHAPES, 3, 0), "differences make a shape all 0", 2, 0, *[1, 0, 0, 4, 1]
+)
+refinement("short", rd.REFINED_REST, "7 bytes", bytes(7))
+for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    refinement(
+        f"step-{what}",
+        rd.REFINED_REST,
+        f"Rest_Step of a refinement is {value}",
+        lambda content, value=value: refined_rest_chunk(content[8:], value),
+    )
+refinement(
+    "infinite",
+    rd.REFINED_REST,
+    "a refined rest pose that is not finite",
+    lambda content: refined_rest_chunk(content[8:], HIGHEST),
+)
+refinement(
+    "zero-behind",
+    rd.REFINED_REST,
+    "a zero byte behind the stream of a refined rest pose",
+    lambda content: content + b"\0",
+)
+refinement(
+    "bytes-behind",
+    rd.REFINED_REST,
+    "bytes behind the stream of a refined rest pose",
+    lambda content: content + b"\1" * 20,
+)
+invalid(
+    "refined-rest-of-exact",
+    "BAD_CHUNK",
+    3,
+    "REFINED_REST of a rest pose that is exact",
+    lambda: (
+        layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
+        .draft()
+        .add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 3))
+    ),
+)
+invalid(
+    "refined-rest-modes",
+    "BAD_CHUNK",
+    2,
+    "a refined run of two vertices has three modes",
+    lambda: (
+        Plant([Stem(-1, 3, lag=0)], rest=coded_rest([Stem(-1, 3, lag=0)], []), layers=2)
+        .draft()
+        .add(Entry(rd.REFINED_REST, refined_rest_chunk(refined_run(3)), 2))
+    ),
+)
+invalid(
+    "refined-rest-checksum",
+    "BAD_CHECKSUM",
+    3,
+    "the Checksum of REFINED_REST is another",
+    lambda: layered().draft().change(rd.REFINED_REST, 3, checksum=0),
+)
+invalid(
+    "refined-rest-cut",
+    "TRUNCATED",
+    3,
+    "the file ends inside REFINED_REST",
+    lambda: cut(lambda draft: end_of(draft, rd.REFINED_REST, 3) - 1, layered().draft()),
+)
+
+
+def refined_run(count: int) -> bytes:
+    """The stream of a root of three vertices, the last two of which are a run with so many modes."""
+    branches = branches_of([Stem(-1, 3, lag=0)])
+    before = rd.RestLayer([[0.0] * 3] * 3, [[0] * 3] * 3)
+    return write(rd.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
+
 
 # ---- invalid: static data ----------------------------------------------------------------------------------
 

@@ -985,6 +985,7 @@ def decode_difference(
 
 PIECE_VERTICES = 64
 SHAPE_MODES = 16
+MOST_SHIFT = 15
 
 
 @dataclass
@@ -1100,10 +1101,13 @@ class Plan:
         """Whether playing `shown` needs the maps of `level`."""
         return any(node.coded and node.level == level and shown <= node.last for node in self.nodes)
 
-    def refine(self, level: int) -> None:
-        """Makes it that of a refinement: all pieces come with its level."""
-        for piece in self.pieces:
+    def refined(self, branches: list[Branch], level: int) -> Plan:
+        """That of a refinement, all of whose pieces come with its level; its rest pose is this one's."""
+        plan = Plan(branches)
+        plan.rest = self.rest
+        for piece in plan.pieces:
             piece.level, piece.low_level, piece.low_modes = level, -1, 0
+        return plan
 
     # From here on the rest pose is needed.
 
@@ -1406,10 +1410,9 @@ def unit_shape(row: list[list[int]]) -> np.ndarray:
     return (numbers * (1.0 / np.sqrt(length2))).reshape(SHAPE_MODES, 3)
 
 
-def decode_refined_shapes(chunk: bytes, plan: Plan, motion: Motion, before: Motion) -> None:
-    """All shapes of a refinement, about those of the layer before."""
-    require(len(chunk) >= 1 and chunk[0] <= 15, "Shift of SHAPES is out of range")
-    coder, model, counts, shift = RangeDecoder(chunk[1:]), RefinementModel(), NumberModel(), chunk[0]
+def decode_refined_shapes(stream: bytes, plan: Plan, motion: Motion, before: Motion, shift: int) -> None:
+    """All shapes of a refinement, about those of the layer before times 2^shift."""
+    coder, model, counts = RangeDecoder(stream), RefinementModel(), NumberModel()
     most = 0x3FFFFFFF >> shift
     for piece in plan.pieces:
         known = before.shape_rows.get(piece.number, [])
@@ -1847,11 +1850,10 @@ class Refinement(Pose):
         super().__init__(plan, motion)
         self.before = before
 
-    def decode_stems(self, chunk: bytes, level: int) -> None:
-        require(len(chunk) >= 2 and u16(chunk, 0) >= 1, "Ratio of STEMS is 0")
-        self.ratio = u16(chunk, 0)
-        self.coder = RangeDecoder(read_stems_head(chunk[2:], self.motion, level))
-        self.model, self.stream = RefinementModel(), self.motion.streams[level]
+    def decode_stems(self, stream: bytes, level: int, ratio: int) -> None:
+        """`ratio`: steps of the layer before over those of this one."""
+        self.coder, self.model, self.ratio = RangeDecoder(stream), RefinementModel(), ratio
+        self.stream = self.motion.streams[level]
         for piece in self.plan.pieces:
             self.decode_piece(piece)
             self.place_piece(piece)
@@ -2271,9 +2273,8 @@ class AthFile:
     def _plan_of(self, q: int) -> Plan:
         """That of a layer, on its own rest pose."""
         for layer in range(len(self._plans), q + 1):
-            level, plan = self.plan.height + 1 + layer, Plan(self.branches)
-            plan.refine(level)
-            plan.rest = self._plans[-1].rest
+            level = self.plan.height + 1 + layer
+            plan = self._plans[-1].refined(self.branches, level)
             if self.find(REFINED_REST, level):
                 plan.rest = self._refined_rest(self.content(REFINED_REST, level))
             self._plans.append(plan)
@@ -2364,9 +2365,13 @@ class AthFile:
         plan, level = self._plan_of(q), self.plan.height + 1 + q
         motion = Motion(frames, cosine_waves(frames))
         if self.find(SHAPES, level):
-            decode_refined_shapes(self.content(SHAPES, level), plan, motion, before.motion)
+            chunk = self.content(SHAPES, level)
+            require(len(chunk) >= 1 and chunk[0] <= MOST_SHIFT, "Shift of SHAPES is out of range")
+            decode_refined_shapes(chunk[1:], plan, motion, before.motion, chunk[0])
+        chunk = self.content(STEMS, level, s)
+        require(len(chunk) >= 2 and u16(chunk, 0) >= 1, "Ratio of STEMS is 0")
         pose = Refinement(plan, motion, before)
-        pose.decode_stems(self.content(STEMS, level, s), level)
+        pose.decode_stems(read_stems_head(chunk[2:], motion, level), level, u16(chunk, 0))
         return pose
 
     # Static data.

@@ -53,6 +53,12 @@ def row(*frequencies: tuple[int, int, int]) -> list[int]:
     return [len(frequencies), *(n for xyz in frequencies for n in xyz)]
 
 
+def refined_row(*frequencies: tuple[int, int, int]) -> list[int]:
+    """Script of a refined row: differences from predictions that are 0; from others, a minus is against the sign."""
+    numbers = [n for xyz in frequencies for n in xyz]
+    return [len(frequencies), *(value for n in numbers for value in ((abs(n), int(n < 0)) if n else (0,)))]
+
+
 def magnitude_bits(magnitude: int, longest: int) -> list[int]:
     """Decisions of a magnitude: its length in unary, and the bits after the leading one."""
     length = magnitude.bit_length()
@@ -168,10 +174,10 @@ def write(function: Callable, script: Script | list, *arguments) -> bytes:
 
 # ---- files in pieces ---------------------------------------------------------------------------------------
 
-HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
+HEADER = struct.Struct("<8sHHIQIIIIIBBBBdB7s")
 HEADER_FIELDS = (
     "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-    "segment_count level_count full_level_count clip_count flags max_error reserved"
+    "segment_count level_count full_level_count clip_count flags max_error layer_count reserved"
 ).split()
 ENTRY = struct.Struct("<HBBIII")
 
@@ -218,7 +224,8 @@ class Draft:
                 clip_count=1,
                 flags=0,
                 max_error=1.0,
-                reserved=0,
+                layer_count=1,
+                reserved=bytes(7),
             )
             | self.header
         )
@@ -349,6 +356,10 @@ def rest_chunk(
     return struct.pack("<BBH3dd", exact, rest_type, reserved, *origin, step) + stream
 
 
+def refined_rest_chunk(stream: bytes, step: float = 0.0625) -> bytes:
+    return struct.pack("<d", step) + stream
+
+
 def clip_entry(
     frames: int,
     segments: int = 1,
@@ -396,7 +407,8 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
 
 @dataclass
 class Plant:
-    """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows."""
+    """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows; SHAPES,
+    CORRECTIONS and REFINED_REST are there only with one."""
 
     stems: list[Stem]
     frames: int = 1
@@ -413,6 +425,9 @@ class Plant:
     default_head: bytes = stems_head()
     origin: tuple = (0.0, 0.0, 0.0)
     step: float = 0.25
+    layers: int = 1
+    ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
+    shift: int = 2  # of SHAPES
 
     def draft(self) -> Draft:
         vertices = sum(stem.count for stem in self.stems)
@@ -423,9 +438,9 @@ class Plant:
             vertices,
         )
         branches, *_ = rd.decode_hierarchy(stream, len(self.stems), vertices)
-        self.plan = rd.Plan(branches)
         rest = self._rest(branches)
-        self._set_rest(branches, rest)
+        self.plan = rd.Plan(branches)
+        rests = self._set_rest(branches, rest)
         clips = self.clips or (rd.Clip(self.frames, self.segments),)
         entries = [
             Entry(rd.HIERARCHY, hierarchy_chunk(stream)),
@@ -438,15 +453,17 @@ class Plant:
                     rd.CLIPS, b"".join(clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)
                 )
             )
-        self.shapes: dict = {}
+        self.plans, self.shapes = [self.plan], [self._no_motion(1)]
         for level in range(self.plan.height + 2):
             if (rd.SHAPES, level, 0) in self.scripts:
                 entries.append(Entry(rd.SHAPES, self._shapes(level), level))
+        for q in range(1, self.layers):
+            entries += self._layer(branches, q, rests)
         lengths = [frames for clip in clips for frames in clip.segment_lengths]
         for s, frames in enumerate(lengths):
             entries += self._segment(s, frames)
         entries.sort(key=lambda entry: entry.key)
-        levels = self.plan.height + 2
+        levels = self.plan.height + 1 + self.layers
         return Draft(
             dict(
                 vertex_count=vertices,
@@ -457,6 +474,7 @@ class Plant:
                 full_level_count=levels,
                 clip_count=len(clips),
                 flags=int(self.is_float64),
+                layer_count=self.layers,
             ),
             tuple(entries),
         )
@@ -476,35 +494,87 @@ class Plant:
             rest_type=int(self.is_float64),
         )
 
-    def _set_rest(self, branches: list, chunk: bytes) -> None:
-        origin = np.array(struct.unpack_from("<3d", chunk, 4))
+    def _set_rest(self, branches: list, chunk: bytes) -> list[rd.RestLayer]:
+        """The rest pose of the first layer, for those that refine it; none where it is exact."""
         with np.errstate(all="ignore"):
             if chunk[0]:
-                self.plan.rest = np.array(rd.decode_exact_rest(chunk[36:], branches, bool(chunk[1]))) - origin
-            else:
-                self.plan.rest = np.array(rd.decode_rest(chunk[36:], branches, rd.f64(chunk, 28)))
+                points = rd.decode_exact_rest(chunk[36:], branches, bool(chunk[1]))
+                self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3d", chunk, 4))
+                return []
+            coded = rd.decode_rest(chunk[36:], branches, rd.f64(chunk, 28))
+            self.plan.rest = np.array(coded.rest)
+            return [coded]
+
+    def _no_motion(self, frames: int, shapes: rd.Motion | None = None) -> rd.Motion:
+        motion = rd.Motion(frames, rd.cosine_waves(frames))
+        if shapes:
+            motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
+        return motion
 
     def _shapes(self, level: int) -> bytes:
         """SHAPES by its script; its values are used by the streams of STEMS."""
-        motion = rd.Motion(1, rd.cosine_waves(1), shapes=self.shapes)
-        return write(rd.decode_shapes, self.scripts[rd.SHAPES, level, 0], self.plan, motion, level)
+        return self._write(rd.decode_shapes, (rd.SHAPES, level, 0), self.plan, self.shapes[0], level)
+
+    def _layer(self, branches: list, q: int, rests: list[rd.RestLayer]) -> list[Entry]:
+        """What all segments share of a refinement."""
+        level, entries = self.plan.height + 1 + q, []
+        plan, shapes = self.plans[-1].refined(branches, level), self._no_motion(1)
+        if (rd.REFINED_REST, level, 0) in self.scripts:
+            step = self.step / self.ratio**q
+            stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), branches, step, rests[-1])
+            entries.append(Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level))
+            rests.append(rd.decode_rest(stream, branches, step, rests[-1]))
+            plan.rest = np.array(rests[-1].rest)
+        if (rd.SHAPES, level, 0) in self.scripts:
+            stream = self._write(
+                rd.decode_refined_shapes, (rd.SHAPES, level, 0), plan, shapes, self.shapes[-1], self.shift
+            )
+            entries.append(Entry(rd.SHAPES, bytes([self.shift]) + stream, level))
+        self.plans.append(plan)
+        self.shapes.append(shapes)
+        return entries
 
     def _segment(self, s: int, frames: int) -> list[Entry]:
-        motion = rd.Motion(frames, rd.cosine_waves(frames), shapes=self.shapes)
-        entries = []
-        for level in range(self.plan.height + 2):
+        motion = self._no_motion(frames, self.shapes[0])
+        entries, last = [], self.plan.height + 1
+        for level in range(last + 1):
             if self.plan.has_stems(level):
-                head = self.heads.get((level, s), self.heads.get(level, self.default_head))
-                rd.read_stems_head(head, motion, level)
+                head = self._head(level, s, motion)
                 stream = self._write(rd.decode_stems, (rd.STEMS, level, s), self.plan, motion, level)
                 entries.append(Entry(rd.STEMS, head + stream, level, s))
             if self.plan.has_affines(level, level):
                 stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), self.plan, motion, level)
                 entries.append(Entry(rd.AFFINES, stream, level, s))
-        place = (rd.CORRECTIONS, self.plan.height + 1, s)
-        if place in self.scripts or place[:2] in self.scripts:
-            stream = self._write(rd.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
-            entries.append(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
+        if self.layers > 1:
+            entries += self._refinements(s, motion)
+        for level in range(last, last + self.layers):
+            place = (rd.CORRECTIONS, level, s)
+            if place in self.scripts or place[:2] in self.scripts:
+                stream = self._write(rd.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
+                entries.append(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
+        return entries
+
+    def _head(self, level: int, s: int, motion: rd.Motion) -> bytes:
+        """Of STEMS; the motion gets its steps and waves."""
+        head = self.heads.get((level, s), self.heads.get(level, self.default_head))
+        rd.read_stems_head(head, motion, level)
+        return head
+
+    def _refinements(self, s: int, motion: rd.Motion) -> list[Entry]:
+        """STEMS of further layers, from the motion of the first."""
+        entries, pose = [], rd.Pose(self.plan, motion)
+        with np.errstate(all="ignore"):
+            pose.place_level(self.plan.height + 1)
+        for q in range(1, self.layers):
+            level, before = self.plan.height + 1 + q, pose
+            motion = self._no_motion(motion.frames, self.shapes[q])
+            head = struct.pack("<H", self.ratio) + self._head(level, s, motion)
+            pose = rd.Refinement(self.plans[q], motion, before)
+            entries.append(
+                Entry(
+                    rd.STEMS, head + self._write(pose.decode_stems, (rd.STEMS, level, s), level, self.ratio), level, s
+                )
+            )
         return entries
 
     def _write(self, function: Callable, place: tuple, *arguments) -> bytes:
