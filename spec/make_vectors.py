@@ -1451,7 +1451,7 @@ valid(
     "runs of beams, some of two, and steps, in all rest poses",
     refinements(BEAMS, 33, rest=coded_rest(BEAMS, Chance(61, large=4))),
 )
-valid("layers-large", "large integers in all streams", refinements(MIXED[:3], 34, large=29, frames=5, wide=True))
+valid("layers-large", "large integers in all streams", refinements(MIXED[:3], 34, large=29, frames=5, is_float64=True))
 valid(
     "layers-ratio-1",
     "Ratio 1",
@@ -1484,7 +1484,7 @@ valid(
         rest=exact_rest(FORK, [float(i * i % 7) for i in range(15)], False),
     ),
 )
-valid("layers-wide", "binary64 positions", layered(wide=True))
+valid("layers-wide", "binary64 positions", layered(is_float64=True))
 valid(
     "layers-clips",
     "two clips, one of them a loop",

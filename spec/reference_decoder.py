@@ -664,7 +664,7 @@ def decode_refined_run(
         sums = in_order((modes * run[:, k]).T)
         coarse[k][:n] = numbers[k * n : k * n + n]
         predicted[k][:n] = [steps_in(total, step) if known != 0 else 0 for total, known in zip(sums, coarse[k])]
-    return decode_refined_row(coder, model, n, 0, predicted, magnitudes(coarse)).row
+    return decode_refined_row(coder, model, n, 0, predicted, 1, magnitudes(coarse)).row
 
 
 def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
@@ -897,9 +897,8 @@ def decode_row(
 
 class RefinementModel:
     def __init__(self):
-        self.differences = CoefficientModel()  # counts, and magnitudes of the differences
-        self.history = [[0] * SEGMENT_FRAMES for _ in range(SLOTS)]  # of the integers
-        self.numbers = [[NumberModel() for _ in range(3)] for _ in range(4)]
+        self.rows = CoefficientModel()  # of differences
+        self.numbers = [NumberModel(), NumberModel()]  # where the layer before has 0, elsewhere
         self.sign = [Context(32768) for _ in range(3)]
 
 
@@ -907,7 +906,6 @@ class RefinementModel:
 class RefinedRow:
     row: list[list[int]]
     differences: list[list[int]]  # from the prediction
-    coded: list[list[int]]  # the row's integers, but 0 from `count` on
     count: int  # frequencies of which differences are coded
 
 
@@ -916,8 +914,8 @@ def magnitudes(coarse: list[list[int]]) -> list[list[int]]:
 
 
 def loudness(steps: list[list[int]], below, axis: int, k: int) -> int:
-    """How large the integers of the layer before are around one that is 0, where no neighbour that is decoded says
-    so: behind it in frequency, on the axes after it, and in the row below."""
+    """How large the integers of the layer before are around one that is 0, where nothing is decoded yet: behind it in
+    frequency, on the axes after it, and in the row below."""
     loud = 4 * at_frequency(steps[axis], k + 1) + 2 * at_frequency(steps[axis], k + 2)
     for other in range(3):
         loud += at_frequency(steps[other], k + 1)
@@ -933,45 +931,35 @@ def decode_refined_row(
     rank: int,
     slot: int,
     predicted: list[list[int]],
+    ratio: int,
     steps: list[list[int]],
     below=None,
     above: RefinedRow | None = None,
 ) -> RefinedRow:
-    """Integers that are known about. `steps`: magnitudes of the row in steps of the layer before, `below`: those of
-    the row that follows."""
-    frames, history, own_history = len(predicted[0]), model.differences.history[slot], model.history[slot]
-    count = decode_count(
-        coder, model.differences, model.differences.history_count[slot], above.count if above else 0, rank
-    )
-    differences, coded = zero_row(frames), zero_row(frames)
+    """Integers that are known about. `ratio`: steps of this layer in one of the layer before. `steps`: magnitudes of
+    the row in steps of the layer before, `below`: those of the row that follows."""
+    frames, rows = len(predicted[0]), model.rows
+    history = rows.history[slot]
+    count = decode_count(coder, rows, rows.history_count[slot], above.count if above else 0, rank)
+    differences = zero_row(frames)
     for k in range(count):
         common = common_magnitude(differences, above and above.differences, k)
-        own_common = common_magnitude(coded, above and above.coded, k)
         for axis in range(3):
-            of_differences = expected_magnitude(differences, common, history[k], axis, k)
-            of_integers = expected_magnitude(coded, own_common, own_history[k], axis, k)
-            size = steps[axis][k]
-            if size == 0:
-                loud = loudness(steps, below, axis, k)
-                expected, around = of_integers + 2 * loud, 0 if loud == 0 else 1 if loud < 3 else 2
-            else:
-                expected, around = of_differences, 0 if of_integers < 12 * size else 1 if of_integers < 40 * size else 2
-            difference = decode_difference(
-                coder, model, model.numbers[min(size, 3)][around], expected, predicted[axis][k]
-            )
-            differences[axis][k] = difference
-            coded[axis][k] = predicted[axis][k] + difference
-    model.differences.history_count[slot] = count
+            expected = expected_magnitude(differences, common, history[k], axis, k)
+            known = steps[axis][k] > 0
+            if not known:
+                expected += 2 * loudness(steps, below, axis, k)
+            elif ratio > 1:
+                expected = 4 * ratio
+            differences[axis][k] = decode_difference(coder, model, known, expected, predicted[axis][k])
+    rows.history_count[slot] = count
     remember(history, differences)
-    remember(own_history, coded)
-    row = [coded[axis][:count] + predicted[axis][count:] for axis in range(3)]
-    return RefinedRow(row, differences, coded, count)
+    row = [[p + d for p, d in zip(*axis, strict=True)] for axis in zip(predicted, differences, strict=True)]
+    return RefinedRow(row, differences, count)
 
 
-def decode_difference(
-    coder: RangeDecoder, model: RefinementModel, number: NumberModel, expected: int, predicted: int
-) -> int:
-    magnitude = code_unsigned(coder, number, expected)
+def decode_difference(coder: RangeDecoder, model: RefinementModel, known: bool, expected: int, predicted: int) -> int:
+    magnitude = code_unsigned(coder, model.numbers[known], expected)
     if magnitude == 0:
         return 0
     if predicted == 0:
@@ -1423,7 +1411,7 @@ def decode_refined_shapes(stream: bytes, plan: Plan, motion: Motion, before: Mot
             coarse = known[s] if s < len(known) else zero_row(SHAPE_MODES)
             predicted = [[min(max(number, -most), most) << shift for number in axis] for axis in coarse]
             above = decode_refined_row(
-                coder, model, plan.shape_modes(piece), s, predicted, magnitudes(coarse), None, above
+                coder, model, plan.shape_modes(piece), s, predicted, 1 << shift, magnitudes(coarse), None, above
             )
             rows.append(above.row)
         set_shapes(motion, piece, rows)
@@ -1912,7 +1900,13 @@ class Refinement(Pose):
         coarse = (row or zero_row(self.frames)) if cosines else None
         predicted = predict_row(self.stream, frequencies, step, self.ratio, track, coarse)
         return decode_refined_row(
-            self.coder, self.model, len(self.stream.waves), slot, predicted, self.magnitudes(predicted, coarse)
+            self.coder,
+            self.model,
+            len(self.stream.waves),
+            slot,
+            predicted,
+            self.ratio,
+            self.magnitudes(predicted, coarse),
         ).row
 
     def decode_modes(self, piece: Piece, frequencies: int, known: int, coarse) -> None:
@@ -1926,7 +1920,7 @@ class Refinement(Pose):
                 continue
             below = steps[m + 1] if m + 1 < rank else None
             above = decode_refined_row(
-                self.coder, self.model, len(self.stream.waves), m, predicted[m], steps[m], below, above
+                self.coder, self.model, len(self.stream.waves), m, predicted[m], self.ratio, steps[m], below, above
             )
             self.motion.coefficients[piece.first + m] = above.row
 
