@@ -54,9 +54,9 @@ def size_of(source: np.ndarray) -> float:
     return float(np.linalg.norm(np.ptp(source.reshape(-1, 3), axis=0)))
 
 
-def base_pose(decoder) -> np.ndarray:
-    """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
-    return decoder.file.core.rest()
+def base_pose(decoder, level: int = 0) -> np.ndarray:
+    """(N, 3) the rest pose of a level in file order, before it is rounded to the source's type."""
+    return decoder.level_rest(level)[decoder.hierarchy.vertex_source]
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
