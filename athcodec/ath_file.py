@@ -9,6 +9,8 @@ from __future__ import annotations
 import builtins
 import os
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any, BinaryIO, cast
@@ -147,6 +149,7 @@ class AthFile:
         self.limits = limits or Limits()
         self.bytes_read = 0
         self._lock = threading.Lock()
+        self._rests_read = 0  # those of layers up to this level's
         self._owned = not hasattr(path, "read")
         self._source = _opened(path) if self._owned else cast(Any, path)
         try:
@@ -610,10 +613,39 @@ class AthFile:
 
     @property
     def rest(self) -> np.ndarray:
-        """Rest pose as decoded, (N, 3), float32 or float64 as the source had it."""
+        """Rest pose as decoded for the deepest complete level, (N, 3), float32 or float64 as the source had it."""
         with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
             dtype = np.float64 if self.core.info.rest_is_float64 else np.float32
-            return self.core.rest(core_file.SOURCE_ORDER).astype(dtype, copy=False)
+            return self.level_rest(max(self._first_lacking - 1, 0)).astype(dtype, copy=False)
+
+    def level_rest(self, level: int, order: int = core_file.SOURCE_ORDER) -> np.ndarray:
+        """The rest pose that a level moves: levels that refine the plant may refine it, too.
+
+        Parameters
+        ----------
+        level : int
+            One that is stored.
+        order : int
+            core_file.SOURCE_ORDER or core_file.FILE_ORDER.
+
+        Returns
+        -------
+        numpy.ndarray
+            (N, 3) float64, scene units, not rounded to the source's type.
+
+        Raises
+        ------
+        LevelUnavailable
+            Where the file was cut off before it.
+        FormatError
+            Where it is damaged.
+        """
+        with self._lock:
+            chunks = [chunk for chunk in self._chunks_of(ct.REFINED_REST) if self._rests_read < chunk.level <= level]
+            with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"rest pose of level {level}"):
+                rest = self.core.level_rest(level, order)
+            self._rests_read = max(self._rests_read, level)
+        return rest
 
     @cached_property
     def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -762,22 +794,27 @@ class AthFile:
         return ready
 
     def _decode(self, segment: int, level: int, ready: core_file.Segment) -> None:
-        missing = self.core.missing(level, segment)
-        if any(offset + size > self.available_length for offset, size in missing):
-            raise LevelUnavailable(
-                f"level {level}, segment {segment}: not in the file; it is cut off at "
-                f"{self.available_length} of {self.file_length} bytes"
-            )
-        self._prefetch(missing)
-        pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in missing]
-        try:
-            for (offset, _), data in zip(missing, pieces):
-                self.core.feed(data, offset)
+        with self._fed(self.core.missing(level, segment), f"level {level}, segment {segment}"):
             self.core.prepare(self._work, segment, level, ready)
+        self._rests_read = max(self._rests_read, level)
+
+    @contextmanager
+    def _fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
+        """The core has these bytes, (offset, size), for as long as this lasts. Raises as `prepare`."""
+        if any(offset + size > self.available_length for offset, size in ranges):
+            raise LevelUnavailable(
+                f"{what}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+            )
+        self._prefetch(ranges)
+        pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in ranges]
+        try:
+            for (offset, _), data in zip(ranges, pieces):
+                self.core.feed(data, offset)
+            yield
         except core_file.CoreError as error:
             raise self._refusal(error) from None
         finally:
-            for offset, size in missing:
+            for offset, size in ranges:
                 self.core.drop(offset, size)
 
     def check(self) -> None:

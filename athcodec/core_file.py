@@ -212,12 +212,15 @@ class File:
         if level < self.info.depth_levels:
             return
         with self._building:
-            size, fault = c_size_t(), Fault()
-            self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)
-            memory = aligned(size.value)
-            self._check(lib.ath_refine(self._file, level, memory.ctypes.data, size.value))
-            if size.value:
+            memory = aligned(self._refine_size(level))
+            self._check(lib.ath_refine(self._file, level, memory.ctypes.data, len(memory)))
+            if len(memory):
                 self._refinements.append(memory)
+
+    def _refine_size(self, level: int) -> int:
+        size, fault = c_size_t(), Fault()
+        self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)
+        return size.value
 
     def _array(self, address: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
         dtype = np.dtype(dtype)
@@ -245,14 +248,10 @@ class File:
     def seam_error(self, clip: int, level: int) -> float:
         return lib.ath_seam_error(self._file, clip, level)
 
-    def rest(self, order: int = FILE_ORDER) -> np.ndarray:
-        """(N, 3) float64."""
-        out = np.empty((self.info.vertex_count, 3))
-        lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0])
-        return out
-
     def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
-        """(N, 3) float64: that of the level's layer, which `refine` has built."""
+        """(N, 3) float64: the rest pose of the level's layer, read unless that is done."""
+        with self._building:
+            self._refine_size(level)
         out = np.empty((self.info.vertex_count, 3))
         self._check(lib.ath_level_rest(self._file, level, order, out.ctypes.data, out.strides[0]))
         return out

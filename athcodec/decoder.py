@@ -43,7 +43,8 @@ class Affines:
     is_stem : (K,) bool
         Whether it is an exact stem, whose matrix is a least-squares fit, or a node of the ATH, which moves as one.
     matrices : (K, 3, 4) float64
-        From the rest pose to positions, both absolute, in scene units: x' = matrix[:, :3] @ x + matrix[:, 3].
+        From the rest pose of the level (`Decoder.level_rest`) to positions, both absolute, in scene units:
+        x' = matrix[:, :3] @ x + matrix[:, 3].
     """
 
     branch: np.ndarray
@@ -329,6 +330,28 @@ class Decoder:
             low, high = max(start, first), min(stop, last)
             yield low, self.positions(slice(low, high), level, dtype)
 
+    def level_rest(self, level: int | None = None) -> np.ndarray:
+        """The rest pose that a level moves: levels that refine the plant may refine it, too.
+
+        `rest` is that of the deepest complete level, rounded to the source's type.
+
+        Parameters
+        ----------
+        level : int, optional
+            Level of detail; by default the deepest that is complete.
+
+        Returns
+        -------
+        numpy.ndarray
+            (N, 3) float64, scene units.
+
+        Raises
+        ------
+        LevelUnavailable, FormatError
+            As for `positions`.
+        """
+        return self.file.level_rest(self._checked_level(level))
+
     def affines(self, frame: int, level: int | None = None) -> Affines:
         """A frame at a level as matrices: nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
 
@@ -342,7 +365,7 @@ class Decoder:
         Returns
         -------
         Affines
-            Maps from the rest pose, `rest`, to the frame.
+            Maps from the rest pose of the level, `level_rest`, to the frame.
 
         Raises
         ------
@@ -359,7 +382,7 @@ class Decoder:
             core.positions(ready, in_file, positions, core_file.FILE_ORDER)
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                maps = stem_maps(file.hierarchy, core.rest(), positions[None])
+                maps = stem_maps(file.hierarchy, file.level_rest(level, core_file.FILE_ORDER), positions[None])
         except np.linalg.LinAlgError:  # which only some plants with infinite positions lead to
             maps = np.array(np.nan)
         if not np.isfinite(maps).all():
@@ -372,7 +395,7 @@ class Decoder:
         return Affines(branch[order], first[order], count[order], is_stem[order], matrices[order])
 
     def residual(self, frame: int, level: int | None = None) -> np.ndarray:
-        """What the matrices of `affines` leave out, in the space of the rest pose (paper, eq. 3).
+        """What the matrices of `affines` leave out, in the space of the level's rest pose (paper, eq. 3).
 
         The matrix of a vertex's part, applied to this, gives the position at the deepest complete level.
 

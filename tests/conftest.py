@@ -87,6 +87,14 @@ def bushy_ath(bushy_clip, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def layered_ath(bushy_clip, tmp_path_factory):
+    """The bushy clip in four segments and three layers of precision, each with a rest pose of its own."""
+    path = tmp_path_factory.mktemp("layered") / "layered.ath"
+    athcodec.encode(bushy_clip, path, rel_error=1e-4, ladder=(1e-2, 1e-3), segment_frames=16)
+    return path
+
+
+@pytest.fixture(scope="session")
 def full_clip():
     """A small clip that needs every kind of chunk: 20 frames of five branches with all sorts of static data.
 

@@ -35,7 +35,7 @@ from athcodec import container as ct
 from athcodec import errors
 from athcodec._library import load_library
 
-OK, BAD_CHECKSUM, LIMIT_EXCEEDED = 0, 5, 10
+OK, BAD_CHECKSUM, BAD_CHUNK, LIMIT_EXCEEDED = 0, 5, 9, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
 FILE_ORDER, SOURCE_ORDER = 0, 1
 CLAMP, LOOP, PING_PONG, AS_MARKED = 0, 1, 2, 3
@@ -357,9 +357,10 @@ def pointers(prepared: list[Memory]):
     return (c_void_p * max(len(prepared), 1))(*[memory and memory.address for memory in prepared])
 
 
-@pytest.fixture(scope="module", params=["sample", "bushy", "full", "medley"])
+@pytest.fixture(scope="module", params=["sample", "bushy", "full", "medley", "layered"])
 def data(request) -> bytes:
-    """Three segments of a tree, four of a random plant on two roots, two of a plant with uneven times, four clips."""
+    """Three segments of a tree, four of a random plant on two roots, two of a plant with uneven times, four clips, and
+    the random plant in layers of precision."""
     return request.getfixturevalue(f"{request.param}_ath").read_bytes()
 
 
@@ -632,6 +633,95 @@ def test_half_a_chunk_is_left_alone_and_dropped_bytes_are_missing_again(data, pl
     assert stream.result_of_preparing(0, level) == MISSING
     stream.feed(*missing[0])
     stream.prepare(0, level)
+
+
+@pytest.fixture(scope="module")
+def layered(layered_ath) -> bytes:
+    return layered_ath.read_bytes()
+
+
+def refined_rests(player: Player) -> list[Chunk]:
+    return [
+        chunk for chunk in core.ath_chunks(player.address)[: player.info.chunk_count] if chunk.kind == ct.REFINED_REST
+    ]
+
+
+def rest_of(player: Player, level: int) -> np.ndarray | None:
+    """The rest pose of a level's layer in file order; None where it has not been read."""
+    rest = np.zeros((player.info.vertex_count, 3))
+    result = core.ath_level_rest(player.address, level, FILE_ORDER, rest.ctypes.data, 24)
+    assert result in (OK, BAD_ARGUMENT)
+    return rest if result == OK else None
+
+
+def test_a_refined_rest_pose_is_asked_for_until_it_is_read(layered):
+    stream = Player(layered, whole=False)
+    first, second = refined_rests(stream)
+    level, last = second.level, stream.segments[-1]
+    asked = stream.ranges(level, last, last)
+    assert all(any(o <= c.offset and c.offset + c.length <= o + size for o, size in asked) for c in (first, second))
+    assert stream.refine(level) == MISSING and "REFINED_REST" in text_of(stream.refusal)
+    stream.feed(first.offset, first.length)
+    assert stream.refine(level) == MISSING and stream.refine(first.level) == OK
+    assert rest_of(stream, first.level) is not None and rest_of(stream, level) is None
+    stream.feed(second.offset, second.length)
+    assert stream.refine(level) == OK
+    core.ath_drop(stream.address, 0, len(layered))
+    lacking = sum(size for _, size in stream.ranges(level, last, last))
+    assert lacking == sum(size for _, size in asked) - first.length - second.length
+    for offset, size in stream.ranges(level, last, last):
+        stream.feed(offset, size)
+    assert stream.result_of_preparing(last, level) == OK
+
+
+def test_layers_are_built_in_any_order_and_play_the_same(layered):
+    once, step_by_step = Player(layered), Player(layered)
+    deepest = once.levels[-1]
+    assert once.result_of_preparing(0, deepest) == OK
+    for level in step_by_step.levels:
+        segment = step_by_step.prepare(0, level)
+        assert np.array_equal(step_by_step.frame([segment], 3), once.frame([once.prepare(0, level)], 3))
+
+
+def test_the_rest_pose_of_a_level_is_that_of_its_layer(layered, bushy_clip):
+    player = Player(layered)
+    assert player.refine(player.levels[-1]) == OK
+    source = bushy_clip.rest[np.ctypeslib.as_array(core.ath_vertex_source(player.address), (player.info.vertex_count,))]
+    errors = [np.abs(rest_of(player, level) - source).max() for level in player.levels]
+    hierarchy = player.info.depth_levels
+    assert len(set(errors[:hierarchy])) == 1 and hierarchy + 2 == player.info.level_count
+    assert errors[hierarchy - 1] > 3 * errors[hierarchy] > 9 * errors[hierarchy + 1]
+
+
+def test_a_level_whose_layers_are_not_built_is_not_prepared(layered):
+    player = Player(layered)
+    work, level = player.work(), player.info.depth_levels
+    into = player.room(level)
+    assert core.ath_prepare(work.address, work.size, player.address, 0, level, into.address, into.size) == NO_MEMORY
+    size = c_size_t()
+    for wrong in (-1, player.info.level_count, -(2**31), 2**31 - 1):
+        assert core.ath_refine_size(player.address, wrong, byref(size), None) == BAD_ARGUMENT
+        assert core.ath_refine(player.address, wrong, None, 0) == BAD_ARGUMENT
+        assert rest_of(player, wrong) is None
+    assert core.ath_refine_size(player.address, level, byref(size), None) == OK and size.value > 0
+    for address, less in too_little(size.value):
+        assert core.ath_refine(player.address, level, address, less) == NO_MEMORY
+    assert player.prepare(0, level)
+
+
+def test_a_damaged_rest_pose_of_a_layer_is_named_and_coarser_levels_play(layered):
+    chunk = refined_rests(Player(layered))[1]
+    at = chunk.offset + chunk.length - 1
+    broken = Player(layered[:at] + bytes([layered[at] ^ 1]) + layered[at + 1 :])
+    assert broken.result_of_preparing(0, chunk.level) == BAD_CHECKSUM
+    assert text_of(broken.refusal).startswith(
+        f"chunk REFINED_REST of level {chunk.level}, segment 0 at byte {chunk.offset}: "
+    )
+    parts = Parts.of(layered)
+    empty = Player(parts.with_payload(ct.REFINED_REST, bytes(8), chunk.level))
+    assert empty.result_of_preparing(0, chunk.level) == BAD_CHUNK and empty.refusal.level == chunk.level
+    for player in (broken, empty):
+        assert all(player.result_of_preparing(0, level) == OK for level in range(chunk.level))
 
 
 def test_ranges_beyond_the_capacity_are_counted_and_not_written(data):

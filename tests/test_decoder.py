@@ -24,10 +24,11 @@ from athcodec.errors import BadChecksum, BadChunk, FormatError, LevelUnavailable
 
 
 @pytest.fixture(scope="module")
-def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, tmp_path_factory):
+def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, layered_ath, tmp_path_factory):
     """{name: (file, source positions)} of several segments and levels."""
     folder = tmp_path_factory.mktemp("plants")
     made = {"sample": (sample_ath, sample_positions), "bushy": (bushy_ath, bushy_clip.positions)}
+    made["layers"] = layered_ath, bushy_clip.positions
     for name, clip, more in (
         ("chain", chain_plant(12, 5, frames=40), {"tam": Thresholds(0, 0, 0, 0)}),
         ("tube", tube(60, 12, 40), {}),
@@ -39,7 +40,9 @@ def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, tmp_path_factory
     return made
 
 
-NAMES = ["sample", "bushy", "chain", "tube", "half accepted"]
+SHARED = ct.SHAPES, ct.REFINED_REST
+"""Kinds of chunks of segment 0 that serve all segments."""
+NAMES = ["sample", "bushy", "layers", "chain", "tube", "half accepted"]
 
 
 @pytest.fixture(params=NAMES)
@@ -54,9 +57,9 @@ def size_of(source: np.ndarray) -> float:
     return float(np.linalg.norm(np.ptp(source.reshape(-1, 3), axis=0)))
 
 
-def base_pose(decoder) -> np.ndarray:
-    """(N, 3) the decoded rest pose in file order, before it is rounded to the source's type."""
-    return decoder.file.core.rest()
+def base_pose(decoder, level: int = 0) -> np.ndarray:
+    """(N, 3) the rest pose of a level in file order, before it is rounded to the source's type."""
+    return decoder.level_rest(level)[decoder.hierarchy.vertex_source]
 
 
 def applied(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -126,10 +129,10 @@ def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name
     parts = Parts.of(plants[name][0].read_bytes())
     bare = opened(parts.without(ct.CORRECTIONS), strict=True)
     with athcodec.open(plants[name][0]) as decoder:
-        last, order = decoder.level_count - 1, decoder.hierarchy.vertex_source
+        last, order = decoder.file.core.info.depth_levels - 1, decoder.hierarchy.vertex_source
         final = bare.positions(level=last)[:, order]
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
-        assert not np.array_equal(final, decoder.positions(level=last)[:, order])
+        assert not np.array_equal(bare.positions(), decoder.positions())
         branch = decoder.hierarchy.vertex_branch()
         for level in range(1, last):
             exact = np.isin(branch, Plan(decoder.file.branches, decoder.vertex_count).exact_branches(level))
@@ -157,8 +160,8 @@ def test_the_parts_of_a_level_share_out_the_vertices(played):
 
 def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
     decoder, source = played
-    pose = base_pose(decoder)
-    for level in range(decoder.level_count - 1):
+    for level in range(decoder.file.core.info.depth_levels - 1):
+        pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
             shown = decoder.positions(frame, level, np.float64)[decoder.hierarchy.vertex_source]
@@ -235,7 +238,7 @@ class Recorder(BytesIO):
         return data
 
 
-@pytest.mark.parametrize("level", [0, 1, 2])
+@pytest.mark.parametrize("level", [0, 1, 2, 6])
 def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(level, plants):
     for name in NAMES:
         file = Recorder(plants[name][0].read_bytes())
@@ -249,9 +252,7 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
         allowed = {
-            c
-            for c in decoder.file.chunks
-            if c.is_motion and c.level <= level and (c.segment == 1 or c.kind == ct.SHAPES)
+            c for c in decoder.file.chunks if c.is_motion and c.level <= level and (c.segment == 1 or c.kind in SHARED)
         }
         read = chunks_read(file, decoder)
         needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}

@@ -157,8 +157,12 @@ def engine(installed, tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def expected(sample_ath) -> str:
     """What the consumer is to say about the sample."""
-    with athcodec.open(sample_ath) as decoder:
-        numbers = decoder.vertex_count, decoder.frame_count, 3, decoder.level_count
+    return said_of(sample_ath)
+
+
+def said_of(path: Path) -> str:
+    with athcodec.open(path) as decoder:
+        numbers = decoder.vertex_count, decoder.frame_count, len(decoder.segments), decoder.level_count
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32).tobytes())
     return "OK {} {} {} {} {:08x}\n".format(*numbers, crc)
 
@@ -251,6 +255,14 @@ def test_the_example_shows_what_has_arrived_until_all_has(played, sample_ath):
     coming = there < size
     assert (shown[coming] <= asked[coming]).all() and (shown[coming] < asked[coming]).any()
     assert played.splitlines()[-1] == "ranges missing at the end: 0"
+
+
+def test_programs_play_the_levels_of_a_file_with_layers(engine, layered_ath):
+    assert run(engine / "static", layered_ath) == said_of(layered_ath)
+    text = run(engine / "play", layered_ath, "--slices", 40, "--seconds", 24, "--fps", 30)
+    with athcodec.open(layered_ath) as decoder:
+        assert rows(text)[:, 3].max() == decoder.level_count - 1
+    assert text.splitlines()[-1] == "ranges missing at the end: 0"
 
 
 def test_the_example_plays_the_same_again(played, engine, sample_ath):

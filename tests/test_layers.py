@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,9 +11,10 @@ from hypothesis import strategies as st
 from plants import STEADY, awkward_plants, bound_for, plant
 
 import athcodec
+from athcodec import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_digits
-from athcodec.errors import LevelUnavailable
+from athcodec.errors import BadChecksum, LevelUnavailable
 
 LADDER = (1e-1, 1e-2, 1e-3)
 ROUNDING = 1e-6  # the error table holds float32
@@ -106,6 +109,84 @@ def test_layers_play_alike_whatever_was_played_before(layered):
     for level in (last, last - 1):
         with athcodec.open(layered) as decoder:
             assert (decoder.positions(20, level) == up[level]).all()
+
+
+def test_every_prefix_plays_its_complete_levels(layered_ath):
+    """Cut after each chunk, and in the middle of it; the rest pose is that of the deepest of them."""
+    data = layered_ath.read_bytes()
+    with athcodec.open(layered_ath) as whole:
+        ends = [chunk.offset + chunk.length // 2 for chunk in whole.file.chunks if chunk.is_motion]
+        ends += [chunk.offset + chunk.length for chunk in whole.file.chunks if chunk.is_motion]
+        frames = [start for start, _ in whole.segments]
+        shown = [[whole.positions(frame, level.level) for frame in frames] for level in whole.levels]
+        rests = [whole.level_rest(level.level) for level in whole.levels]
+    for end in ends:
+        with athcodec.open(BytesIO(data[:end])) as part:
+            there = [level.level for level in part.levels if level.available]
+            assert there == list(range(len(there)))
+            for level in there:
+                assert all(np.array_equal(part.positions(f, level), of) for f, of in zip(frames, shown[level]))
+            assert np.array_equal(part.rest, rests[max(there, default=0)])
+            if len(there) < part.level_count:
+                with pytest.raises(LevelUnavailable):
+                    part.positions(level=len(there))
+    assert len(there) == part.level_count
+
+
+# ---- rest poses ----
+
+
+def test_the_rest_pose_is_as_precise_as_the_deepest_level_that_is_there(layered_ath, bushy_clip, tmp_path):
+    with athcodec.open(layered_ath) as whole:
+        rests = [whole.level_rest(level.level) for level in whole.levels]
+        assert np.array_equal(whole.rest, whole.level_rest())
+        refined = [chunk.level for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST]
+    errors = [np.abs(rest - bushy_clip.rest).max() for rest in rests]
+    assert refined == [len(rests) - 2, len(rests) - 1]
+    assert errors[0] == errors[refined[0] - 1] > 3 * errors[refined[0]] > 9 * errors[refined[1]]
+    for level, rest in enumerate(rests):
+        athcodec.truncate(layered_ath, tmp_path / "cut.ath", level)
+        with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
+            assert np.array_equal(cut.rest, rest)
+
+
+def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_ath):
+    with athcodec.open(layered_ath) as decoder:
+        before = decoder.file.bytes_read
+        assert np.array_equal(decoder.rest, decoder.rest) and np.array_equal(
+            decoder.level_rest(0), decoder.level_rest(1)
+        )
+        sizes = [chunk.length for chunk in decoder.file.chunks if chunk.kind == ct.REFINED_REST]
+        assert decoder.file.bytes_read - before == sum(sizes) > 0
+
+
+def test_maps_are_from_the_rest_pose_of_their_level(layered_ath):
+    """Least-squares fits from the rest pose of another layer fit less well."""
+    with athcodec.open(layered_ath) as decoder:
+        order, deepest = decoder.hierarchy.vertex_source, decoder.level_count - 1
+        parts = decoder.affines(20, deepest)
+        shown = decoder.positions(20, deepest, np.float64)[order]
+        matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)
+
+        def error(level: int) -> float:
+            pose = decoder.level_rest(level)[order]
+            moved = np.einsum("nij,nj->ni", matrices[..., :3], pose) + matrices[..., 3]
+            return float(np.square(moved - shown).sum())
+
+        assert parts.is_stem.all() and error(deepest) < error(deepest - 1) < error(0)
+
+
+def test_a_damaged_rest_pose_hides_the_levels_of_its_layer(layered_ath):
+    data = bytearray(layered_ath.read_bytes())
+    with athcodec.open(layered_ath) as whole:
+        chunk = next(chunk for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST)
+        coarse, rest = whole.positions(20, chunk.level - 1), whole.level_rest(chunk.level - 1)
+    data[chunk.offset] ^= 1
+    with athcodec.open(BytesIO(data), allow_partial=True) as part:
+        assert part.deepest == chunk.level - 1
+        assert np.array_equal(part.positions(20), coarse) and np.array_equal(part.rest, rest)
+    with athcodec.open(BytesIO(data)) as strict, pytest.raises(BadChecksum, match=str(chunk)):
+        strict.positions(20)
 
 
 def test_a_file_cut_after_a_layer_plays_that_layer(layered, tmp_path):

@@ -215,10 +215,12 @@ def learned_chunks(data: bytes) -> int:
     return learned
 
 
-@pytest.fixture(scope="module", params=["sample", "bushy", "uneven", "clips", "wide", "exact rest", "key-framed"])
-def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_ath):
+@pytest.fixture(
+    scope="module", params=["sample", "bushy", "uneven", "clips", "layers", "wide", "exact rest", "key-framed"]
+)
+def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_ath, layered_ath):
     """Files that use different parts of the decoder, all but one in several segments."""
-    kept = {"sample": sample_ath, "bushy": bushy_ath, "uneven": full_ath, "clips": medley_ath}
+    kept = {"sample": sample_ath, "bushy": bushy_ath, "uneven": full_ath, "clips": medley_ath, "layers": layered_ath}
     if request.param in kept:
         return kept[request.param]
     path = tmp_path_factory.mktemp("wasm") / "plant.ath"

@@ -207,8 +207,8 @@ ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
  * refines all of it by one layer, some of which refine the rest pose too. Before such a level is prepared, what its
  * layers share is built, once ath_build has run, in memory that stays as long as the file's:
  *     ath_refine_size reads the rest poses of the layers up to the level's from their REFINED_REST chunks, which
- * ath_ranges names until they are read, and says how much memory ath_refine needs: 0 where little or nothing is left to
- * do. ATH_MISSING, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
+ * ath_ranges names until they are read, and says how much memory ath_refine needs, which may be none. ATH_MISSING,
+ * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
  *     ath_refine builds what is not built yet. The same, ATH_NO_MEMORY.
  * Levels of the first layer, and what is built already, need neither, but allow both. */
 ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
@@ -281,8 +281,8 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
  * were floats: what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
-/* The rest pose of a level's layer, from which the exact vertices of the level were moved: the one above for levels of
- * the first layer. ATH_BAD_ARGUMENT for no level of the file, and where ath_refine_size has not read it. */
+/* The rest pose of a level's layer, which the level moves: the one above for levels of the first layer. ATH_BAD_ARGUMENT
+ * for no level of the file, and where ath_refine_size has not read it. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result
@@ -406,8 +406,8 @@ ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const
                                   double frame, ath_order order, double *xyz, size_t stride);
 
 /* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
- * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level of the
- * hierarchy and at those beyond there are no matrices, at level 0 nothing but. */
+ * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level of
+ * the hierarchy and at those beyond there are no matrices, at level 0 nothing but. */
 ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                          float *matrices, size_t stride);
 ATH_API int ath_matrices_float64(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,

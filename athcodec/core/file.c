@@ -487,8 +487,8 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     ath_file counted = *file;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
-    ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
-                     (int32_t *)file->scratch); /* gaps may be a layer's */
+    /* again: the gaps may be a layer's since */
+    ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
     ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
     file->plan.bases = file->bases;
     for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)

@@ -62,7 +62,7 @@ static int32_t code_refined_shapes(ath_coder *coder, refined_shape_model *model,
                                    int32_t coarse_count, const int32_t *coarse, int32_t shift, int32_t count,
                                    int32_t *integers)
 {
-    static const int32_t nothing[ATH_SHAPE_NUMBERS];
+    static const int32_t nothing[ATH_SHAPE_NUMBERS] = {0};
     int32_t modes = ath_shape_modes(piece), above_count = -1;
     int32_t own = (int32_t)code_unsigned(coder, &model->count, (uint32_t)coarse_count * 16, (uint32_t)count);
     if (own > 3 * modes) return -1;

@@ -53,7 +53,8 @@ typedef struct {
 int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const ath_limits *limits, int fill);
 void fuzz_close(fuzz_file *opened);
 
-/* Builds what the layers up to a level's share; 0 where their chunks are missing or refused, or it is more than `most`. */
+/* Builds what the layers up to a level's share; 0 where their chunks are missing or refused, or it is more than
+ * `most`. */
 int fuzz_refine(fuzz_file *opened, int32_t level, uint64_t most, int fill);
 
 /* One segment at one level, prepared `steps` steps at a time; null where it is refused or larger than `most`. */
