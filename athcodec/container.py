@@ -51,7 +51,7 @@ KIND_NAMES = {
     ATTRIBUTE: "ATTRIBUTE",
 }
 
-_HEADER = struct.Struct("<8sHHIQIIIIIBBBBdQ")
+_HEADER = struct.Struct("<8sHHIQIIIIIBBBBdB7s")
 _CHUNK = struct.Struct("<HBBIII")
 _ERRORS = struct.Struct("<ff")
 
@@ -157,6 +157,7 @@ def _pack_header(header: Header, checksum: int) -> bytes:
         int(header.is_float64),
         header.max_error,
         header.layer_count,
+        b"",
     )
 
 

@@ -22,7 +22,7 @@ from athcodec.segmentation import balanced_segments
 
 HEADER_FIELDS = (
     "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-    "segment_count level_count full_level_count clip_count flags max_error layer_count"
+    "segment_count level_count full_level_count clip_count flags max_error layer_count reserved"
 ).split()
 CHECKSUM_AT = 12
 

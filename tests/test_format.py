@@ -11,9 +11,9 @@ import io
 import math
 import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -179,7 +179,7 @@ def test_errors_are_those_of_the_code():
 def test_every_error_named_in_a_field_table_exists():
     names = {row["Name"] for row in table("Errors", "Code")}
     used = set(re.findall(r"\b[A-Z]+(?:_[A-Z]+)*_[A-Z]+\b", section("File")))
-    assert used <= names and "BAD_CHUNK_TABLE" in used
+    assert used - set(container.KIND_NAMES.values()) <= names and "BAD_CHUNK_TABLE" in used
 
 
 def test_checksum_has_the_check_value_of_the_document(spec):
@@ -276,6 +276,17 @@ def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path
 )
 def test_pseudo_code_decodes_every_feature(spec, seed, is_float64, exact):
     assert_same_bits(spec, HandMade(seed, is_float64, exact).file())
+
+
+@pytest.mark.parametrize("path", sorted(VECTORS.glob("layers-*.ath")), ids=lambda path: path.stem)
+def test_pseudo_code_decodes_layers(spec, path):
+    assert_same_bits(spec, path.read_bytes())
+
+
+def test_pseudo_code_decodes_layers_that_the_encoder_writes(spec, tmp_path):
+    clip = plant(seed=14, branches=6, longest=5, frames=18, rough=1e-3)
+    athcodec.encode(clip, tmp_path / "layers.ath", rel_error=1e-4, ladder=(1e-2, 1e-3))
+    assert_same_bits(spec, (tmp_path / "layers.ath").read_bytes())
 
 
 def test_pseudo_code_decodes_several_clips(spec, medley_ath):
@@ -375,10 +386,19 @@ def read_basis(stream: bytes, frames: int, bits: int = 8) -> list[int]:
 # ---- decisions made by chance ----
 
 
+def assert_same_on_levels(spec: SimpleNamespace, data: bytes, levels: Iterable[int]) -> list[object]:
+    """The positions that they have, or that they are invalid; returns what the document makes of them."""
+    documents = [outcome(spec, lambda data, level=level: spec.decode(data, level), data) for level in levels]
+    for level, document in zip(levels, documents):
+        assert_same_numbers(
+            document, outcome(spec, lambda data, level=level: opened(data).positions(level=level), data)
+        )
+    return documents
+
+
 @pytest.mark.parametrize("kind", [container.STEMS, container.AFFINES, container.CORRECTIONS, container.SHAPES])
 @pytest.mark.parametrize("seed", range(6))
 def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_code(spec, seed, kind):
-    """On every level: the positions that they give, or that they are invalid."""
     parts = Parts.of(Sapling(seed).file())
     random = np.random.default_rng(seed)
     for i, (chunk, payload) in enumerate(parts.chunks):
@@ -387,10 +407,7 @@ def test_random_decisions_about_motion_mean_the_same_to_the_document_and_the_cod
         head = {container.STEMS: 8, container.AFFINES: 0, container.CORRECTIONS: 4, container.SHAPES: 0}[kind]
         stream = random_stream(spec, random, *motion_function(spec, parts, chunk))
         data = parts.with_chunks([*parts.chunks[:i], (chunk, payload[:head] + stream), *parts.chunks[i + 1 :]])
-        for level in range(chunk.level, parts.header.level_count):
-            document = outcome(spec, lambda data: spec.decode(data, level), data)
-            code = outcome(spec, lambda data: opened(data).positions(level=level), data)
-            assert_same_numbers(document, code)
+        assert_same_on_levels(spec, data, range(chunk.level, parts.header.level_count))
 
 
 def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk) -> tuple:
@@ -399,20 +416,55 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
     if chunk.kind == container.CORRECTIONS:
         return "decode_corrections", parts.header.vertex_count, frames
     _, chunks = spec.parse_front(parts.file())
-    branches, *_ = spec.decode_hierarchy(
-        spec.content(chunks, 1)[16:], parts.header.branch_count, parts.header.vertex_count
-    )
-    rest = spec.content(chunks, 2)
-    plan = spec.make_plan(branches, spec.decode_rest(rest[36:], branches, spec.f64(rest, 28)))
+    branches, rest = prelude_by_document(spec, parts.header, chunks)
+    plan = spec.make_plan(branches, rest.rest)
     if chunk.kind == container.SHAPES:
-        shapes = [[] for _ in plan.pieces]
+        motion = spec.no_motion(plan, 1)
         for level in range(chunk.level):
             if (container.SHAPES, level, 0) in chunks:
-                spec.decode_shapes(spec.content(chunks, container.SHAPES, level), plan, shapes, level)
-        return "decode_shapes", plan, shapes, chunk.level
+                spec.decode_shapes(spec.content(chunks, container.SHAPES, level), plan, motion, level)
+        return "decode_shapes", plan, motion, chunk.level
     motion = spec.decode_motion(chunks, plan, 0, frames, chunk.level)
     name = "decode_stems" if chunk.kind == container.STEMS else "decode_affines"
     return name, plan, motion, chunk.level
+
+
+def prelude_by_document(spec: SimpleNamespace, header: container.Header, chunks: dict) -> tuple:
+    """Branches and the rest pose of the first layer."""
+    branches, *_ = spec.decode_hierarchy(spec.content(chunks, 1)[16:], header.branch_count, header.vertex_count)
+    rest = spec.content(chunks, 2)
+    return branches, spec.decode_rest(rest[36:], branches, spec.f64(rest, 28))
+
+
+@pytest.mark.parametrize("refines_rest", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_the_code(spec, seed, refines_rest):
+    """A layer behind those of a sapling: its rest pose, shapes and stems."""
+    parts, random = Parts.of(Sapling(seed).file()), np.random.default_rng(seed)
+    level, ratio, shift = parts.header.level_count, int(random.choice([1, 3, 4, 16, 65535])), int(random.integers(16))
+    _, chunks = spec.parse_front(parts.file())
+    branches, rest = prelude_by_document(spec, parts.header, chunks)
+    plan = spec.make_plan(branches, rest.rest)
+    motion = spec.decode_motion(chunks, plan, 0, parts.header.frame_count, level - 1)
+    before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1))
+    added = []
+    if refines_rest:
+        stream = random_stream(spec, random, "decode_rest", branches, 0.0025, rest)
+        added.append((container.REFINED_REST, container.pack_refined_rest(0.0025, stream)))
+        made = outcome(spec, lambda stream: spec.decode_rest(stream, branches, 0.0025, rest), stream)
+        rest = rest if made == "invalid" else made
+    refined, motion = spec.refined_plan(branches, rest.rest, level), spec.no_motion(plan, parts.header.frame_count)
+    if seed % 3:
+        stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
+        added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))
+    head = container.StemsHead(0.02 / min(ratio, 16), (0, 1, 4)[seed % 3])
+    spec.read_stems_head(container.pack_stems(head, b""), motion, level)
+    stream = random_stream(spec, random, "decode_refined_stems", refined, motion, before, level, ratio)
+    added.append((container.STEMS, container.pack_refined_stems(ratio, head, stream)))
+    header = replace(parts.header, level_count=level + 1, full_level_count=level + 1, layer_count=2)
+    new = [(container.Chunk(kind, level, 0, 0, 0, 0), payload) for kind, payload in sorted(added)]
+    data = Parts(header, np.zeros((level + 1, 1, 2)), parts.chunks + new).file()
+    assert_same_on_levels(spec, data, [level - 1, level])
 
 
 def assert_same_numbers(document: object, code: object) -> None:
