@@ -22,7 +22,7 @@ export function roundOf({ duration, frameCount }) {
   return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
 }
 
-const SHARED = [0x13, 0x15]; // SHAPES and REFINED_REST: chunks that serve all segments
+const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
  * came), "ready" (what can be shown changed), "stopped" and "damaged" (with `message`: what is here goes on playing). */
@@ -128,7 +128,7 @@ export class ATHMotion extends EventDispatcher {
   motionBytes(level) {
     const { firstSegment, segmentCount } = this.clip;
     const needed = this.#channel.chunks.filter((chunk) => chunk.level <= level
-      && (SHARED.includes(chunk.kind) || (chunk.segment >= firstSegment && chunk.segment < firstSegment + segmentCount)));
+      && ([SHAPES, REFINED_REST].includes(chunk.kind) || (chunk.segment >= firstSegment && chunk.segment < firstSegment + segmentCount)));
     return needed.reduce((sum, { length }) => sum + length, 0);
   }
 
