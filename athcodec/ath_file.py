@@ -244,7 +244,7 @@ class AthFile:
 
     def _set_tables(self) -> None:
         table = self.core.chunks()
-        self._index = np.flatnonzero(np.isin(table["kind"], list(ct.KIND_NAMES)))  # of the known chunks
+        self._index = np.flatnonzero(np.isin(table["kind"], list(ct.KIND_NAMES), kind="table"))  # of the known chunks
         self._table = table = table[self._index]
         self._ends = table["offset"] + table["length"]
         self._is_motion = ct.is_motion(table["kind"])

@@ -63,6 +63,11 @@ def parts(data) -> Parts:
 
 
 @pytest.fixture(scope="module")
+def layered_parts(layered_ath) -> Parts:
+    return Parts.of(layered_ath.read_bytes())
+
+
+@pytest.fixture(scope="module")
 def medley_parts(medley_ath) -> Parts:
     """Several clips."""
     return Parts.of(medley_ath.read_bytes())
@@ -120,7 +125,9 @@ def use(data: bytes, **options) -> bool:
 
 def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, data):
     assert parts.file() == data and with_header(data) == data
-    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - {ct.CLIPS, ct.EXACT}, "every kind of a lossy clip"
+    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - {ct.CLIPS, ct.EXACT, ct.REFINED_REST}, (
+        "of a lossy clip"
+    )
     assert use(data)
 
 
@@ -568,7 +575,7 @@ STATIC = {"METADATA", "FACES", "EDGES", "ATTRIBUTE"}
 @pytest.fixture
 def parts_with(request, parts):
     """A function that gives a file with chunks of a kind, in parts."""
-    others = {"CLIPS": "medley_parts", "EXACT": "lossless_parts"}
+    others = {"CLIPS": "medley_parts", "EXACT": "lossless_parts", "REFINED_REST": "layered_parts"}
     return lambda name: request.getfixturevalue(others[name]) if name in others else parts
 
 
