@@ -11,7 +11,7 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
     open        opens for streaming, as all that follow; no answer
     0, 1, ...   positions of that level: frames of all clips x vertices x 3 numbers, little-endian, in source
                 order, binary64 where Is_Float64 is set, else binary32
-    rest        the rest pose of level 0: vertices x 3 numbers of Rest_Type, little-endian, in source order
+    rest        the rest pose of layer 0: vertices x 3 numbers of Rest_Type, little-endian, in source order
     time        the time of every frame, clip by clip, binary64, little-endian
     clips       the entries of CLIPS, written from the decoder's values for every clip: frames, segments, flags,
                 name, seams; for a file without CLIPS, the entry that it would have

@@ -2282,9 +2282,13 @@ class AthFile:
         require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
         return rest
 
-    def rest(self) -> np.ndarray:
-        """(vertices, 3) of Rest_Type, source order."""
-        return self._in_source_order(self._shown_rest)
+    def rest(self, level: int = 0) -> np.ndarray:
+        """(vertices, 3) of Rest_Type, source order: that of the level's layer."""
+        plan = self._plan_of(self._layer_of(level))
+        if plan.rest is self.plan.rest:
+            return self._in_source_order(self._shown_rest)
+        with np.errstate(over="ignore"):
+            return self._in_source_order((plan.rest + self.origin).astype(self.rest_type))
 
     def _in_source_order(self, by_vertex: np.ndarray) -> np.ndarray:
         out = np.empty_like(by_vertex)

@@ -28,13 +28,13 @@ from spec import reference_decoder as reference  # noqa: E402
 
 
 def assert_same_bits(data: bytes) -> None:
-    """Every level, the rest pose, the times and the static data; NaN only as such."""
+    """Every level, the rest pose of the last, the times and the static data; NaN only as such."""
     file = reference.AthFile(data, strict=True)
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
         played = [decoder.play(clip.name) for clip in decoder.clips]
         for level in range(decoder.level_count):
             assert_same_numbers(file.positions(level), np.concatenate([clip.positions(level=level) for clip in played]))
-        assert_same_numbers(file.rest(), decoder.rest)
+        assert_same_numbers(file.rest(decoder.level_count - 1), decoder.rest)
         assert_same_numbers(np.concatenate(file.times), np.concatenate([clip.time for clip in played]))
         assert [(clip.name, clip.frames, clip.segments, clip.seams) for clip in file.clips] == [
             (clip.name, clip.frame_count, clip.segment_count, clip.seam_errors if clip.loop else None)
@@ -128,6 +128,59 @@ def test_learned_time_bases_have_the_same_bits(tmp_path):
 )
 def test_plants_of_all_sorts_have_the_same_bits(make, options, tmp_path):
     assert_same_bits(encoded(make(), tmp_path, effort="fast", **options))
+
+
+@pytest.mark.parametrize(
+    "make, options",
+    [
+        (lambda: plant(seed=21, roots=2, branches=9), {"segment_frames": 16}),
+        (lambda: awkward(seed=8, branches=9, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
+        (lambda: plant(seed=3, dtype=np.float64), {"exact_rest": True}),
+        (lambda: plant(seed=9, branches=5, frames=20), {"lossless": True, "rel_error": 1e-3, "ladder": (1e-1, 1e-2)}),
+        (lambda: tube(rings=10, around=8, frames=20), {"effort": "default"}),
+        (lambda: awkward(seed=4, shape="flat", motion="spin", longest=12), {}),
+        (lambda: awkward(seed=5, motion="mirror", longest=70, shuffled=True), {"effort": "default"}),
+        (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
+        (lambda: chain_plant(branches=12, longest=3), {}),
+    ],
+    ids=["sway", "wide", "exact rest", "lossless", "tube", "sheets", "mirrored", "coincident", "chain"],
+)
+def test_layers_have_the_same_bits(make, options, tmp_path):
+    data = encoded(make(), tmp_path, **{"rel_error": 1e-4, "ladder": (1e-2, 1e-3), "effort": "fast"} | options)
+    assert reference.AthFile(data).header.layer_count > 1
+    assert_same_bits(data)
+
+
+def test_shapes_of_layers_and_several_clips_have_the_same_bits(full_clip, medley_clips, tmp_path):
+    data = encoded(full_clip, tmp_path, rel_error=1e-4, segment_frames=16, ladder=(1e-2, 1e-3))
+    assert chunk_kinds(data) >= {"SHAPES", "REFINED_REST"}
+    assert_same_bits(data)
+    assert_same_bits(encoded(athcodec.join(medley_clips), tmp_path, rel_error=1e-4, ladder=(1e-2, 1e-3)))
+
+
+@pytest.mark.parametrize("name", ["layers-mixed", "layers-three"])
+def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
+    """One byte of a chunk of a refinement is another, and its checksum fits."""
+    parts, random = Parts.of((VECTORS / f"{name}.ath").read_bytes()), np.random.default_rng(6)
+    h = reference.AthFile(parts.file()).plan.height
+    chosen = [
+        i for i, (chunk, content) in enumerate(parts.chunks) if chunk.is_motion and chunk.level > h + 1 and content
+    ]
+    refused = 0
+    for _ in range(40):
+        i, chunks = int(random.choice(chosen)), list(parts.chunks)
+        content = bytearray(chunks[i][1])
+        content[random.integers(len(content))] ^= 1 << random.integers(8)
+        chunks[i] = chunks[i][0], bytes(content)
+        data, level = parts.with_chunks(chunks), chunks[i][0].level
+        got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
+        expected = outcome(lambda data=data, level=level: opened(data).positions(level=level))
+        refused += isinstance(expected, str)
+        if isinstance(expected, str) or isinstance(got, str):
+            assert isinstance(got, str) and got == expected
+        else:
+            assert_same_numbers(got, expected)
+    assert 2 < refused < 40
 
 
 def test_several_clips_have_the_same_bits(medley_ath):
