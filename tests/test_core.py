@@ -462,7 +462,7 @@ def parts(full_ath) -> Parts:
         ({"full_level_count": 3, "level_count": 4}, "BAD_HEADER header: got Level_Count 4; expected 1 to 3"),
         ({"clip_count": 0}, "BAD_HEADER header: got Clip_Count 0; expected 1 to 255"),
         ({"flags": 2}, "BAD_HEADER header: got Flags 2; expected 0 to 1"),
-        ({"layer_count": 1 | 2**52}, "BAD_HEADER header: got Reserved 17592186044416; expected 0"),
+        ({"reserved": bytes(5) + b"\x10\0"}, "BAD_HEADER header: got Reserved 17592186044416; expected 0"),
         ({"layer_count": 9}, "BAD_HEADER header: got Layer_Count 9; expected 1 to 8"),
         ({"max_error": float("nan")}, "BAD_HEADER header: got Max_Error nan; expected a finite length"),
         ({"max_error": -1.25e-7}, "BAD_HEADER header: got Max_Error -1.25000e-7; expected a finite length"),
