@@ -795,6 +795,9 @@ class AthFile:
 
     def _decode(self, segment: int, level: int, ready: core_file.Segment) -> None:
         with self._fed(self.core.missing(level, segment), f"level {level}, segment {segment}"):
+            needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
+            if needed > limit:
+                raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
             self.core.prepare(self._work, segment, level, ready)
         self._rests_read = max(self._rests_read, level)
 

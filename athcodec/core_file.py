@@ -217,6 +217,11 @@ class File:
             if len(memory):
                 self._refinements.append(memory)
 
+    def refinement_size(self, level: int) -> int:
+        """Bytes that the layers up to that of a level take, and those that are built already."""
+        with self._building:
+            return self._refine_size(level) + sum(map(len, self._refinements))
+
     def _refine_size(self, level: int) -> int:
         size, fault = c_size_t(), Fault()
         self._check(lib.ath_refine_size(self._file, level, byref(size), byref(fault)), fault)

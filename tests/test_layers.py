@@ -14,7 +14,7 @@ import athcodec
 from athcodec import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_digits
-from athcodec.errors import BadChecksum, LevelUnavailable
+from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)
 ROUNDING = 1e-6  # the error table holds float32
@@ -230,6 +230,17 @@ def test_awkward_plants_keep_their_bound(clip, fraction, scratch):
     bound = bound_for(clip, fraction)
     athcodec.encode(clip, scratch / "a.ath", max_error=bound, segment_frames=16, effort="fast", ladder=LADDER)
     check_levels(clip, scratch / "a.ath")
+
+
+def test_layers_take_no_more_memory_than_the_limit(tmp_path):
+    clip = plant(seed=1, branches=100, longest=64, frames=1)
+    athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-5, effort="fast", ladder=LADDER)
+    limits = ct.Limits(memory_bytes=572 * clip.vertex_count)
+    with athcodec.open(tmp_path / "a.ath", limits=limits) as decoder:
+        last = decoder.level_count - 1
+        assert np.isfinite(decoder.positions(level=last - 3)).all()
+        with pytest.raises(LimitExceeded, match=rf"level {last}: got layers of \d+ bytes; the limit is"):
+            decoder.positions(level=last)
 
 
 # ---- which level to keep ----
