@@ -661,19 +661,28 @@ static int32_t nearest_or_none(double units, double least)
     return units < 0.0 ? -whole : whole;
 }
 
+static int is_zero(const int32_t *integers, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++)
+        if (integers[i] != 0) return 0;
+    return 1;
+}
+
 void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies, double step, int32_t ratio,
                        const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
     double least = coarse ? 0.5 : 0.5 * (double)ratio;
     memset(predicted, 0, 3 * (size_t)T * sizeof *predicted);
-    for (int32_t axis = 0; axis < 3; axis++) {
+    for (int32_t axis = 0; axis < 3 && count > 0; axis++) {
         const double *row = track + axis * T;
         int32_t k = 0, any = 0;
         for (int32_t t = 0; t < T && !any; t++) any = row[t] != 0.0;
         if (!any) continue;
+        const int32_t *known = coarse ? coarse + axis * T : 0;
         for (; k + PREDICTED <= count; k += PREDICTED) {
             double sums[PREDICTED];
+            if (known && is_zero(known + k, PREDICTED)) continue;
             project_waves(T, stream->temporal + (size_t)k * (size_t)T, row, sums);
             for (int32_t i = 0; i < PREDICTED; i++)
                 predicted[axis * T + k + i] = nearest_or_none(sums[i] / step, least);
@@ -681,8 +690,8 @@ void ath_predict_track(const ath_stream *stream, int32_t T, int32_t frequencies,
         for (; k < count; k++)
             predicted[axis * T + k] =
                 nearest_or_none(wave_product(T, stream->temporal + (size_t)k * (size_t)T, row) / step, least);
-        for (k = 0; coarse && k < count; k++)
-            if (coarse[axis * T + k] == 0) predicted[axis * T + k] = 0;
+        for (k = 0; known && k < count; k++)
+            if (known[k] == 0) predicted[axis * T + k] = 0;
     }
 }
 
@@ -713,19 +722,22 @@ void ath_to_local(const ath_plan *plan, int32_t T, const ath_piece *piece, const
     }
 }
 
-ATH_HOT void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,
-                         double *ATH_RESTRICT rows)
+ATH_HOT static void project_mode(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t m,
+                                 const double *local, double *ATH_RESTRICT row)
 {
-    for (int32_t m = 0; m < count; m++) {
-        const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
-        double *row = rows + (size_t)m * 3 * (size_t)T;
-        for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
-        for (int32_t v = 0; v < piece->count; v++) {
-            double weight = mode[v];
-            const double *x = local + (size_t)v * 3 * (size_t)T;
-            for (int32_t i = 0; i < 3 * T; i++) row[i] = row[i] + weight * x[i];
-        }
+    const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+    for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
+    for (int32_t v = 0; v < piece->count; v++) {
+        double weight = mode[v];
+        const double *x = local + (size_t)v * 3 * (size_t)T;
+        for (int32_t i = 0; i < 3 * T; i++) row[i] = row[i] + weight * x[i];
     }
+}
+
+void ath_project(const ath_plan *plan, int32_t T, const ath_piece *piece, int32_t count, const double *local,
+                 double *ATH_RESTRICT rows)
+{
+    for (int32_t m = 0; m < count; m++) project_mode(plan, T, piece, m, local, rows + (size_t)m * 3 * (size_t)T);
 }
 
 void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
@@ -761,18 +773,20 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
     if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
     if (modes > 0) {
         ath_to_local(plan, T, piece, &scratch->at, before->placed, scratch->placed);
-        ath_project(plan, T, piece, modes, scratch->placed, scratch->rows);
+        if (rows->shape_count > 0) ath_project(plan, T, piece, modes, scratch->placed, scratch->rows);
     }
     for (int32_t r = 0; r < modes; r++) {
         const ath_stream *stream = ath_mode_stream(motion, piece, r);
-        const double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
+        const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0;
+        double *track = scratch->rows + (size_t)r * 3 * (size_t)T;
+        int has_prediction = !coarse || !is_zero(coarse, 3 * T);
+        if (has_prediction && rows->shape_count == 0) project_mode(plan, T, piece, r, scratch->placed, track);
         if (ath_is_shape_row(piece, rows, r)) {
             shape_tracks(T, piece, rows, r, scratch->rows, scratch->track);
             track = scratch->track;
         }
-        ath_predict_track(stream, T, before->frequencies, ath_row_step(motion, piece, rows, r), motion->ratio, track,
-                          rows->coarse_modes ? rows->coarse_modes + (size_t)r * 3 * (size_t)T : 0,
-                          ath_row(rows->predicted_modes, r, T));
+        ath_predict_track(stream, T, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
+                          motion->ratio, track, coarse, ath_row(rows->predicted_modes, r, T));
     }
     for (int32_t r = modes; r < piece->rank; r++)
         memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
