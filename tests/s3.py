@@ -55,4 +55,4 @@ class S3Server:
     def answers(self) -> list[str]:
         """Method, path and status of each request so far."""
         found = re.findall(r'"\S*?([A-Z]+ /\S*) HTTP/1\.1\S*" (\d+)', self.log.read_text())
-        return [" ".join(each) for each in found]
+        return [" ".join(row) for row in found]

@@ -50,9 +50,9 @@ def write_archive(path, faces=QUADS[:, ::-1], counts=(12,) * 10):
         shift.setMatrix(matrix(np.eye(3), [i, 0, 5]))
         shifted.getSchema().set(shift)
         points = filled(imath.V3fArray, sway(101 + i)[:count])
-        for each in (mesh, twin):
+        for shape in (mesh, twin):
             sample = AbcGeom.OPolyMeshSchemaSample
-            each.getSchema().set(sample(points, held[1], held[0]) if i == 0 else sample(points))
+            shape.getSchema().set(sample(points, held[1], held[0]) if i == 0 else sample(points))
     del archive, turned, shifted, mesh, twin
     gc.collect()
 
@@ -225,7 +225,7 @@ for frame in range(3, 13):
     shown["Hair"].append(np.array([point.co[:3] for point in spline.points]) + shift)
 bpy.ops.wm.alembic_export(filepath=args["path"] + ".abc", start=3, end=12)
 bpy.ops.wm.usd_export(filepath=args["path"] + ".usdc", export_animation=True)
-save(faces=[list(each.vertices) for each in grid.data.polygons], **shown)
+save(faces=[list(polygon.vertices) for polygon in grid.data.polygons], **shown)
 """
 
 
@@ -254,16 +254,16 @@ scene.render.fps, scene.render.fps_base = 24, 1.001
 importer = bpy.ops.wm.alembic_import if args["path"].endswith("abc") else bpy.ops.wm.usd_import
 importer(filepath=args["path"])
 found = {}
-for obj in [each for each in bpy.data.objects if each.type == "MESH"]:
+for obj in [item for item in bpy.data.objects if item.type == "MESH"]:
     found[obj.name] = []
     for frame in (101, 104, 110):
         scene.frame_set(frame)
         found[obj.name].append(world(obj.name))
-grid = next(each for each in bpy.data.objects if each.type == "MESH" and "grid" in each.name)
+grid = next(item for item in bpy.data.objects if item.type == "MESH" and "grid" in item.name)
 uv = np.empty(2 * len(grid.data.loops), np.float32)
 grid.data.uv_layers[0].data.foreach_get("uv", uv)
-save(uv=uv.reshape(-1, 2), faces=[list(each.vertices) for each in grid.data.polygons],
-     names=list(found), kinds=[each.type for each in bpy.data.objects], **found)
+save(uv=uv.reshape(-1, 2), faces=[list(polygon.vertices) for polygon in grid.data.polygons],
+     names=list(found), kinds=[item.type for item in bpy.data.objects], **found)
 """
 
 

@@ -144,7 +144,7 @@ def test_a_line_of_the_manifest_says_what_was_made_of_what(clips, tmp_path, clus
 
 
 def reasons(items, out) -> dict[str, str]:
-    return {each.item.name: each.reason for each in batch.preview(items, out)}
+    return {forecast.item.name: forecast.reason for forecast in batch.preview(items, out)}
 
 
 def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, tmp_path, cluster):
@@ -277,7 +277,7 @@ def test_inputs_can_come_from_a_list(clips, tmp_path, monkeypatch, capsys):
     words = ["batch", "--list", str(tmp_path / "list.txt"), "--out", str(tmp_path / "out"), "--dry-run", "--json"]
     assert cli.main(words) == 0
     found = json.loads(capsys.readouterr().out)["clips"]
-    assert [each["input"] for each in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
+    assert [entry["input"] for entry in found] == [f"{clips}/a.h5", f"{clips}/b.h5"]
 
 
 def test_file_names_that_are_not_utf8_are_encoded_and_recognised(clips, tmp_path, cluster):
@@ -549,7 +549,7 @@ def finished(process: subprocess.Popen) -> tuple[int, str]:
 
 
 def workers_of(process: subprocess.Popen) -> list[psutil.Process]:
-    return [each for each in psutil.Process(process.pid).children() if "spawn_main" in " ".join(each.cmdline())]
+    return [child for child in psutil.Process(process.pid).children() if "spawn_main" in " ".join(child.cmdline())]
 
 
 def wait_for(happened, process: subprocess.Popen) -> None:
@@ -700,6 +700,6 @@ def test_the_benchmark_compares_numbers_of_workers_and_every_file(tmp_path):
     ]
     subprocess.run(command, cwd=Path(__file__).resolve().parent.parent, check=True, capture_output=True, timeout=120)
     result = json.loads((tmp_path / "b.json").read_text())
-    runs_of, ratios = (each["rows"] for each in result["tables"])
+    runs_of, ratios = (table["rows"] for table in result["tables"])
     assert [row["workers"] for row in runs_of] == ["loop", "1", "2"] and result["broken"] == []
     assert ratios[0]["ratio"] == pytest.approx(runs_of[1]["clips s"] / runs_of[2]["clips s"])

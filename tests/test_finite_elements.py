@@ -119,9 +119,9 @@ def test_second_order_cells_keep_their_middle_nodes(tmp_path):
 def test_numbered_files_of_meshio_are_read(tmp_path, suffix, how):
     points, cells = CELLS["quads and lines"]
     motion, _ = moved(points)
-    for frame, each in enumerate(motion, 7):
+    for frame, points_of_frame in enumerate(motion, 7):
         (meshio.vtu if suffix == ".vtu" else meshio.vtk).write(
-            tmp_path / f"r{frame}{suffix}", meshio.Mesh(each, cells), **how
+            tmp_path / f"r{frame}{suffix}", meshio.Mesh(points_of_frame, cells), **how
         )
     with athcodec.read(tmp_path / f"r9{suffix}", fps=24) as clip:
         assert np.abs(clip.block(0, 5) - motion).max() < 1e-10 and clip.metadata["start_frame"] == 7
@@ -371,8 +371,8 @@ def test_damaged_files_are_refused_with_a_clip_error(tmp_path, name, gzip):
 def test_damaged_legacy_files_are_refused_with_a_clip_error(tmp_path):
     points, cells = CELLS["quads and lines"]
     for how in ({}, {"binary": False}):
-        for frame, each in enumerate(moved(points)[0][:2]):
-            meshio.vtk.write(tmp_path / f"r{frame}.vtk", meshio.Mesh(each, cells), **how)
+        for frame, points_of_frame in enumerate(moved(points)[0][:2]):
+            meshio.vtk.write(tmp_path / f"r{frame}.vtk", meshio.Mesh(points_of_frame, cells), **how)
         refused = survives_damage(tmp_path / "r0.vtk", lambda: athcodec.read(tmp_path / "r1.vtk"), cuts=15, changes=30)
         assert refused > 12
 

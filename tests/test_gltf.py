@@ -167,7 +167,7 @@ def test_keys_are_interpolated_as_the_specification_says(tmp_path):
         name: frames_of(moving_cube([channel]).save(tmp_path / f"{name}.glb"), fps=10)[0]
         for name, channel in channels.items()
     }
-    turned = np.stack([CUBE @ about([0, 0, 1], 2 * each)[1].T for each in t])
+    turned = np.stack([CUBE @ about([0, 0, 1], 2 * angle)[1].T for angle in t])
     assert np.allclose(found["LINEAR"], turned, atol=1e-6)
     assert np.allclose(found["STEP"][:, 0, 0], np.select([t < 0.5, t < 1], [0, 5], 7))
     spline = (t**3 - 2 * t**2 + t) * 3 + 3 * t**2 - 2 * t**3
@@ -376,7 +376,7 @@ def test_takes_are_clips_of_their_own(tmp_path):
             ("animation 2", 3, False),
             ("turn", 4, True),
         ]
-        found = {name: each.block(0, each.frame_count) for name, each in athcodec.split(clip).items()}
+        found = {name: part.block(0, part.frame_count) for name, part in athcodec.split(clip).items()}
         assert np.array_equal(clip.block(0, 15), np.concatenate(list(found.values())))
         assert np.allclose(found["walk"][2], CUBE + [1, 0, 0]) and np.allclose(found["walk.1"][4], CUBE + [0, 2, 0])
         assert np.allclose(found["turn"][1], CUBE @ about([0, 1, 0], np.pi / 2)[1].T, atol=1e-6)
@@ -820,12 +820,12 @@ def same_clips(path, wanted, error):
     with read(path, takes="all") as clip:
         found = athcodec.split(clip)
         assert list(found) == list(wanted)
-        for name, each in wanted.items():
+        for name, motion in wanted.items():
             assert found[name].clip_ranges[0].loop == (name == "calm")
-            assert far(found[name].block(0, found[name].frame_count), each.block(0, each.frame_count)) <= error
-            assert found[name].time == pytest.approx(each.time, abs=1e-6)
+            assert far(found[name].block(0, found[name].frame_count), motion.block(0, motion.frame_count)) <= error
+            assert found[name].time == pytest.approx(motion.time, abs=1e-6)
             for key in ("fps", "start_frame"):
-                assert found[name].metadata[key] == pytest.approx(each.metadata[key])
+                assert found[name].metadata[key] == pytest.approx(motion.metadata[key])
 
 
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
@@ -845,8 +845,10 @@ def test_every_clip_moves_all_that_any_moves_over_one_skin(seasons_ath, tmp_path
     with athcodec.open(seasons_ath) as decoder:
         write(ClipView(decoder, all_clips=True), tmp_path / "a.glb", animation="joints")
     gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
-    moved = [{(channel.target.node, channel.target.path) for channel in each.channels} for each in gltf.animations]
-    assert len(gltf.skins) == 1 and len(moved) == 4 and all(each == moved[0] for each in moved)
+    moved = [
+        {(channel.target.node, channel.target.path) for channel in animation.channels} for animation in gltf.animations
+    ]
+    assert len(gltf.skins) == 1 and len(moved) == 4 and all(channels == moved[0] for channels in moved)
     with read(tmp_path / "a.glb") as clip:
         assert clip.metadata["animations"] == ["calm"] and clip.frame_count == 24
 
@@ -864,7 +866,7 @@ def test_clips_that_all_stand_still_become_animations(seasons, tmp_path):
 @pytest.mark.parametrize("animation", ["joints", "morphs"])
 def test_one_clip_of_several_is_an_animation_of_its_name(seasons_ath, tmp_path, animation):
     assert main(["decode", str(seasons_ath), str(tmp_path / "a.glb"), "--clip", "gale", "--animation", animation]) == 0
-    assert [each.name for each in pygltflib.GLTF2().load(str(tmp_path / "a.glb")).animations] == ["gale"]
+    assert [animation.name for animation in pygltflib.GLTF2().load(str(tmp_path / "a.glb")).animations] == ["gale"]
     assert facts_of(tmp_path / "a.glb")["start_frame"] == 100
     assert main(["decode", str(seasons_ath), str(tmp_path / "b.glb"), "--frames", "0:3"]) == 1
     assert not (tmp_path / "b.glb").exists()

@@ -105,7 +105,9 @@ def three_file(node, tmp_path):
 
 def assert_valid(node, path):
     found = json.loads(node("validate.mjs", path))
-    further = [each for each in found["messages"] if not (each.startswith("UNUSED_OBJECT") and "TEXCOORD" in each)]
+    further = [
+        message for message in found["messages"] if not (message.startswith("UNUSED_OBJECT") and "TEXCOORD" in message)
+    ]
     assert (found["errors"], found["warnings"], further) == (0, 0, [])  # nothing is drawn with the textures' places
 
 

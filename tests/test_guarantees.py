@@ -138,9 +138,9 @@ def test_every_format_of_the_table_is_tried_here():
     from athcodec import exporters
 
     written = {re.sub(r".*\.", "", name) for name in FORMATS.values()}
-    for each in exporters.FORMATS:
-        if each.name not in ("vat", "openvat"):  # which nobody reads back: see test_vat.py
-            assert written & {suffix[1:] for suffix in each.suffixes}, each.name
+    for kind in exporters.FORMATS:
+        if kind.name not in ("vat", "openvat"):  # which nobody reads back: see test_vat.py
+            assert written & {suffix[1:] for suffix in kind.suffixes}, kind.name
 
 
 @pytest.mark.parametrize("cache", ["a.pc2", "a.mdd"])

@@ -267,7 +267,7 @@ def test_a_clip_view_of_all_clips_is_what_each_is(medley_clips, medley_ath):
 
 
 @pytest.mark.parametrize(
-    "kind", [each for each in exporters.FORMATS if not each.holds_several], ids=lambda kind: kind.name
+    "kind", [form for form in exporters.FORMATS if not form.holds_several], ids=lambda kind: kind.name
 )
 def test_formats_of_one_clip_refuse_several_and_write_nothing(kind, medley_clips, medley_ath, tmp_path):
     path = tmp_path / f"a{kind.suffixes[0]}"

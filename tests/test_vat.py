@@ -46,21 +46,21 @@ def mesh_of(path):
 
 def shown_by_matrices(folder):
     """(T, N, 3): what a shader makes of a .vat folder, texel by texel as vat.md says, in float32."""
-    (facts,) = (json.loads(each.read_text()) for each in folder.glob("*.json"))
+    (facts,) = (json.loads(path.read_text()) for path in folder.glob("*.json"))
     mesh, pivots = mesh_of(folder / facts["mesh"]), exr(folder / facts["pivots"])
     node, p = mesh["_NODE"][:, 0].astype(int), mesh["POSITION"]
     c = pivots[node // facts["nodes_per_row"], node % facts["nodes_per_row"]]
     frames = np.empty((facts["frames"], *p.shape), np.float32)
-    for each in facts["textures"]:
-        texels = exr(folder / each["file"])
+    for texture in facts["textures"]:
+        texels = exr(folder / texture["file"])
         assert texels.shape == (facts["height"], facts["width"], 4)
         assert texels.dtype == {"half": np.float16, "float": np.float32}[facts["precision"]]
-        for g in range(each["frames"]):
+        for g in range(texture["frames"]):
             y = g * facts["rows_per_frame"] + node // facts["nodes_per_row"]
             for r in range(3):
                 row = texels[y, 3 * (node % facts["nodes_per_row"]) + r].astype(np.float32)
                 moved = p[:, r] + (row[:, :3] * (p - c)).sum(axis=1) + row[:, 3]
-                frames[each["first_frame"] + g, :, r] = moved
+                frames[texture["first_frame"] + g, :, r] = moved
     return frames, facts, mesh
 
 

@@ -60,7 +60,7 @@ def test_valid_files_are_wholly_valid_and_invalid_ones_are_not():
 def test_every_error_has_a_vector():
     """But INVALID, which nothing has to say."""
     seen = {result for vector in VECTORS for result in vector.results.values()} & set(conformance.ERRORS)
-    names = {each.name for each in (errors.FormatError, *errors.FormatError.__subclasses__())}
+    names = {error.name for error in (errors.FormatError, *errors.FormatError.__subclasses__())}
     assert set(conformance.ERRORS) == names and seen == names - {"INVALID"}
 
 
