@@ -191,6 +191,7 @@ class File:
         lib.ath_get_info(self._file, byref(self.info))
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
+        self._refined = self.info.depth_levels - 1  # levels up to this one have what their layers share
         self._building = threading.Lock()
 
     @staticmethod
@@ -209,18 +210,19 @@ class File:
 
     def refine(self, level: int) -> None:
         """Computes what the layers of precision up to that of a level share, unless that is done."""
-        if level < self.info.depth_levels:
-            return
         with self._building:
+            if level <= self._refined:
+                return
             memory = aligned(self._refine_size(level))
             self._check(lib.ath_refine(self._file, level, memory.ctypes.data, len(memory)))
-            if len(memory):
-                self._refinements.append(memory)
+            self._refinements.append(memory)
+            self._refined = level
 
     def refinement_size(self, level: int) -> int:
         """Bytes that the layers up to that of a level take, and those that are built already."""
         with self._building:
-            return self._refine_size(level) + sum(map(len, self._refinements))
+            further = self._refine_size(level) if level > self._refined else 0
+            return further + sum(map(len, self._refinements))
 
     def _refine_size(self, level: int) -> int:
         size, fault = c_size_t(), Fault()

@@ -21,7 +21,6 @@ from athcodec.clip import MotionClip
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
-from athcodec.encoding.layers import ladder_of
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
@@ -116,7 +115,7 @@ def encode(
         attributes=attributes,
         effort=effort,
         jobs=jobs,
-        ladder=ladder_of(ladder),
+        ladder=ladder,
     )
     check_target(path)  # before any work
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
@@ -141,7 +140,7 @@ def draft(
     ClipError, BoundError, ValueError
         As `encode`.
     """
-    checked = EncodingOptions.of(**options | {"ladder": ladder_of(options.get("ladder", "none"))})
+    checked = EncodingOptions.of(**options)
     option = BoundOption(max_error, rel_error, target_size, checked.lossless)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))

@@ -28,7 +28,7 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.layers import Layer, code_segment, layer_chunks, layer_digits, layers_of
+from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_digits, layers_of
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, decide
@@ -58,9 +58,11 @@ class EncodingOptions:
     ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
 
     @classmethod
-    def of(cls, *, segment_frames: int | None = None, **options) -> EncodingOptions:
-        """None for segment_frames is its default."""
-        return cls(DEFAULT_SEGMENT if segment_frames is None else segment_frames, **options)
+    def of(
+        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = "none", **options
+    ) -> EncodingOptions:
+        """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
+        return cls(DEFAULT_SEGMENT if segment_frames is None else segment_frames, ladder=ladder_of(ladder), **options)
 
     def __post_init__(self) -> None:
         if not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:

@@ -18,7 +18,16 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_error
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, analyse, correct, stem_streams, stems_head
+from athcodec.encoding.segment import (
+    CodedPrelude,
+    Settings,
+    Source,
+    analyse,
+    correct,
+    correction_chunk,
+    stem_streams,
+    stems_head,
+)
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 LEAST_RATIO = 4  # of the steps of neighbouring layers
@@ -159,6 +168,7 @@ class _SegmentCoder:
 
     def __init__(self, prelude: CodedPrelude, positions: np.ndarray):
         self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
+        self._pool = prelude.plan.pool
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, float]] = []
         self.decoded = np.empty(0)
@@ -170,13 +180,12 @@ class _SegmentCoder:
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(segment, layer, plan.level_count - 1)
-        decoded = self.decoded
         segment.analyse_nodes(self._positions, settings.node_steps, qz.DEAD_ZONE)
         for level in range(plan.level_count):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(segment, level)
         below = [self._error(segment.pose(level, self._origin, self._dtype)) for level in range(plan.level_count - 1)]
-        self.errors, self.decoded = [*below, *self.errors], decoded
+        self.errors = [*below, *self.errors]
         return segment
 
     def refine(self, layer: Layer, before: SegmentMotion, level: int) -> SegmentMotion:
@@ -196,15 +205,13 @@ class _SegmentCoder:
         """Corrections of the level that a layer ends with, and its errors."""
         self.decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
         if layer.settings.limit is not None:
-            corrections, step = correct(self.decoded, self._positions, self._origin, layer.settings, layer.plan.pool)
-            if len(corrections):
-                vertices, _, frames = self.decoded.shape
-                stream = streams.encode_corrections(corrections, vertices, frames)
-                self.chunks[level, ct.CORRECTIONS] = ct.pack_corrections(step, stream)
+            corrections, step = correct(self.decoded, self._positions, self._origin, layer.settings, self._pool)
+            if chunk := correction_chunk(corrections, step, self.decoded.shape):
+                self.chunks[level, ct.CORRECTIONS] = chunk
         self.errors.append(self._error(self.decoded))
 
     def _error(self, decoded: np.ndarray) -> tuple[float, float]:
-        largest, squares = position_error(decoded, self._positions, self._origin)
+        largest, squares = position_error(decoded, self._positions, self._origin, self._pool)
         return largest, math.sqrt(squares / (self._positions.shape[0] * self._positions.shape[2]))
 
 

@@ -290,11 +290,14 @@ class Coded:
 
     @cached_property
     def correction_chunk(self) -> bytes:
-        if not len(self.corrections):
-            return b""
-        vertices, _, frames = self.decoded.shape
-        stream = streams.encode_corrections(self.corrections, vertices, frames)
-        return ct.pack_corrections(self.correction_step, stream)
+        return correction_chunk(self.corrections, self.correction_step, self.decoded.shape)
+
+
+def correction_chunk(corrections: np.ndarray, step: float, shape: tuple[int, int, int]) -> bytes:
+    """CORRECTIONS for positions of a shape, (N, 3, T); empty where there are none."""
+    if not len(corrections):
+        return b""
+    return ct.pack_corrections(step, streams.encode_corrections(corrections, shape[0], shape[2]))
 
 
 def analyse(
