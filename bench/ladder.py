@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from athcodec.encoding.layers import LADDERS, ladder_of
 from bench.clips import Encoded, add_clips, add_rel_error, encoded
 from bench.curves import Curve
+from bench.progressive import diagonal, single_files
 from bench.tables import table
 
 LOOSEST, OWN_PER_DECADE = 2e-2, 4
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, sizes = [], []
     for path in args.clips:
-        own = list(_own(path, args.rel_error))
+        own = single_files(path, _bounds(args.rel_error))
         found = {}
         for name, ladder in (("none", ()), ("layers", args.ladder)):
             with encoded(path, args.rel_error, ladder=ladder) as result:
@@ -57,25 +57,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _own(path: Path, rel_error: float) -> Iterator[tuple[float, float, int]]:
-    """(largest error, RMS error, bytes), errors over the diagonal, of files of their own."""
+def _bounds(rel_error: float) -> list[float]:
     count = 1 + max(1, round(OWN_PER_DECADE * np.log10(LOOSEST / rel_error)))
-    for bound in np.geomspace(LOOSEST, rel_error, count):
-        with encoded(path, float(bound)) as result:
-            last = result.decoder.levels[-1]
-            yield *_over_diagonal(result, last.max_error, last.rms_error), result.summary.bytes
+    return np.geomspace(LOOSEST, rel_error, count).tolist()
 
 
-def _over_diagonal(result: Encoded, *errors: float) -> list[float]:
-    diagonal = result.summary.max_error_bound / result.summary.relative_bound
-    return [error / diagonal for error in errors]
-
-
-def _prefixes(result: Encoded, own: list[tuple[float, float, int]]) -> Iterator[dict[str, Any]]:
-    largest, rms, sizes = zip(*own, strict=True)
-    by_max, by_rms = Curve.of(largest, sizes), Curve.of(rms, sizes)
+def _prefixes(result: Encoded, own: list[dict[str, float]]) -> Iterator[dict[str, Any]]:
+    sizes, scale = [row["bytes"] for row in own], diagonal(result)
+    by_max, by_rms = (Curve.of([row[error] for row in own], sizes) for error in ("max", "rms"))
     for level in result.decoder.levels:
-        at_max, at_rms = _over_diagonal(result, level.max_error, level.rms_error)
+        at_max, at_rms = level.max_error / scale, level.rms_error / scale
         row = {"level": level.level, "bytes": level.bytes, "max": at_max, "RMS": at_rms}
         for name, own_size in (("max", by_max.size_at(at_max)), ("RMS", by_rms.size_at(at_rms))):
             row |= {

@@ -55,20 +55,8 @@ larger of the two savings; cost: the excess of the file over that.
 def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[str, Any]:
     """{"steps": rows by growing prefix, "single": separate files at looser bounds, "broken": lines}."""
     with encoded(clip_path, rel_error) as result:
-        diagonal = _diagonal(result)
-        steps = _steps(result, diagonal)
-    single = []
-    for bound in (*(bound for bound in looser if bound > rel_error), rel_error):
-        with encoded(clip_path, bound) as result:
-            meter = measure(result.clip, result.decoder)
-            single.append(
-                {
-                    "bound": bound,
-                    "bytes": result.summary.bytes,
-                    "max": meter.max_error / diagonal,
-                    "rms": meter.rms_error / diagonal,
-                }
-            )
+        steps = _steps(result, diagonal(result))
+    single = single_files(clip_path, (*(bound for bound in looser if bound > rel_error), rel_error))
     broken = [
         f"{clip_path.name}, {row['bytes']} bytes: got an error of {row['max']:.7g} of the diagonal; "
         f"the file's table says {row['table max']:.7g}"
@@ -78,7 +66,24 @@ def curve(clip_path: Path, rel_error: float, looser: Iterable[float]) -> dict[st
     return {"steps": steps, "single": single, "broken": broken}
 
 
-def _diagonal(result: Encoded) -> float:
+def single_files(clip_path: Path, bounds: Iterable[float]) -> list[dict[str, float]]:
+    """A row for a file of its own at each bound, with the errors of what it decodes to over the diagonal."""
+    rows = []
+    for bound in bounds:
+        with encoded(clip_path, bound) as result:
+            meter, scale = measure(result.clip, result.decoder), diagonal(result)
+            rows.append(
+                {
+                    "bound": bound,
+                    "bytes": result.summary.bytes,
+                    "max": meter.max_error / scale,
+                    "rms": meter.rms_error / scale,
+                }
+            )
+    return rows
+
+
+def diagonal(result: Encoded) -> float:
     return result.summary.max_error_bound / result.summary.relative_bound
 
 
