@@ -46,14 +46,14 @@ class Stream(ctypes.Structure):
         ("rotation_step_factor", c_double),
         ("temporal", c_void_p),
         ("temporal_rank", c_int32),
-        ("reserved", c_int32),
+        ("root", c_int32),
     ]
 
 
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "decoded")]
+    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "known", "decoded")]
     _fields_ += [("frames", c_int32), ("ratio", c_int32)]
 
 
@@ -62,7 +62,7 @@ class Coarse(ctypes.Structure):
 
     _fields_ = [
         (name, c_void_p)
-        for name in ("placed", "integers", "integer_tracks", "shape_counts", "in_cosines", "tracks", "extents")
+        for name in ("placed", "integers", "integer_tracks", "shape_counts", "tracks", "extents")
     ]
 
 

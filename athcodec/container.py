@@ -234,8 +234,8 @@ _REST = struct.Struct("<BBH3dd")
 _TIME = struct.Struct("<B")
 _STEADY = struct.Struct("<dd")
 _CLIP = struct.Struct("<IIBB")
-_STEMS = struct.Struct("<fBBH")
-_BASIS_LENGTH = struct.Struct("<I")
+_STEMS = struct.Struct("<fBB")
+_BASIS = struct.Struct("<HBI")
 _CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
@@ -313,19 +313,21 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any."""
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, and the level
+    of the stream whose basis it begins with."""
 
     step: float
     rotation_step_factor: int
     bits: int = 0
     rank: int = 0
     basis: bytes = b""
+    base: int = NO_LEVEL
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length(), head.bits, head.rank)
+    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length(), head.bits)
     if head.bits:
-        data += _BASIS_LENGTH.pack(len(head.basis)) + head.basis
+        data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream
 
 

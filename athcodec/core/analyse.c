@@ -211,8 +211,7 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     ath_piece_before before = {layer->placed + (size_t)plan->pieces[p].first * 3 * T, layer->tracks + (size_t)p * 6 * T,
                                layer->tracks + (size_t)p * 6 * T + 3 * T, layer->extents[2 * p],
                                layer->extents[2 * p + 1]};
-    int cosines = layer->in_cosines[p] && motion->streams[plan->pieces[p].level].temporal == motion->cosines;
-    if (!cosines && before.frequencies > 0) before.frequencies = motion->frames;
+    if (!motion->known[p] && before.frequencies > 0) before.frequencies = motion->frames;
     return before;
 }
 

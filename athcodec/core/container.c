@@ -414,21 +414,21 @@ int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *hea
 
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
 {
-    if (chunk.size < 8 || chunk.bytes[4] > 4) return ATH_BAD_CHUNK;
+    if (chunk.size < 6 || chunk.bytes[4] > 4) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes);
     head->rotation_step_factor = (double)(1 << chunk.bytes[4] >> 1);
     head->bits = chunk.bytes[5];
-    head->rank = (int32_t)u16_at(chunk.bytes + 6);
-    head->basis = *body = rest_of(chunk, 8);
+    *body = rest_of(chunk, 6);
     if (!is_step(head->step)) return ATH_BAD_CHUNK;
-    if (head->bits == 0) return head->rank == 0 ? ATH_OK : ATH_BAD_CHUNK;
-    if (head->bits < 8 || head->bits > 16 || head->rank < 1 || head->rank > frames || body->size < 4)
-        return ATH_BAD_CHUNK;
-    size_t length = u32_at(body->bytes);
-    if (length > body->size - 4) return ATH_BAD_CHUNK;
-    head->basis = rest_of(*body, 4);
+    if (head->bits == 0) return ATH_OK;
+    if (head->bits < 8 || head->bits > 16 || body->size < 7) return ATH_BAD_CHUNK;
+    head->rank = (int32_t)u16_at(body->bytes);
+    head->base = body->bytes[2] == ATH_NO_LEVEL ? -1 : body->bytes[2];
+    size_t length = u32_at(body->bytes + 3);
+    if (head->rank < 1 || head->rank > frames || length > body->size - 7) return ATH_BAD_CHUNK;
+    head->basis = rest_of(*body, 7);
     head->basis.size = length;
-    *body = rest_of(*body, 4 + length);
+    *body = rest_of(*body, 7 + length);
     return ATH_OK;
 }
 

@@ -42,11 +42,11 @@ ATH_INLINE void ath_coarse_rows(const ath_motion *motion, const ath_piece *piece
 {
     const ath_coarse *before = motion->before;
     size_t T = (size_t)motion->frames;
-    int cosines = before->in_cosines[p] && motion->streams[piece->level].temporal == motion->cosines;
+    int known = motion->known[p];
     int alike = (before->shape_counts && before->shape_counts[p] > 0) == (rows->shape_count > 0);
-    rows->coarse_modes = cosines && alike ? before->integers + (size_t)piece->first * 3 * T : 0;
-    rows->coarse_rotation = cosines ? before->integer_tracks + (size_t)p * 6 * T : 0;
-    rows->coarse_shift = cosines ? before->integer_tracks + (size_t)p * 6 * T + 3 * T : 0;
+    rows->coarse_modes = known && alike ? before->integers + (size_t)piece->first * 3 * T : 0;
+    rows->coarse_rotation = known ? before->integer_tracks + (size_t)p * 6 * T : 0;
+    rows->coarse_shift = known ? before->integer_tracks + (size_t)p * 6 * T + 3 * T : 0;
 }
 
 ATH_INLINE ath_node_rows ath_rows_of_node(const ath_integers *integers, int32_t frames, int32_t n)

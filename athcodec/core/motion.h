@@ -10,7 +10,7 @@ typedef struct ath_stream {
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t reserved;
+    int32_t root; /* level of the first of the streams whose learned bases begin with the same rows; -1: cosines */
 } ath_stream;
 
 /* The layer before, from which a refinement predicts: what all pieces have become there. */
@@ -18,7 +18,6 @@ typedef struct ath_coarse {
     double *placed;                           /* vertex_count x 3 x frames: positions less the origin */
     const int32_t *integers, *integer_tracks; /* vertex_count x 3 x frames, piece_count x 2 x 3 x frames */
     const int32_t *shape_counts;              /* piece_count; null: no piece has shapes */
-    const uint8_t *in_cosines;                /* piece_count: whether all rows of a piece are in cosines */
     double *tracks;   /* piece_count x 2 x 3 x frames: rotation, translation over time; 0 where none is coded */
     int32_t *extents; /* piece_count x 2: frequencies and modes that its rows reach */
 } ath_coarse;
@@ -30,6 +29,7 @@ typedef struct ath_motion {
     double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
     const ath_coarse *before;  /* of a refinement; else null */
+    const uint8_t *known;      /* of a refinement, encoder: whether integers of a piece before stand for the same here */
     ath_coarse *decoded;       /* encoder: filled for the next layer; may be null */
     int32_t frames;
     int32_t ratio; /* of a refinement: the steps of the layer before over this one's */

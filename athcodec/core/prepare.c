@@ -261,6 +261,7 @@ static void ready_motion(ath_work *work)
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
         work->streams[d].temporal = work->layers[0].motion.cosines;
+        work->streams[d].root = -1;
         work->streams[d].temporal_rank = work->segment->frames;
     }
 }
@@ -338,18 +339,25 @@ static int check_some(ath_work *work)
     return ATH_OK;
 }
 
-/* Integers are decoded into the far half of the rows that they become. */
-static int read_temporal(ath_work *work, const ath_stems_head *head, stems_reader *reader, ath_stream *stream)
+/* Rows of a basis: those of the one that it begins with, then its own. Integers are decoded into the far half of the rows
+ * that they become. */
+static int read_temporal(ath_work *work, const ath_stems_head *head, int32_t d)
 {
-    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1);
-    size_t count = (size_t)head->rank * (size_t)frames;
-    int32_t *integers = (int32_t *)(void *)reader->temporal + count;
-    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank, frames,
-                                     limit, integers);
-    double unit = 1.0 / (double)limit;
-    for (size_t i = 0; result == ATH_OK && i < count; i++) reader->temporal[i] = (double)integers[i] * unit;
+    stems_reader *reader = work->stems + d;
+    ath_stream *stream = work->streams + d;
+    const ath_stream *base = head->base >= 0 && head->base < d ? work->streams + head->base : 0;
+    if (head->base >= 0 && (!base || base->root < 0 || base->temporal_rank > head->rank)) return ATH_BAD_CHUNK;
+    int32_t frames = work->segment->frames, limit = 1 << (head->bits - 1), known = base ? base->temporal_rank : 0;
+    size_t count = (size_t)(head->rank - known) * (size_t)frames;
+    double *rows = reader->temporal + (size_t)known * (size_t)frames, unit = 1.0 / (double)limit;
+    int32_t *integers = (int32_t *)(void *)rows + count;
+    if (base) memcpy(reader->temporal, base->temporal, (size_t)known * (size_t)frames * sizeof *rows);
+    int result = ath_decode_temporal(work->prelude_model, head->basis.bytes, head->basis.size, head->rank - known,
+                                     frames, limit, integers);
+    for (size_t i = 0; result == ATH_OK && i < count; i++) rows[i] = (double)integers[i] * unit;
     stream->temporal = reader->temporal;
     stream->temporal_rank = head->rank;
+    stream->root = base ? base->root : d;
     return result;
 }
 
@@ -365,7 +373,7 @@ static int open_stems(ath_work *work, int32_t d)
     if (result != ATH_OK) return result;
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
-    if (head.bits) result = read_temporal(work, &head, reader, stream);
+    if (head.bits) result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;
         refinement_model_init(reader->refined, frames, reader->history);
@@ -490,8 +498,8 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     const layer_work *coarse = layer - 1;
     const ath_piece *piece = coarse->plan->pieces + p;
     ath_piece_before *before = &layer->before;
-    int32_t T = layer->motion.frames,
-            cosines = work->streams[layer->plan->pieces[p].level].temporal == layer->motion.cosines;
+    int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].level].root;
+    int same = ath_base_stream(&coarse->motion, piece)->root == root;
     before->placed = placed;
     before->rotation = coarse->scratch.rotation;
     before->shift = coarse->scratch.shift;
@@ -501,15 +509,14 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     for (int32_t r = 0; r < piece->rank; r++) {
         int32_t count = ath_row_extent(ath_row(coarse->rows.modes, r, T), T, coarse->counts[r]);
         before->frequencies = ath_max(before->frequencies, count);
-        cosines = cosines && ath_mode_stream(&coarse->motion, piece, r)->temporal == layer->motion.cosines;
+        same = same && ath_mode_stream(&coarse->motion, piece, r)->root == root;
         if (count > 0) before->modes = coarse->rows.shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
     }
-    cosines = cosines && ath_base_stream(&coarse->motion, piece)->temporal == layer->motion.cosines;
-    if (!cosines && before->frequencies > 0) before->frequencies = T;
+    if (!same && before->frequencies > 0) before->frequencies = T;
     int alike = (coarse->rows.shape_count > 0) == (layer->rows.shape_count > 0);
-    layer->rows.coarse_modes = cosines && alike ? coarse->rows.modes : 0;
-    layer->rows.coarse_rotation = cosines ? coarse->rows.rotation : 0;
-    layer->rows.coarse_shift = cosines ? coarse->rows.shift : 0;
+    layer->rows.coarse_modes = same && alike ? coarse->rows.modes : 0;
+    layer->rows.coarse_rotation = same ? coarse->rows.rotation : 0;
+    layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
 }
 
 static int refine_piece(ath_work *work, int32_t q, int32_t p, const double **placed)

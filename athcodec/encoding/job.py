@@ -31,7 +31,7 @@ from athcodec.encoding import streams
 from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_digits, layers_of
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, decide
+from athcodec.encoding.search import EFFORTS, Choice, decide
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -83,8 +83,7 @@ class Draft:
     `fingerprint` a process notices that it found another hierarchy or rest pose than the one that made the draft.
     """
 
-    settings: Settings
-    learned_modes: LearnedModes | None
+    choice: Choice
     seen: Survey
     segment_count: int
     found: Found | None  # branches, for a clip without
@@ -154,9 +153,8 @@ class _Decided:
     """What the streams of a file depend on: settings, and what follows from them."""
 
     ath: Ath
-    settings: Settings
+    choice: Choice
     prelude: CodedPrelude
-    learned_modes: LearnedModes | None
     layers: list[Layer]
 
     @property
@@ -242,17 +240,22 @@ class EncodingJob:
             self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
         )
         ath = self.seen.ath(self.thresholds(bound))
-        settings, prelude, modes = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs)
-        return self._layered(ath, settings, prelude, modes)
+        coarser = self._layer_digits(bound)[0]
+        choice, prelude = decide(
+            self.source, ath, bound, self.options.effort, self.report, self.options.jobs, coarser
+        )
+        return self._layered(ath, choice, prelude)
 
-    def _layered(self, ath: Ath, settings: Settings, prelude: CodedPrelude, modes: LearnedModes | None) -> _Decided:
-        digits = layer_digits(self.options.ladder, settings.bound, self.seen.diagonal)
-        return _Decided(ath, settings, prelude, modes, layers_of(self.source, prelude, settings, modes, digits))
+    def _layer_digits(self, bound: float) -> list[int]:
+        return layer_digits(self.options.ladder, bound, self.seen.diagonal)
+
+    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
+        layers = layers_of(self.source, prelude, choice, self._layer_digits(choice.settings.bound))
+        return _Decided(ath, choice, prelude, layers)
 
     def draft(self, decided: _Decided) -> Draft:
         return Draft(
-            decided.settings,
-            decided.learned_modes,
+            decided.choice,
             self.seen,
             self.segment_count,
             self.found,
@@ -262,10 +265,9 @@ class EncodingJob:
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
-        ath = self.seen.ath(self.thresholds(draft.settings.bound))
-        decided = self._layered(
-            ath, draft.settings, CodedPrelude(self.source, ath, draft.settings), draft.learned_modes
-        )
+        settings = draft.choice.settings
+        ath = self.seen.ath(self.thresholds(settings.bound))
+        decided = self._layered(ath, draft.choice, CodedPrelude(self.source, ath, settings))
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(
                 "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
@@ -324,7 +326,7 @@ class EncodingJob:
             self.segment_count,
             len(errors),
             len(errors),
-            0.0 if self.options.lossless else self.source.largest_bound(decided.settings.bound),
+            0.0 if self.options.lossless else self.source.largest_bound(decided.choice.settings.bound),
             self.clip.dtype == np.float64,
             len(self.clip.clip_range_frames),
             len(layers),
@@ -441,7 +443,7 @@ def _summary(
         name = ct.KIND_NAMES[chunk.kind]
         sizes[name] = sizes.get(name, 0) + chunk.length
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
-    settings, bound = decided.settings, decided.settings.bound
+    settings, bound = decided.choice.settings, decided.choice.settings.bound
     choices = {
         "step_ratio": settings.step / bound,
         "rest_step_ratio": settings.rest_step / bound,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,15 +19,19 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_error
+from athcodec.encoding.search import Choice
 from athcodec.encoding.segment import (
     CodedPrelude,
     Settings,
     Source,
+    StreamBasis,
     analyse,
     correct,
     correction_chunk,
+    learned_bases,
     stem_streams,
     stems_head,
+    time_components,
 )
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
@@ -45,8 +50,8 @@ class Layer:
     settings : Settings
         Those of the file, with the layer's step and limit; a limit of None leaves the layer without corrections.
     modes : LearnedModes or None
-    digits : int
-        Binary digits of its integers beyond those of the layer before; 0 for the first.
+    coarser : int
+        Binary digits by which its step is coarser than that of the last layer.
     rest : ct.Rest or streams.CodedRest or None
         The content of REST for the first layer, of REFINED_REST for others; None: the rest pose of the layer before.
     """
@@ -54,7 +59,7 @@ class Layer:
     plan: Plan
     settings: Settings
     modes: LearnedModes | None
-    digits: int = 0
+    coarser: int = 0
     rest: ct.Rest | streams.CodedRest | None = None
 
 
@@ -91,9 +96,10 @@ def layer_digits(ladder: Sequence[float], bound: float, diagonal: float) -> list
 
 
 def layers_of(
-    source: Source, prelude: CodedPrelude, settings: Settings, modes: LearnedModes | None, digits: Sequence[int]
+    source: Source, prelude: CodedPrelude, choice: Choice, digits: Sequence[int]
 ) -> list[Layer]:
-    """The layers for settings and a prelude that were found for the last of them."""
+    """The layers for what was chosen; prelude: of the last of them."""
+    settings = choice.settings
     rests = _rests(source, prelude, digits)
     layers: list[Layer] = []
     for i, coarser in enumerate(digits):
@@ -104,19 +110,22 @@ def layers_of(
         )
         if plan is not prelude.plan:
             plan.set_rest(rests[i][1])
-        step = qz.single(settings.step * 2.0**coarser)
-        limit = settings.limit if coarser == 0 else None
-        own = replace(settings if i == 0 else _uniform(prelude.plan, settings), step=step, limit=limit)
-        layers.append(
-            Layer(
-                plan,
-                own,
-                modes if coarser == 0 or modes is None else nested(plan, modes, coarser),
-                digits[i - 1] - coarser if i else 0,
-                rests[i][0],
-            )
+        own = replace(
+            choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
+            step=qz.single(settings.step * 2.0**coarser),
+            limit=settings.limit if coarser == 0 else None,
         )
+        layers.append(Layer(plan, own, _modes(plan, choice, own, coarser), coarser, rests[i][0]))
     return layers
+
+
+def _modes(plan: Plan, choice: Choice, settings: Settings, coarser: int) -> LearnedModes | None:
+    """Those of the pieces that a layer's settings name."""
+    if coarser == 0 or choice.learned_modes is None:
+        return choice.learned_modes
+    if settings.learned_pieces is None:
+        return None
+    return nested(plan, choice.learned_modes, settings.learned_pieces, coarser)
 
 
 def _uniform(plan: Plan, settings: Settings) -> Settings:
@@ -154,29 +163,63 @@ def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
     }
     before = first
     for level, layer in enumerate(finer, first.plan.level_count):
-        modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, layer.digits)
+        digits = before.coarser - layer.coarser
+        modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
         if modes is not None:
-            chunks[level, ct.SHAPES] = ct.pack_refined_shapes(layer.digits, modes)
+            chunks[level, ct.SHAPES] = ct.pack_refined_shapes(digits, modes)
         if isinstance(layer.rest, streams.CodedRest):
             chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest.stream)
         before = layer
     return chunks
 
 
+class _TimeBases:
+    """The time bases of the layers of one segment: one, learned for the last layer, with more rows in each."""
+
+    def __init__(self, last: Layer, positions: np.ndarray):
+        found = time_components(last.plan, last.settings, positions)
+        self._components = found.get(last.plan.level_count - 1)
+        self._before: tuple[int, StreamBasis] | None = None
+
+    def first(self, layer: Layer) -> dict[int, StreamBasis]:
+        """Of the levels of the first layer that are to have it."""
+        bases: dict[int, StreamBasis] = {}
+        for level, learned in enumerate(layer.settings.learned_bases):
+            if learned and layer.plan.has_stems(level):
+                bases |= self.refined(layer, level, level)
+        return bases
+
+    def refined(self, layer: Layer, stream: int, level: int) -> dict[int, StreamBasis]:
+        """Of a stream of the layer's settings, which stands at a level of the file."""
+        if self._components is None or not layer.settings.learned_bases[stream]:
+            return {}
+        steps = self._components.basis(layer.coarser)
+        if steps is None:
+            return {}
+        own = StreamBasis(steps, level)
+        if self._before is not None:
+            base, before = self._before
+            own = StreamBasis(steps, before.root, len(before.steps), base)
+        self._before = level, own
+        return {stream: own}
+
+
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, (largest, RMS), of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, positions: np.ndarray):
+    def __init__(self, prelude: CodedPrelude, layers: Sequence[Layer], positions: np.ndarray):
         self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
-        self._pool = prelude.plan.pool
+        self._pool, self._layered = prelude.plan.pool, len(layers) > 1
+        self._bases = _TimeBases(layers[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, float]] = []
         self.decoded = np.empty(0)
 
-    def first(self, layer: Layer, layered: bool) -> SegmentMotion:
+    def first(self, layer: Layer) -> SegmentMotion:
         """The levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
-        segment, bases = analyse(plan, settings, self._positions, layer.modes, layered=layered)
+        bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self._positions)
+        segment = analyse(plan, settings, self._positions, layer.modes, bases, layered=self._layered)
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(segment, layer, plan.level_count - 1)
@@ -188,16 +231,13 @@ class _SegmentCoder:
         self.errors = [*below, *self.errors]
         return segment
 
-    def refine(self, layer: Layer, before: SegmentMotion, level: int) -> SegmentMotion:
-        """One further level."""
+    def refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
+        """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
-        segment, bases = analyse(
-            layer.plan, settings, self._positions, layer.modes, before, 1 << layer.digits, layered=True
-        )
+        bases = self._bases.refined(layer, last, level)
+        segment = analyse(layer.plan, settings, self._positions, layer.modes, bases, before, ratio, layered=True)
         head = stems_head(settings, last, bases)
-        self.chunks[level, ct.STEMS] = ct.pack_refined_stems(
-            1 << layer.digits, head, streams.encode_refinement(segment, last)
-        )
+        self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         self._finish_with(segment, layer, level)
         return segment
 
@@ -222,10 +262,10 @@ def code_segment(
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.
     """
-    coder, level = _SegmentCoder(prelude, positions), layers[0].plan.level_count
-    segment = coder.first(layers[0], layered=len(layers) > 1)
-    for layer in layers[1:]:
-        segment = coder.refine(layer, segment, level)
+    coder, level = _SegmentCoder(prelude, layers, positions), layers[0].plan.level_count
+    segment = coder.first(layers[0])
+    for before, layer in pairwise(layers):
+        segment = coder.refine(layer, segment, 1 << before.coarser - layer.coarser, level)
         level += 1
     largest_bound = layers[-1].settings.largest_bound
     if coder.errors[-1][0] > largest_bound:

@@ -111,11 +111,12 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
     return _packed(counts, [rows[p] for p in np.flatnonzero(counts)])
 
 
-def nested(plan: Plan, modes: LearnedModes, digits: int) -> LearnedModes:
-    """The same modes with so many binary digits less; those of a piece end before the first that vanishes."""
+def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
+    """The same modes of the pieces `wanted`, (P,) bool, with so many binary digits less; those of a piece end before the
+    first that vanishes."""
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
     counts, rows = np.zeros_like(modes.counts), []
-    for piece in np.flatnonzero(modes.counts):
+    for piece in np.flatnonzero(wanted & (modes.counts > 0)):
         own = integers[modes.first[piece] : modes.first[piece] + modes.counts[piece]]
         counts[piece] = count = np.cumprod(own.any(axis=1)).sum()
         size = min(int(plan.pieces["rank"][piece]), SHAPE_MODES)

@@ -44,11 +44,6 @@ def cosine_basis(frames: int) -> np.ndarray:
     return basis
 
 
-def temporal_basis(steps: np.ndarray, bits: int) -> np.ndarray:
-    """The rows over time that stored integers of `bits` bits mean, (rank, frames) float64."""
-    return steps.astype(np.float64) * 2.0 ** -(bits - 1)
-
-
 class Plan:
     """Pieces, nodes and bases of a plant, from its branches and decoded rest pose.
 
@@ -165,6 +160,7 @@ class LevelStream:
     step: float
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
+    root: int = -1  # level of the first of the streams whose learned bases begin with the same rows
 
 
 class SegmentMotion:
@@ -196,32 +192,36 @@ class SegmentMotion:
         self.before, self.ratio = before, ratio
         if before is not None:
             self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
+            self.known = self._known(before)
         self.coarse = None
         if layered:
             self.placed = np.zeros((plan.vertex_count, 3, frames))
             self.placed_tracks = np.zeros(self.tracks.shape)
             self.extents = np.zeros((core.piece_count, 2), np.int32)
-            learned = np.array([stream.temporal is not None for stream in streams])
-            self.in_cosines = (~(learned[plan.pieces["level"]] | learned[plan.base_level])).astype(np.uint8)
             self.coarse = Coarse(
                 self.placed.ctypes.data,
                 self.coefficients.ctypes.data,
                 self.tracks.ctypes.data,
                 None if learned_modes is None else learned_modes.counts.ctypes.data,
-                self.in_cosines.ctypes.data,
                 self.placed_tracks.ctypes.data,
                 self.extents.ctypes.data,
             )
         self._bind()
 
+    def _known(self, before: SegmentMotion) -> np.ndarray:
+        """(P,) uint8: pieces whose integers in the layer before stand for the same functions of time as here."""
+        same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
+        return (same[before.plan.pieces["level"]] & same[before.plan.base_level]).astype(np.uint8)
+
     def _bind(self) -> None:
         self._c_streams = (Stream * len(self.streams))()
         self._temporal = []  # keeps what the C structs point to
         for c_stream, stream in zip(self._c_streams, self.streams):
-            temporal = self.cosines if stream.temporal is None else np.ascontiguousarray(stream.temporal, np.float64)
+            temporal = self.cosines if stream.temporal is None else stream.temporal
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
+            c_stream.root = stream.root
         self.motion = Motion(
             streams=addressof(self._c_streams),
             cosines=self.cosines.ctypes.data,
@@ -229,6 +229,7 @@ class SegmentMotion:
             frames=self.frames,
             ratio=self.ratio,
             before=None if self.before is None else addressof(self.before.coarse),
+            known=None if self.before is None else self.known.ctypes.data,
             decoded=None if self.coarse is None else addressof(self.coarse),
         )
         self.integers = Integers(

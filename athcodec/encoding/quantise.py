@@ -19,14 +19,12 @@ MODE_STEP = 0.1  # precision of a learned mode: what it moves in a frame (RMS), 
 LEAST_MODE = 0.12  # what a learned mode that is kept moves in a frame (RMS), in steps
 LARGEST_MODE = 2.0**20
 REQUIRED_SAVINGS = (1.0, 1.25)  # by which factor a piece's estimated bits must shrink for learned modes
-TEMPORAL_TOLERANCE = 5e-4  # mean square, in steps, that a learned time basis may leave out
 SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of errors must not vanish
 LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
-TEMPORAL_BITS = 14
 
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # of a level's vertices that may have weights below that of its step
 
@@ -73,24 +71,6 @@ def first_step_ratio(relative_bound: float) -> float:
 def rest_step_ratio(relative_bound: float) -> float:
     """Rest pose step over error bound."""
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
-
-
-def learn_temporal_basis(moments: np.ndarray, count: int, tolerance: float) -> np.ndarray | None:
-    """Orthonormal rows over time that hold tracks but for a residual below `tolerance` (mean square per number).
-
-    moments: (T, T) second moments of `count` tracks in units of their steps. Returns stored integers (rank, T) int32 of
-    TEMPORAL_BITS, or None where no basis smaller than the DCT's would do.
-    """
-    frames = len(moments)
-    if count <= 1:
-        return None
-    values, vectors = np.linalg.eigh(moments)
-    rest = np.cumsum(np.maximum(values, 0.0))  # ascending: what is lost by leaving out the first i + 1
-    rank = frames - int(np.searchsorted(rest, tolerance * count * frames, side="right"))
-    if not 1 <= rank <= frames // 2:
-        return None
-    basis = np.ascontiguousarray(vectors[:, ::-1][:, :rank].T)
-    return np.rint(basis * 2.0 ** (TEMPORAL_BITS - 1)).astype(np.int32)
 
 
 LONGEST_LAG = 40

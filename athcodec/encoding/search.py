@@ -30,6 +30,7 @@ from athcodec.encoding.segment import (
     branch_records,
     code_stems,
     lags,
+    learned_bases,
     loose_branches,
     thread_count,
 )
@@ -79,14 +80,24 @@ def _moved(source: Source, segment: int) -> float:
     return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)
 
 
+@dataclass(frozen=True)
+class Choice:
+    """Settings of the last layer of precision and, where it is another, of the first; modes learned for the last."""
+
+    settings: Settings
+    first_layer: Settings
+    learned_modes: LearnedModes | None
+
+
 def decide(
-    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None
-) -> tuple[Settings, CodedPrelude, LearnedModes | None]:
-    """Settings, and what follows from them: hierarchy and rest pose as coded, learned modes."""
+    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, coarser: int = 0
+) -> tuple[Choice, CodedPrelude]:
+    """Settings, and hierarchy and rest pose as coded with them. coarser: binary digits by which the step of the first
+    layer is coarser than that of the last."""
     search = Search.of(source, ath, bound, effort, report, jobs)
-    settings = search.found()
+    settings, first_layer = search.found(coarser)
     prelude = search.prelude(settings)
-    return settings, prelude, search.learned_modes(prelude.plan, settings)
+    return Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)), prelude
 
 
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
@@ -108,6 +119,25 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
+    )
+
+
+def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: LearnedModes | None) -> SegmentMotion:
+    return analyse(plan, settings, positions, modes, learned_bases(plan, settings, positions))
+
+
+def _coarser(settings: Settings, digits: int) -> Settings:
+    """The same, 2^digits times as coarse; the rest pose half of that."""
+    if digits == 0:
+        return settings
+    ratio = 2.0**digits
+    return replace(
+        settings,
+        bound=ratio * settings.bound,
+        largest_bound=ratio * settings.largest_bound,
+        limit=ratio * settings.limit,
+        step=qz.single(ratio * settings.step),
+        rest_step=qz.single(ratio / 2 * settings.rest_step),
     )
 
 
@@ -169,10 +199,12 @@ class Search:
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
 
-    def found(self) -> Settings:
-        """The best settings; for a large plant those of a sample of it."""
+    def found(self, coarser: int = 0) -> tuple[Settings, Settings]:
+        """The best settings, and those of a first layer; for a large plant those of a sample of it."""
         sample = sample_plant(self.source, self.ath, self.effort)
-        return self.best() if sample is None else self.best_of_sample(sample)
+        found = self.best_of_sample(sample, coarser) if sample else (best := self.best(), self.first_layer(best, coarser))
+        self.report("search", 1.0)
+        return found
 
     def best(self) -> Settings:
         steps = [
@@ -193,15 +225,23 @@ class Search:
         for step in [*steps, self._with_node_steps]:
             settings = step(settings)
             self._report(WORTH.get(step.__name__, 0))
-        self.report("search", 1.0)
         return settings
+
+    def first_layer(self, settings: Settings, coarser: int) -> Settings:
+        """Settings of a layer whose step is 2^coarser times that of the given ones."""
+        if coarser == 0:
+            return settings
+        first = replace(_coarser(settings, coarser), learned_bases=(False,) * self.levels)
+        for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
+            first = first if self.effort == "fast" else step(first)
+        return self._with_node_steps(first)
 
     def _report(self, worth: int = 0) -> None:
         """Reports progress after work that counts as `worth` trials in addition to those made."""
         self._extra_trials += worth
         self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
 
-    def best_of_sample(self, sample: PlantSample) -> Settings:
+    def best_of_sample(self, sample: PlantSample, coarser: int) -> tuple[Settings, Settings]:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
@@ -215,9 +255,15 @@ class Search:
         samples = [segment.of_plant(sample) for segment in self.samples]
         search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
+        settings = self._from_sample(search, found, start)
+        first = search.first_layer(found, coarser)
+        return settings, self._from_sample(search, first, _coarser(start, coarser))
+
+    def _from_sample(self, search: Search, found: Settings, start: Settings) -> Settings:
+        """What was found last for a sample of the plant, for all of it; start: what does not depend on that."""
         inner, all_inner = search.inner_nodes(), self.inner_nodes()
-        coarser = np.where(inner > 0, np.sqrt(extrapolation.vertices * inner / np.maximum(all_inner, 1)), 1.0)
-        by_form = np.array_equal(found.sheet, sample.source.sheet_like)
+        fewer = np.sqrt(search.extrapolation.vertices * inner / np.maximum(all_inner, 1))
+        by_form = np.array_equal(found.sheet, search.source.sheet_like)
         settings = replace(
             start,
             step=found.step,
@@ -226,7 +272,7 @@ class Search:
             rotation_step_factors=found.rotation_step_factors,
             learned_bases=found.learned_bases,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
-            node_steps=found.node_steps * coarser,
+            node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
         if search.required_saving is None:
             return settings
@@ -308,7 +354,7 @@ class Search:
         modes, tracks = (
             sum(
                 estimated_bits(
-                    analyse(prelude.plan, plain, sample.positions, some)[0].coefficients,
+                    _analysed(prelude.plan, plain, sample.positions, some).coefficients,
                     pieces,
                     len(learned_modes.counts),
                 )
@@ -429,7 +475,7 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment, _ = analyse(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        segment = _analysed(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)

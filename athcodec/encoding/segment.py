@@ -18,7 +18,8 @@ from athcodec.clip import MotionClip
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
-from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather, temporal_basis
+from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
 from athcodec.segmentation import split_segments
@@ -223,12 +224,23 @@ def _thin_branches(source: Source) -> np.ndarray:
     return way <= 1.3 * _stem_sizes(source)
 
 
-def _level_streams(settings: Settings, levels: int, bases: dict[int, np.ndarray]) -> list[LevelStream]:
+@dataclass(frozen=True)
+class StreamBasis:
+    """The learned time basis of a stream, (rank, frames) int32 as stored; root as in LevelStream. It begins with the
+    `known` rows of the stream of another level, if any."""
+
+    steps: np.ndarray
+    root: int
+    known: int = 0
+    base: int = ct.NO_LEVEL
+
+
+def _level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
     level_streams = []
     for level in range(levels):
         stream = LevelStream(settings.step_of(level), float(settings.rotation_step_factors[level]))
         if level in bases:
-            stream.temporal = temporal_basis(bases[level], qz.TEMPORAL_BITS)
+            stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
         level_streams.append(stream)
     return level_streams
 
@@ -263,14 +275,19 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
     return segment
 
 
-def _learn_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, np.ndarray]:
-    """Temporal bases of the levels that learn theirs, from a finer pass with cosines."""
+def time_components(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, TimeComponents]:
+    """Of the levels that learn their time bases, from a finer pass with cosines."""
     levels = [level for level, learned in enumerate(settings.learned_bases) if learned]
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
-    bases = {level: qz.learn_temporal_basis(*_level_moments(segment, level), qz.TEMPORAL_TOLERANCE) for level in levels}
-    return {level: basis for level, basis in bases.items() if basis is not None}
+    return {level: TimeComponents(*_level_moments(segment, level)) for level in levels}
+
+
+def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
+    """Each level's own."""
+    bases = {level: found.basis() for level, found in time_components(plan, settings, positions).items()}
+    return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
 
 
 @dataclass
@@ -305,29 +322,30 @@ def analyse(
     settings: Settings,
     positions: np.ndarray,
     learned_modes: LearnedModes | None,
+    bases: dict[int, StreamBasis],
     before: SegmentMotion | None = None,
     ratio: int = 1,
     layered: bool = False,
-) -> tuple[SegmentMotion, dict[int, np.ndarray]]:
-    """The integers of the stems, and the time bases of the levels that learn theirs; before, ratio, layered: as
-    SegmentMotion has them."""
-    bases = _learn_bases(plan, settings, positions)
+) -> SegmentMotion:
+    """The integers of the stems; bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has
+    them."""
     level_streams = _level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], level_streams, learned_modes, before, ratio, layered)
     segment.analyse(positions, qz.DEAD_ZONE)
-    return segment, bases
+    return segment
 
 
-def stems_head(settings: Settings, level: int, bases: dict[int, np.ndarray]) -> ct.StemsHead:
+def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
     """Of the stems of a level, whose time basis is among `bases` where it is learned."""
     head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
     if level in bases:
-        head.bits, head.rank = qz.TEMPORAL_BITS, len(bases[level])
-        head.basis = streams.encode_temporal(bases[level], head.bits)
+        own = bases[level]
+        head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
+        head.basis = streams.encode_temporal(own.steps[own.known :], BASIS_BITS)
     return head
 
 
-def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, np.ndarray]) -> tuple[dict, dict]:
+def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]) -> tuple[dict, dict]:
     """STEMS of the levels of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 
@@ -362,7 +380,8 @@ def code_stems(
     prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None
 ) -> Coded:
     """Streams of the stems of a single layer and the corrections that keep the limit."""
-    segment, bases = analyse(prelude.plan, settings, positions, learned_modes)
+    bases = learned_bases(prelude.plan, settings, positions)
+    segment = analyse(prelude.plan, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)
     corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan.pool)

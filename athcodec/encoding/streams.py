@@ -76,7 +76,7 @@ def encode_times(time: np.ndarray) -> bytes:
 
 
 def encode_temporal(steps: np.ndarray, bits: int) -> bytes:
-    """A learned temporal basis as stored integers of `bits` bits, (rank, frames) int32."""
+    """Rows of a learned temporal basis as stored integers of `bits` bits, (rows, frames) int32."""
     rank, frames = steps.shape
     return encode_stream(
         "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, 1 << bits - 1, address(steps, np.int32, steps.size)

@@ -1,0 +1,40 @@
+"""Time bases learned from the tracks of a segment, which take the place of cosines.
+
+The principal components over time of a level's tracks (Lengyel 1999) represent it in fewer rows than cosines, at the
+price of storing them. FORMAT.md, "Temporal basis stream".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+BASIS_BITS = 14  # of stored integers
+TOLERANCE = 5e-4  # mean square, in steps, that a basis may leave out
+
+
+def basis_rows(steps: np.ndarray) -> np.ndarray:
+    """The rows over time that stored integers mean, (rank, frames) float64."""
+    return steps.astype(np.float64) * 2.0 ** -(BASIS_BITS - 1)
+
+
+class TimeComponents:
+    """Principal components over time, in descending order, of `count` tracks.
+
+    moments: (frames, frames), their second moments in units of their steps.
+    """
+
+    def __init__(self, moments: np.ndarray, count: int):
+        values, vectors = np.linalg.eigh(moments)
+        self._left_out = np.cumsum(np.maximum(values, 0.0))  # by leaving out the last i + 1
+        self._rows = np.ascontiguousarray(vectors[:, ::-1].T)
+        self._count = count
+
+    def basis(self, coarser: int = 0) -> np.ndarray | None:
+        """The rows that tracks in steps 2^coarser times as large need, (rank, frames) int32 as stored, or None where no
+        basis smaller than the DCT's would do."""
+        frames = len(self._rows)
+        allowed = TOLERANCE * 4.0**coarser * self._count * frames
+        rank = frames - int(np.searchsorted(self._left_out, allowed, side="right"))
+        if self._count <= 1 or not 1 <= rank <= frames // 2:
+            return None
+        return np.rint(self._rows[:rank] * 2.0 ** (BASIS_BITS - 1)).astype(np.int32)
