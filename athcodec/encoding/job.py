@@ -28,7 +28,7 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_digits, layers_of
+from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_ratios, layers_of
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, decide
@@ -240,17 +240,17 @@ class EncodingJob:
             self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
         )
         ath = self.seen.ath(self.thresholds(bound))
-        coarser = self._layer_digits(bound)[0]
+        ratio = self._layer_ratios(bound)[0]
         choice, prelude = decide(
-            self.source, ath, bound, self.options.effort, self.report, self.options.jobs, coarser
+            self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio
         )
         return self._layered(ath, choice, prelude)
 
-    def _layer_digits(self, bound: float) -> list[int]:
-        return layer_digits(self.options.ladder, bound, self.seen.diagonal)
+    def _layer_ratios(self, bound: float) -> list[int]:
+        return layer_ratios(self.options.ladder, bound, self.seen.diagonal)
 
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
-        layers = layers_of(self.source, prelude, choice, self._layer_digits(choice.settings.bound))
+        layers = layers_of(self.source, prelude, choice, self._layer_ratios(choice.settings.bound))
         return _Decided(ath, choice, prelude, layers)
 
     def draft(self, decided: _Decided) -> Draft:
@@ -408,7 +408,7 @@ class EncodingJob:
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
-            return CodedSegment(index, *code_segment(decided.prelude, decided.layers, positions, exact))
+            return CodedSegment(index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact))
 
         at_once = thread_count(self.options.jobs, self.source)
         pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)

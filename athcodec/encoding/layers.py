@@ -35,8 +35,10 @@ from athcodec.encoding.segment import (
 )
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
+CORRECTIONS_SHARE = 0.01  # of the bytes up to a layer, that its corrections may take if it is not the last
+CORRECTED_LIMITS = tuple(2.0 ** (i / 3) for i in range(5, -6, -1))  # over the layer's own, to choose from
 LEAST_RATIO = 4  # of the steps of neighbouring layers
-MOST_DIGITS = 14  # binary, between neighbouring layers
+MOST_RATIO = 1 << 14  # likewise
 
 
 @dataclass
@@ -48,10 +50,10 @@ class Layer:
     plan : Plan
         On the rest pose of the layer.
     settings : Settings
-        Those of the file, with the layer's step and limit; a limit of None leaves the layer without corrections.
+        Those of the file, with the layer's step and limit.
     modes : LearnedModes or None
-    coarser : int
-        Binary digits by which its step is coarser than that of the last layer.
+    ratio : int
+        Of its step to that of the last layer.
     rest : ct.Rest or streams.CodedRest or None
         The content of REST for the first layer, of REFINED_REST for others; None: the rest pose of the layer before.
     """
@@ -59,7 +61,7 @@ class Layer:
     plan: Plan
     settings: Settings
     modes: LearnedModes | None
-    coarser: int = 0
+    ratio: int = 1
     rest: ct.Rest | streams.CodedRest | None = None
 
 
@@ -79,53 +81,55 @@ def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
     return errors
 
 
-def layer_digits(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
-    """Binary digits by which the step of each layer is coarser than that of the last, descending to 0.
+def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
+    """Of the step of each layer to that of the last, powers of two, descending to 1.
 
     ladder: largest errors over the diagonal, descending; those close to the bound, or to each other, make no layer of
     their own.
     """
-    digits: list[int] = []
+    ratios: list[int] = []
     for error in ladder:
-        ratio = error * diagonal / bound
-        coarser = int(np.ceil(np.log2(ratio))) if ratio > 1 else 0
-        if 2**coarser >= LEAST_RATIO and (not digits or digits[-1] - coarser >= 2):
-            digits.append(coarser)
-    digits.append(0)
-    return [most for i, most in enumerate(digits) if i == 0 or digits[i - 1] - most <= MOST_DIGITS]
+        ratio = 1 << max(0, math.ceil(math.log2(min(error * diagonal / bound, MOST_RATIO**2))))
+        if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
+            ratios.append(ratio)
+    ratios.append(1)
+    return [ratio for i, ratio in enumerate(ratios) if i == 0 or ratios[i - 1] <= MOST_RATIO * ratio]
 
 
-def layers_of(
-    source: Source, prelude: CodedPrelude, choice: Choice, digits: Sequence[int]
-) -> list[Layer]:
+def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> list[Layer]:
     """The layers for what was chosen; prelude: of the last of them."""
     settings = choice.settings
-    rests = _rests(source, prelude, digits)
+    rests = _rests(source, prelude, ratios)
     layers: list[Layer] = []
-    for i, coarser in enumerate(digits):
+    for i, ratio in enumerate(ratios):
         plan = (
             prelude.plan
-            if coarser == 0 and i == 0
+            if len(ratios) == 1
             else Plan(prelude.plan.branches.copy(), source.hierarchy.vertex_count, source.pool, refined=i > 0)
         )
         if plan is not prelude.plan:
             plan.set_rest(rests[i][1])
         own = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
-            step=qz.single(settings.step * 2.0**coarser),
-            limit=settings.limit if coarser == 0 else None,
+            step=qz.single(settings.step * ratio),
+            limit=settings.limit * ratio,
         )
-        layers.append(Layer(plan, own, _modes(plan, choice, own, coarser), coarser, rests[i][0]))
+        layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, rests[i][0]))
     return layers
 
 
-def _modes(plan: Plan, choice: Choice, settings: Settings, coarser: int) -> LearnedModes | None:
+def _modes(plan: Plan, choice: Choice, settings: Settings, ratio: int) -> LearnedModes | None:
     """Those of the pieces that a layer's settings name."""
-    if coarser == 0 or choice.learned_modes is None:
+    if ratio == 1 or choice.learned_modes is None:
         return choice.learned_modes
     if settings.learned_pieces is None:
         return None
-    return nested(plan, choice.learned_modes, settings.learned_pieces, coarser)
+    return nested(plan, choice.learned_modes, settings.learned_pieces, _binary_digits(ratio))
+
+
+def _binary_digits(ratio: int) -> int:
+    """That integers lose where steps are so many times as large."""
+    return ratio.bit_length() - 1
 
 
 def _uniform(plan: Plan, settings: Settings) -> Settings:
@@ -141,15 +145,15 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
     )
 
 
-def _rests(source: Source, prelude: CodedPrelude, digits: Sequence[int]) -> list[tuple]:
+def _rests(source: Source, prelude: CodedPrelude, ratios: Sequence[int]) -> list[tuple]:
     """(rest, decoded pose) of each layer, as Layer.rest has it."""
     final = prelude.rest_chunk
-    if final.exact or len(digits) == 1:
-        return [(final if i == 0 else None, prelude.plan.rest) for i in range(len(digits))]
+    if final.exact or len(ratios) == 1:
+        return [(final if i == 0 else None, prelude.plan.rest) for i in range(len(ratios))]
     found: list[tuple] = []
     coded = None
-    for coarser in digits:
-        step = final.step * 2.0 ** max(0, coarser - 1)
+    for ratio in ratios:
+        step = final.step * max(1.0, ratio / 2)
         coded = streams.encode_rest(prelude.plan.branches, step, source.rest, coded)
         found.append((coded if found else replace(final, step=step, stream=coded.stream), coded.decoded))
     return found
@@ -163,7 +167,7 @@ def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
     }
     before = first
     for level, layer in enumerate(finer, first.plan.level_count):
-        digits = before.coarser - layer.coarser
+        digits = _binary_digits(before.ratio) - _binary_digits(layer.ratio)
         modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
         if modes is not None:
             chunks[level, ct.SHAPES] = ct.pack_refined_shapes(digits, modes)
@@ -193,7 +197,7 @@ class _TimeBases:
         """Of a stream of the layer's settings, which stands at a level of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
-        steps = self._components.basis(layer.coarser)
+        steps = self._components.basis(layer.ratio)
         if steps is None:
             return {}
         own = StreamBasis(steps, level)
@@ -207,9 +211,10 @@ class _TimeBases:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, (largest, RMS), of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, layers: Sequence[Layer], positions: np.ndarray):
+    def __init__(self, prelude: CodedPrelude, layers: Sequence[Layer], segment_count: int, positions: np.ndarray):
         self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
         self._pool, self._layered = prelude.plan.pool, len(layers) > 1
+        self._shared_bytes = (len(prelude.hierarchy_stream) + len(layers[0].rest.stream)) / segment_count
         self._bases = _TimeBases(layers[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, float]] = []
@@ -243,12 +248,31 @@ class _SegmentCoder:
 
     def _finish_with(self, segment: SegmentMotion, layer: Layer, level: int) -> None:
         """Corrections of the level that a layer ends with, and its errors."""
-        self.decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
-        if layer.settings.limit is not None:
-            corrections, step = correct(self.decoded, self._positions, self._origin, layer.settings, self._pool)
-            if chunk := correction_chunk(corrections, step, self.decoded.shape):
-                self.chunks[level, ct.CORRECTIONS] = chunk
+        decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
+        if layer.ratio == 1:
+            self.decoded, chunk = self._corrected(decoded, layer.settings)
+        else:
+            self.decoded, chunk = self._tightest(decoded, layer.settings)
+        if chunk:
+            self.chunks[level, ct.CORRECTIONS] = chunk
         self.errors.append(self._error(self.decoded))
+
+    def _corrected(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
+        """Positions within the limit, and the corrections that bring them there."""
+        decoded = decoded.copy()
+        corrections, step = correct(decoded, self._positions, self._origin, settings, self._pool)
+        return decoded, correction_chunk(corrections, step, decoded.shape)
+
+    def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
+        """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
+        allowed = CORRECTIONS_SHARE * (self._shared_bytes + sum(map(len, self.chunks.values())))
+        best = decoded, b""
+        for factor in CORRECTED_LIMITS:
+            corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
+            if len(corrected[1]) > allowed:
+                break
+            best = corrected
+        return best
 
     def _error(self, decoded: np.ndarray) -> tuple[float, float]:
         largest, squares = position_error(decoded, self._positions, self._origin, self._pool)
@@ -256,16 +280,20 @@ class _SegmentCoder:
 
 
 def code_segment(
-    prelude: CodedPrelude, layers: Sequence[Layer], positions: np.ndarray, exact: np.ndarray | None = None
+    prelude: CodedPrelude,
+    layers: Sequence[Layer],
+    segment_count: int,
+    positions: np.ndarray,
+    exact: np.ndarray | None = None,
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks {(level, kind): payload} of one segment and (levels, 2) errors of stopping at each level.
+    """Chunks {(level, kind): payload} of one of so many segments and (levels, 2) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.
     """
-    coder, level = _SegmentCoder(prelude, layers, positions), layers[0].plan.level_count
+    coder, level = _SegmentCoder(prelude, layers, segment_count, positions), layers[0].plan.level_count
     segment = coder.first(layers[0])
     for before, layer in pairwise(layers):
-        segment = coder.refine(layer, segment, 1 << before.coarser - layer.coarser, level)
+        segment = coder.refine(layer, segment, round(before.ratio / layer.ratio), level)
         level += 1
     largest_bound = layers[-1].settings.largest_bound
     if coder.errors[-1][0] > largest_bound:

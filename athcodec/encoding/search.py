@@ -90,12 +90,11 @@ class Choice:
 
 
 def decide(
-    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, coarser: int = 0
+    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
 ) -> tuple[Choice, CodedPrelude]:
-    """Settings, and hierarchy and rest pose as coded with them. coarser: binary digits by which the step of the first
-    layer is coarser than that of the last."""
+    """Settings, and hierarchy and rest pose as coded with them. ratio: of the first layer's step to that of the last."""
     search = Search.of(source, ath, bound, effort, report, jobs)
-    settings, first_layer = search.found(coarser)
+    settings, first_layer = search.found(ratio)
     prelude = search.prelude(settings)
     return Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)), prelude
 
@@ -126,11 +125,10 @@ def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: Lear
     return analyse(plan, settings, positions, modes, learned_bases(plan, settings, positions))
 
 
-def _coarser(settings: Settings, digits: int) -> Settings:
-    """The same, 2^digits times as coarse; the rest pose half of that."""
-    if digits == 0:
+def _coarser(settings: Settings, ratio: int) -> Settings:
+    """The same, so many times as coarse; the rest pose half of that."""
+    if ratio == 1:
         return settings
-    ratio = 2.0**digits
     return replace(
         settings,
         bound=ratio * settings.bound,
@@ -199,10 +197,10 @@ class Search:
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
 
-    def found(self, coarser: int = 0) -> tuple[Settings, Settings]:
+    def found(self, ratio: int = 1) -> tuple[Settings, Settings]:
         """The best settings, and those of a first layer; for a large plant those of a sample of it."""
         sample = sample_plant(self.source, self.ath, self.effort)
-        found = self.best_of_sample(sample, coarser) if sample else (best := self.best(), self.first_layer(best, coarser))
+        found = self.best_of_sample(sample, ratio) if sample else (best := self.best(), self.first_layer(best, ratio))
         self.report("search", 1.0)
         return found
 
@@ -227,11 +225,11 @@ class Search:
             self._report(WORTH.get(step.__name__, 0))
         return settings
 
-    def first_layer(self, settings: Settings, coarser: int) -> Settings:
-        """Settings of a layer whose step is 2^coarser times that of the given ones."""
-        if coarser == 0:
+    def first_layer(self, settings: Settings, ratio: int) -> Settings:
+        """Settings of a layer whose step is `ratio` times that of the given ones."""
+        if ratio == 1:
             return settings
-        first = replace(_coarser(settings, coarser), learned_bases=(False,) * self.levels)
+        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels)
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
@@ -241,7 +239,7 @@ class Search:
         self._extra_trials += worth
         self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
 
-    def best_of_sample(self, sample: PlantSample, coarser: int) -> tuple[Settings, Settings]:
+    def best_of_sample(self, sample: PlantSample, ratio: int) -> tuple[Settings, Settings]:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
@@ -256,8 +254,8 @@ class Search:
         search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
         settings = self._from_sample(search, found, start)
-        first = search.first_layer(found, coarser)
-        return settings, self._from_sample(search, first, _coarser(start, coarser))
+        first = search.first_layer(found, ratio)
+        return settings, self._from_sample(search, first, _coarser(start, ratio))
 
     def _from_sample(self, search: Search, found: Settings, start: Settings) -> Settings:
         """What was found last for a sample of the plant, for all of it; start: what does not depend on that."""

@@ -29,11 +29,11 @@ class TimeComponents:
         self._rows = np.ascontiguousarray(vectors[:, ::-1].T)
         self._count = count
 
-    def basis(self, coarser: int = 0) -> np.ndarray | None:
-        """The rows that tracks in steps 2^coarser times as large need, (rank, frames) int32 as stored, or None where no
+    def basis(self, ratio: float = 1.0) -> np.ndarray | None:
+        """The rows that tracks in steps `ratio` times as large need, (rank, frames) int32 as stored, or None where no
         basis smaller than the DCT's would do."""
         frames = len(self._rows)
-        allowed = TOLERANCE * 4.0**coarser * self._count * frames
+        allowed = TOLERANCE * ratio**2 * self._count * frames
         rank = frames - int(np.searchsorted(self._left_out, allowed, side="right"))
         if self._count <= 1 or not 1 <= rank <= frames // 2:
             return None
