@@ -53,7 +53,9 @@ class Stream(ctypes.Structure):
 class Motion(ctypes.Structure):
     """ath_motion."""
 
-    _fields_ = [(name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "known", "decoded")]
+    _fields_ = [
+        (name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "known", "decoded")
+    ]
     _fields_ += [("frames", c_int32), ("ratio", c_int32)]
 
 
@@ -61,8 +63,7 @@ class Coarse(ctypes.Structure):
     """ath_coarse."""
 
     _fields_ = [
-        (name, c_void_p)
-        for name in ("placed", "integers", "integer_tracks", "shape_counts", "tracks", "extents")
+        (name, c_void_p) for name in ("placed", "integers", "integer_tracks", "shape_counts", "tracks", "extents")
     ]
 
 

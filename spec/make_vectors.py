@@ -1353,6 +1353,12 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
     return forked(**{"layers": layers, "heads": LAYER_HEADS} | more | {"scripts": scripts | more["scripts"]})
 
 
+SHARED_BASES = {
+    1: stems_head(0.5, 1, 8, 1, basis_stream([[77, -90]], 8)),
+    2: stems_head(0.5, 2, 9, 1, base=1),
+    3: stems_head(0.125, 3, 10, 2, basis_stream([[-300, 512]], 10), base=2),
+    4: stems_head(0.03125, 4, 8, 2, base=3),
+}
 LAYER_HEADS = {level: stems_head(0.5 / 4 ** max(level - 2, 0), level % 5) for level in range(12)}
 MIXED = [
     Stem(-1, 4),
@@ -1436,6 +1442,16 @@ valid(
     layered(heads=learned(1)),
 )
 valid("layers-learned-all", "learned time bases in all layers", layered(heads=learned(1, 2, 3, 4)))
+valid(
+    "layers-learned-shared",
+    "learned time bases that begin with those of earlier layers: some with further rows, one of other bits",
+    layered(heads=LAYER_HEADS | SHARED_BASES),
+)
+valid(
+    "layers-learned-apart",
+    "two roots of learned time bases: predictions of pieces of level 1 alone are of all frequencies",
+    layered(heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 2, 8, 1, basis_stream([[3, 99]], 8))}),
+)
 valid(
     "layers-mixed",
     "rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
@@ -2471,7 +2487,7 @@ def motion(
 
 def stems(*head, **fields) -> Callable[[], bytes]:
     """STEMS of level 1 with another head."""
-    return lambda: stems_head(*head, **fields) + fork().content(rd.STEMS, 1, 0)[8:]
+    return lambda: stems_head(*head, **fields) + fork().content(rd.STEMS, 1, 0)[6:]
 
 
 def basis(rank: int, bits: int, stream: bytes) -> Callable[[], bytes]:
@@ -2479,13 +2495,12 @@ def basis(rank: int, bits: int, stream: bytes) -> Callable[[], bytes]:
 
 
 motion("empty", rd.STEMS, 1, "no bytes", b"")
-motion("short", rd.STEMS, 1, "7 bytes", bytes(7))
+motion("short", rd.STEMS, 1, "5 bytes", bytes(5))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     motion(f"step-{what}", rd.STEMS, 1, f"Step is {value}", stems(value))
 motion("rotation-5", rd.STEMS, 1, "Rotation 5", stems(0.5, 5))
 motion("bits-7", rd.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
 motion("bits-17", rd.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
-motion("rank-without-basis", rd.STEMS, 1, "Basis_Rank 1 though there is no basis", stems(0.5, 0, 0, 1))
 motion("rank-0", rd.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))
 motion(
     "rank-more-than-frames",
@@ -2500,7 +2515,27 @@ motion(
     rd.STEMS,
     1,
     "Basis_Length is more than the chunk holds",
-    lambda: struct.pack("<fBBHI", 0.5, 0, 8, 1, 100) + basis_stream([[1, 2]], 8),
+    lambda: struct.pack("<fBBHBI", 0.5, 0, 8, 1, 255, 100) + basis_stream([[1, 2]], 8),
+)
+for name, level, reason, base in (
+    ("own", 1, "Basis_Level is the level itself", 1),
+    ("later", 1, "Basis_Level is a later level", 2),
+    ("cosines", 2, "Basis_Level is a level in cosines", 1),
+    ("missing", 2, "Basis_Level is a level without STEMS", 0),
+):
+    motion(
+        f"basis-level-{name}", rd.STEMS, level, reason, lambda base=base: stems_head(0.5, 0, 8, 1, base=base), segment=1
+    )
+invalid(
+    "stems-basis-level-rank",
+    "BAD_CHUNK",
+    2,
+    "Basis_Rank 1 though Basis_Level has a basis of two rows",
+    lambda: (
+        forked(heads={1: stems_head(0.5, 0, 8, 2, basis_stream([[1, 2], [3, 4]], 8))})
+        .draft()
+        .change(rd.STEMS, 2, 0, content=stems_head(0.5, 0, 8, 1, base=1))
+    ),
 )
 motion(
     "basis-beyond-1",

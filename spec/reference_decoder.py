@@ -1339,7 +1339,7 @@ class LevelStream:
     step: float
     rotation_step_factor: float
     waves: np.ndarray  # (rank, frames)
-    learned: bool  # else they are cosines
+    root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are cosines
 
 
 @dataclass
@@ -1420,20 +1420,32 @@ def decode_refined_shapes(stream: bytes, plan: Plan, motion: Motion, before: Mot
 
 def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     """Steps and waves of a level; returns its Stems_Stream."""
-    require(len(chunk) >= 8, "STEMS is too short")
-    step, rotation, bits, rank = f32(chunk, 0), chunk[4], chunk[5], u16(chunk, 6)
+    require(len(chunk) >= 6, "STEMS is too short")
+    step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
     require(finite(step) and step > 0.0 and rotation <= 4, "Step or Rotation of STEMS is out of range")
-    require(
-        rank == 0 if bits == 0 else 8 <= bits <= 16 and 1 <= rank <= motion.frames,
-        "Basis_Bits or Basis_Rank is out of range",
-    )
-    waves, body = motion.cosines, chunk[8:]
+    require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
+    waves, root, body = motion.cosines, None, chunk[6:]
     if bits:
-        require(len(body) >= 4 and u32(body, 0) <= len(body) - 4, "Basis_Length is more than the chunk holds")
-        stream, body = body[4 : 4 + u32(body, 0)], body[4 + u32(body, 0) :]
-        waves = np.array(decode_temporal(stream, rank, motion.frames, bits), float) * 2.0 ** -(bits - 1)
-    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves, learned=bits > 0)
+        waves, root, body = read_basis(body, motion, level, bits)
+    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves, root)
     return body
+
+
+def read_basis(body: bytes, motion: Motion, level: int, bits: int) -> tuple[np.ndarray, int, bytes]:
+    """Waves and root of a learned basis, and what follows it."""
+    require(len(body) >= 7, "STEMS is too short")
+    rank, base, length = u16(body, 0), body[2], u32(body, 3)
+    require(1 <= rank <= motion.frames, "Basis_Rank is out of range")
+    require(length <= len(body) - 7, "Basis_Length is more than the chunk holds")
+    known, root = np.empty((0, motion.frames)), level
+    if base != 255:
+        require(base < level and base in motion.streams, "Basis_Level is not a level before with STEMS")
+        require(motion.streams[base].root is not None, "Basis_Level is a level without a learned basis")
+        known, root = motion.streams[base].waves, motion.streams[base].root
+    require(len(known) <= rank, "Basis_Rank is less than that of the basis that it begins with")
+    rows = decode_temporal(body[7 : 7 + length], rank - len(known), motion.frames, bits)
+    own = np.array(rows, float).reshape(len(rows), motion.frames) * 2.0 ** -(bits - 1)
+    return np.concatenate([known, own]), root, body[7 + length :]
 
 
 def decode_stems(stream: bytes, plan: Plan, motion: Motion, level: int) -> None:
@@ -1855,17 +1867,15 @@ class Refinement(Pose):
         reach = [row_extent(rows[m]) for m in modes]
         frequencies = max(row_extent(motion.shift.get(n)), row_extent(motion.rotation.get(n)), *reach)
         streams = [self.stream, before.base_stream(coarse_piece), *(before.mode_stream(coarse_piece, m) for m in modes)]
-        cosines = not any(stream.learned for stream in streams)
-        if frequencies > 0 and not cosines:
+        same = all(stream.root == self.stream.root for stream in streams)
+        if frequencies > 0 and not same:
             frequencies = self.frames
-        self.decode_tracks(piece, frequencies, cosines)
+        self.decode_tracks(piece, frequencies, same)
         known = max((m + 1 for m in modes if reach[m] > 0), default=0)
         if known > 0 and motion.shapes_of(piece):
             known = max(known, before.plan.shape_modes(coarse_piece))
         alike = bool(motion.shapes_of(piece)) == bool(self.motion.shapes_of(piece))
-        self.decode_modes(
-            piece, frequencies, min(known, len(self.plan.basis(piece))), rows if cosines and alike else None
-        )
+        self.decode_modes(piece, frequencies, min(known, len(self.plan.basis(piece))), rows if same and alike else None)
 
     def magnitudes(self, predicted, coarse):
         """In steps of the layer before."""
@@ -1873,7 +1883,7 @@ class Refinement(Pose):
             return magnitudes(coarse)
         return [[clipped((abs(number) + self.ratio // 2) // self.ratio) for number in axis] for axis in predicted]
 
-    def decode_tracks(self, piece: Piece, frequencies: int, cosines: bool) -> None:
+    def decode_tracks(self, piece: Piece, frequencies: int, same: bool) -> None:
         before, n = self.before, piece.number
         coarse_piece = before.plan.pieces[n]
         if piece.has_shift:
@@ -1883,7 +1893,7 @@ class Refinement(Pose):
                 shift_step(piece, self.stream),
                 before.shift_track(coarse_piece),
                 before.motion.shift.get(n),
-                cosines,
+                same,
             )
         step = rotation_step(self.plan, piece, self.stream)
         if step > 0.0:
@@ -1893,11 +1903,11 @@ class Refinement(Pose):
                 step,
                 before.rotation_track(coarse_piece),
                 before.motion.rotation.get(n),
-                cosines,
+                same,
             )
 
-    def decode_track(self, slot: int, frequencies: int, step: float, track: np.ndarray, row, cosines: bool):
-        coarse = (row or zero_row(self.frames)) if cosines else None
+    def decode_track(self, slot: int, frequencies: int, step: float, track: np.ndarray, row, same: bool):
+        coarse = (row or zero_row(self.frames)) if same else None
         predicted = predict_row(self.stream, frequencies, step, self.ratio, track, coarse)
         return decode_refined_row(
             self.coder,
@@ -2361,7 +2371,7 @@ class AthFile:
     def _refinement(self, s: int, frames: int, q: int, before: Pose) -> Refinement:
         """All vertices of a segment in a layer, from those of the layer before."""
         plan, level = self._plan_of(q), self.plan.height + 1 + q
-        motion = Motion(frames, cosine_waves(frames))
+        motion = Motion(frames, cosine_waves(frames), dict(before.motion.streams))
         if self.find(SHAPES, level):
             chunk = self.content(SHAPES, level)
             require(len(chunk) >= 1 and chunk[0] <= MOST_SHIFT, "Shift of SHAPES is out of range")

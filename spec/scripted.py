@@ -389,9 +389,11 @@ def uneven_time(*times: float | tuple) -> bytes:
     return b"\2" + write(rd.decode_times, list(times), len(times))
 
 
-def stems_head(step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0, basis: bytes = b"") -> bytes:
-    head = struct.pack("<fBBH", step, rotation, bits, rank)
-    return head + struct.pack("<I", len(basis)) + basis if bits else head
+def stems_head(
+    step: float = 0.125, rotation: int = 0, bits: int = 0, rank: int = 0, basis: bytes = b"", base: int = 255
+) -> bytes:
+    head = struct.pack("<fBB", step, rotation, bits)
+    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits else head
 
 
 def basis_stream(rows: list[list[int]], bits: int) -> bytes:
@@ -568,6 +570,7 @@ class Plant:
         for q in range(1, self.layers):
             level, before = self.plan.height + 1 + q, pose
             motion = self._no_motion(motion.frames, self.shapes[q])
+            motion.streams |= before.motion.streams
             head = struct.pack("<H", self.ratio) + self._head(level, s, motion)
             pose = rd.Refinement(self.plans[q], motion, before)
             entries.append(

@@ -13,7 +13,7 @@ from plants import STEADY, awkward_plants, bound_for, plant
 import athcodec
 from athcodec import container as ct
 from athcodec.encoding import encoder
-from athcodec.encoding.layers import layer_digits
+from athcodec.encoding.layers import layer_ratios
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)
@@ -56,10 +56,10 @@ def check_levels(clip, path, name: str | None = None) -> None:
 
 
 def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
-    assert layer_digits((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [7, 4, 0]
-    assert layer_digits((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [5, 0]
-    assert layer_digits((1e-2, 9e-3), 1e-4, 1.0) == [7, 0]
-    assert layer_digits((), 1e-4, 1.0) == layer_digits((1e-4, 1e-5), 1e-4, 1.0) == [0]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [128, 16, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [32, 1]
+    assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [128, 1]
+    assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
 
 
 @pytest.mark.parametrize("ladder", ["", "some", "1e-2,", (0.0,), (1e-2, 1.0), ("nan",), (None,), 1e-2])

@@ -64,7 +64,7 @@ typedef int32_t ath_time_method;
 typedef struct {
     double step, rotation_step_factor;
     int32_t bits, rank;
-    int32_t base; /* level of the stream whose time basis this one's begins with; -1: none */
+    int32_t base;  /* level of the stream whose time basis this one's begins with; -1: none */
     int32_t ratio; /* of a refinement: the step of the layer before over this one's */
     ath_bytes basis;
 } ath_stems_head;

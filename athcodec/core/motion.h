@@ -29,8 +29,8 @@ typedef struct ath_motion {
     double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
     const ath_coarse *before;  /* of a refinement; else null */
-    const uint8_t *known;      /* of a refinement, encoder: whether integers of a piece before stand for the same here */
-    ath_coarse *decoded;       /* encoder: filled for the next layer; may be null */
+    const uint8_t *known; /* of a refinement, encoder: whether integers of a piece before stand for the same here */
+    ath_coarse *decoded;  /* encoder: filled for the next layer; may be null */
     int32_t frames;
     int32_t ratio; /* of a refinement: the steps of the layer before over this one's */
 } ath_motion;

@@ -241,9 +241,7 @@ class EncodingJob:
         )
         ath = self.seen.ath(self.thresholds(bound))
         ratio = self._layer_ratios(bound)[0]
-        choice, prelude = decide(
-            self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio
-        )
+        choice, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
         return self._layered(ath, choice, prelude)
 
     def _layer_ratios(self, bound: float) -> list[int]:
@@ -254,14 +252,7 @@ class EncodingJob:
         return _Decided(ath, choice, prelude, layers)
 
     def draft(self, decided: _Decided) -> Draft:
-        return Draft(
-            decided.choice,
-            self.seen,
-            self.segment_count,
-            self.found,
-            self.options,
-            decided.fingerprint,
-        )
+        return Draft(decided.choice, self.seen, self.segment_count, self.found, self.options, decided.fingerprint)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
@@ -408,7 +399,9 @@ class EncodingJob:
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
-            return CodedSegment(index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact))
+            return CodedSegment(
+                index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact)
+            )
 
         at_once = thread_count(self.options.jobs, self.source)
         pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)

@@ -89,7 +89,7 @@ def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list
     """
     ratios: list[int] = []
     for error in ladder:
-        ratio = 1 << max(0, math.ceil(math.log2(min(error * diagonal / bound, MOST_RATIO**2))))
+        ratio = 1 << math.ceil(math.log2(min(max(error * diagonal / bound, 1.0), MOST_RATIO**2)))
         if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
             ratios.append(ratio)
     ratios.append(1)
