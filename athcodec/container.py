@@ -313,8 +313,8 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, and the level
-    of the stream whose basis it begins with."""
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, and the
+    level of the stream whose basis it begins with."""
 
     step: float
     rotation_step_factor: int

@@ -29,10 +29,9 @@ from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_ratios, layers_of
-from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, decide
-from athcodec.encoding.segment import CodedPrelude, Settings, Source, thread_count
+from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of

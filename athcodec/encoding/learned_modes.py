@@ -112,8 +112,8 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
-    """The same modes of the pieces `wanted`, (P,) bool, with so many binary digits less; those of a piece end before the
-    first that vanishes."""
+    """The same modes of the pieces `wanted`, (P,) bool, with so many binary digits less; those of a piece end before
+    the first that vanishes."""
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
     counts, rows = np.zeros_like(modes.counts), []
     for piece in np.flatnonzero(wanted & (modes.counts > 0)):

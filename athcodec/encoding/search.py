@@ -92,7 +92,7 @@ class Choice:
 def decide(
     source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
 ) -> tuple[Choice, CodedPrelude]:
-    """Settings, and hierarchy and rest pose as coded with them. ratio: of the first layer's step to that of the last."""
+    """Settings, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the last one's."""
     search = Search.of(source, ath, bound, effort, report, jobs)
     settings, first_layer = search.found(ratio)
     prelude = search.prelude(settings)
