@@ -47,6 +47,8 @@ class Stream(ctypes.Structure):
         ("temporal", c_void_p),
         ("temporal_rank", c_int32),
         ("root", c_int32),
+        ("only_tips", c_int32),
+        ("reserved", c_int32),
     ]
 
 

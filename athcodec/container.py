@@ -27,6 +27,7 @@ from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 5
 NO_LEVEL = 255
+ONLY_TIPS = 8  # of Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
@@ -313,8 +314,8 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, and the
-    level of the stream whose basis it begins with."""
+    """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, the
+    level of the stream whose basis it begins with, and whether pieces that carry others have no rotations."""
 
     step: float
     rotation_step_factor: int
@@ -322,10 +323,11 @@ class StemsHead:
     rank: int = 0
     basis: bytes = b""
     base: int = NO_LEVEL
+    only_tips: bool = False
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length(), head.bits)
+    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips, head.bits)
     if head.bits:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream

@@ -1453,6 +1453,13 @@ valid(
     layered(heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 2, 8, 1, basis_stream([[3, 99]], 8))}),
 )
 valid(
+    "layers-tips",
+    "rotations of tips alone, in all layers",
+    refinements(
+        MIXED, 36, heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 8 | level % 5) for level in range(12)}
+    ),
+)
+valid(
     "layers-mixed",
     "rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
     refinements(MIXED, 32, frames=9, segments=2),
@@ -2499,6 +2506,8 @@ motion("short", rd.STEMS, 1, "5 bytes", bytes(5))
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     motion(f"step-{what}", rd.STEMS, 1, f"Step is {value}", stems(value))
 motion("rotation-5", rd.STEMS, 1, "Rotation 5", stems(0.5, 5))
+motion("rotation-tips-5", rd.STEMS, 1, "Only_Tips and Rotation 5", stems(0.5, 13))
+motion("rotation-16", rd.STEMS, 1, "bit 4 of Rotation is set", stems(0.5, 17))
 motion("bits-7", rd.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
 motion("bits-17", rd.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
 motion("rank-0", rd.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))

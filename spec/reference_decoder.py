@@ -989,6 +989,7 @@ class Piece:
     level: int  # that completes it
     low_level: int = -1  # that holds its tracks and first modes instead
     low_modes: int = 0
+    carries: bool = False  # whether another piece hangs on it
 
     @property
     def base_level(self) -> int:
@@ -1081,6 +1082,8 @@ class Plan:
                 piece.low_modes = min(branch.count, 3 if branch.flags & SHEET else 2)
             piece_of_vertex += [piece.number] * piece.count
             self.pieces.append(piece)
+            if piece.parent >= 0:
+                self.pieces[piece.parent].carries = True
 
     def has_stems(self, level: int) -> bool:
         return any(level in (piece.level, piece.low_level) for piece in self.pieces)
@@ -1338,6 +1341,7 @@ class LevelStream:
 
     step: float
     rotation_step_factor: float
+    only_tips: bool  # pieces that carry others have no rotations
     waves: np.ndarray  # (rank, frames)
     root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are cosines
 
@@ -1422,12 +1426,12 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     """Steps and waves of a level; returns its Stems_Stream."""
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
-    require(finite(step) and step > 0.0 and rotation <= 4, "Step or Rotation of STEMS is out of range")
+    require(finite(step) and step > 0.0 and rotation & ~8 <= 4, "Step or Rotation of STEMS is out of range")
     require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
     waves, root, body = motion.cosines, None, chunk[6:]
     if bits:
         waves, root, body = read_basis(body, motion, level, bits)
-    motion.streams[level] = LevelStream(step, float((1 << rotation) >> 1), waves, root)
+    motion.streams[level] = LevelStream(step, float((1 << (rotation & 7)) >> 1), rotation & 8 != 0, waves, root)
     return body
 
 
@@ -1629,7 +1633,7 @@ def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
     """0.0: no rotation is coded."""
     d = plan.from_attach(piece).ravel()
     lever2 = in_order(d * d)
-    if not lever2 > 0.0 or not stream.rotation_step_factor > 0.0:
+    if not lever2 > 0.0 or not stream.rotation_step_factor > 0.0 or (stream.only_tips and piece.carries):
         return 0.0
     return stream.rotation_step_factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
 

@@ -12,7 +12,7 @@ import athcodec
 from athcodec import discovery
 from athcodec.cli import verbs
 from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
-from athcodec.encoding.layers import ladder_of
+from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.units import METRES, Length, parse_length, parse_size
 
@@ -282,9 +282,10 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--ladder",
         metavar="ERROR,...",
         type=_argument(ladder_of),
-        default=(),
+        default=ladder_of(DEFAULT_LADDER),
         help="layers of precision to stop at, by their largest errors as fractions of the diagonal, such as 1e-2,1e-3; "
-        "decades: 1e-2, 1e-3 and so on down to the bound (default: none)",
+        "decades: 1e-2, 1e-3 and so on down to the bound; none: one layer, a few percent smaller, for archives "
+        "(default decades)",
     )
     verb.add_argument(
         "--rest",

@@ -45,6 +45,7 @@ from athcodec.cli.printing import (
     say_seam,
 )
 from athcodec.encoding import DEFAULT_REL_ERROR
+from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
 
@@ -123,7 +124,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
         for name, usual in (("attributes", "all"), ("effort", "default"))
         if getattr(args, name) != usual
     }
-    if args.ladder:
+    if args.ladder != ladder_of(DEFAULT_LADDER):
         given["ladder"] = list(args.ladder)
     if given.get("rest") == "auto":
         del given["rest"]

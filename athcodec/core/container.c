@@ -1,7 +1,7 @@
 /* Header, chunk table, error table, heads of chunks: read with every check that FORMAT.md asks for, in its order. */
 #include "container.h"
 
-enum { HEADER_SIZE = 64, CHUNK_SIZE = 16, ERRORS_SIZE = 8, CHECKSUM_AT = 12, MOST_SHIFT = 15 };
+enum { HEADER_SIZE = 64, CHUNK_SIZE = 16, ERRORS_SIZE = 8, CHECKSUM_AT = 12, MOST_SHIFT = 15, ONLY_TIPS = 8 };
 
 static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
 
@@ -414,12 +414,14 @@ int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *hea
 
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
 {
-    if (chunk.size < 6 || chunk.bytes[4] > 4) return ATH_BAD_CHUNK;
+    if (chunk.size < 6) return ATH_BAD_CHUNK;
+    int32_t rotation = chunk.bytes[4] & ~ONLY_TIPS;
     head->step = (double)f32_at(chunk.bytes);
-    head->rotation_step_factor = (double)(1 << chunk.bytes[4] >> 1);
+    head->rotation_step_factor = (double)(1 << rotation >> 1);
+    head->only_tips = rotation != chunk.bytes[4];
     head->bits = chunk.bytes[5];
     *body = rest_of(chunk, 6);
-    if (!is_step(head->step)) return ATH_BAD_CHUNK;
+    if (!is_step(head->step) || rotation > 4) return ATH_BAD_CHUNK;
     if (head->bits == 0) return ATH_OK;
     if (head->bits < 8 || head->bits > 16 || body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);

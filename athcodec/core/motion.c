@@ -378,6 +378,7 @@ double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath
 {
     const double *a = ath_rest_attach(plan, piece);
     double lever2 = 0.0;
+    if (stream->only_tips && piece->last_attached >= 0) return 0.0;
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t k = 0; k < 3; k++) lever2 = lever2 + (x0[k] - a[k]) * (x0[k] - a[k]);
@@ -492,7 +493,7 @@ double ath_node_step(int32_t exponent) { return half_octave(exponent); }
 
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
-    ath_stream stream = {step, 0.0, motion->cosines, motion->frames, 0};
+    ath_stream stream = {step, 0.0, motion->cosines, motion->frames, -1, 0, 0};
     return stream;
 }
 

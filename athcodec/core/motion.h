@@ -10,7 +10,9 @@ typedef struct ath_stream {
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t root; /* level of the first of the streams whose learned bases begin with the same rows; -1: cosines */
+    int32_t root;      /* level of the first of the streams whose learned bases begin with the same rows; -1: cosines */
+    int32_t only_tips; /* 1: of pieces that carry others no rotations are coded */
+    int32_t reserved;
 } ath_stream;
 
 /* The layer before, from which a refinement predicts: what all pieces have become there. */

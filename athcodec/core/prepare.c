@@ -373,6 +373,7 @@ static int open_stems(ath_work *work, int32_t d)
     if (result != ATH_OK) return result;
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
+    stream->only_tips = head.only_tips;
     if (head.bits) result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;

@@ -21,6 +21,7 @@ from athcodec.clip import MotionClip
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
+from athcodec.encoding.layers import DEFAULT_LADDER
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
@@ -41,7 +42,7 @@ def encode(
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
     effort: str = "default",
-    ladder: str | Sequence[float] = "none",
+    ladder: str | Sequence[float] = DEFAULT_LADDER,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Summary:
@@ -79,10 +80,10 @@ def encode(
         "none" drops faces, edges and named arrays.
     effort : {"fast", "default", "best"}
         How long settings are searched.
-    ladder : {"none", "decades"} or sequence of float
+    ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which a decoder can stop, each about that of a layer of precision: one file
-        for several distances, a few percent larger than "none", a single layer. "decades" is 1e-2, 1e-3 and so on, down
-        to the bound.
+        for every distance, a few percent larger than "none", a single layer for archives. "decades" is 1e-2, 1e-3 and
+        so on, down to the bound.
     jobs : int, optional
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.

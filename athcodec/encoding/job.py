@@ -28,7 +28,15 @@ from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
-from athcodec.encoding.layers import Layer, code_segment, ladder_of, layer_chunks, layer_ratios, layers_of
+from athcodec.encoding.layers import (
+    DEFAULT_LADDER,
+    Layer,
+    code_segment,
+    ladder_of,
+    layer_chunks,
+    layer_ratios,
+    layers_of,
+)
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, decide
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
@@ -58,7 +66,7 @@ class EncodingOptions:
 
     @classmethod
     def of(
-        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = "none", **options
+        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = DEFAULT_LADDER, **options
     ) -> EncodingOptions:
         """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
         return cls(DEFAULT_SEGMENT if segment_frames is None else segment_frames, ladder=ladder_of(ladder), **options)
@@ -240,8 +248,16 @@ class EncodingJob:
         )
         ath = self.seen.ath(self.thresholds(bound))
         ratio = self._layer_ratios(bound)[0]
-        choice, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
-        return self._layered(ath, choice, prelude)
+        choices, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
+        layered = [self._layered(ath, choice, prelude) for choice in choices]
+        return layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
+
+    def _bytes_like_the_middle(self, decided: _Decided) -> int:
+        """Of the motion of a file whose segments are all like the one in the middle."""
+        positions = self.source.positions(self.segment_count // 2)
+        chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions)
+        shared = sum(map(len, layer_chunks(decided.layers).values()))
+        return self.segment_count * sum(map(len, chunks.values())) + shared
 
     def _layer_ratios(self, bound: float) -> list[int]:
         return layer_ratios(self.options.ladder, bound, self.seen.diagonal)

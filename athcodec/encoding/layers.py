@@ -35,6 +35,7 @@ from athcodec.encoding.segment import (
 )
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
+DEFAULT_LADDER = "decades"
 CORRECTIONS_SHARE = 0.01  # of the bytes up to a layer, that its corrections may take if it is not the last
 CORRECTED_LIMITS = tuple(2.0 ** (i / 3) for i in range(5, -6, -1))  # over the layer's own, to choose from
 LEAST_RATIO = 4  # of the steps of neighbouring layers
@@ -134,13 +135,12 @@ def _binary_digits(ratio: int) -> int:
 
 def _uniform(plan: Plan, settings: Settings) -> Settings:
     """For a refinement, which has one stream: the settings of the level with the most rows, the finest step of all."""
-    levels = np.bincount(plan.base_level, plan.pieces["low_modes"], plan.level_count)
-    levels += np.bincount(plan.pieces["level"], plan.pieces["rank"] - plan.pieces["low_modes"], plan.level_count)
-    main = int(levels.argmax())
+    main, factors = plan.main_level, settings.rotation_step_factors
+    finest = min(settings.level_steps[level] for level in range(plan.level_count) if plan.has_stems(level))
     return replace(
         settings,
-        level_steps=np.full(plan.level_count, settings.level_steps[levels > 0].min()),
-        rotation_step_factors=(settings.rotation_step_factors[main],) * plan.level_count,
+        level_steps=np.full(plan.level_count, finest),
+        rotation_step_factors=(factors[main],) * plan.level_count,
         learned_bases=(settings.learned_bases[main],) * plan.level_count,
     )
 

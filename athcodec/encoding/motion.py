@@ -140,6 +140,13 @@ class Plan:
         """Per piece the level whose stream holds its tracks and first modes, (P,)."""
         return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
 
+    @property
+    def main_level(self) -> int:
+        """The level whose stream holds the most rows."""
+        pieces, low = self.pieces, self.pieces["low_modes"]
+        rows = np.bincount(self.base_level, low, self.level_count)
+        return int((rows + np.bincount(pieces["level"], pieces["rank"] - low, self.level_count)).argmax())
+
     def has_stems(self, level: int) -> bool:
         """Whether the level has a coefficient stream."""
         return bool(((self.pieces["level"] == level) | (self.pieces["low_level"] == level)).any())
@@ -160,6 +167,7 @@ class LevelStream:
     step: float
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
+    only_tips: bool = False  # pieces that carry others have no rotations
     root: int = -1  # level of the first of the streams whose learned bases begin with the same rows
 
 
@@ -221,7 +229,7 @@ class SegmentMotion:
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
-            c_stream.root = stream.root
+            c_stream.root, c_stream.only_tips = stream.root, stream.only_tips
         self.motion = Motion(
             streams=addressof(self._c_streams),
             cosines=self.cosines.ctypes.data,

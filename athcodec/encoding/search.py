@@ -7,7 +7,7 @@ Bases, rotations, time bases and steps are searched one after the other, on a sa
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -82,7 +82,10 @@ def _moved(source: Source, segment: int) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings of the last layer of precision and, where it is another, of the first; modes learned for the last."""
+    """Settings of a file: those of its only layer of precision, or of the refinements and of the first layer.
+
+    learned_modes: of the last layer.
+    """
 
     settings: Settings
     first_layer: Settings
@@ -91,12 +94,15 @@ class Choice:
 
 def decide(
     source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
-) -> tuple[Choice, CodedPrelude]:
-    """Settings, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the last one's."""
+) -> tuple[list[Choice], CodedPrelude]:
+    """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the
+    last one's, 1 if that is the same layer."""
     search = Search.of(source, ath, bound, effort, report, jobs)
-    settings, first_layer = search.found(ratio)
-    prelude = search.prelude(settings)
-    return Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)), prelude
+    first_layer, candidates = search.found(ratio)
+    prelude = search.prelude(first_layer if ratio == 1 else candidates[0])
+    return [
+        Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)) for settings in candidates
+    ], prelude
 
 
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
@@ -115,6 +121,7 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         loose=loose_branches(source, wildest.positions),
         lags=lags(source, rest_step),
         rotation_step_factors=(0,) * levels,
+        only_tips=False,
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
@@ -197,10 +204,15 @@ class Search:
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
 
-    def found(self, ratio: int = 1) -> tuple[Settings, Settings]:
-        """The best settings, and those of a first layer; for a large plant those of a sample of it."""
+    def found(self, ratio: int = 1) -> tuple[Settings, list[Settings]]:
+        """Settings of a first layer, and those to choose from for refinements; for a large plant those of a sample of
+        it. Where the ratio is 1, the best of the only layer."""
         sample = sample_plant(self.source, self.ath, self.effort)
-        found = self.best_of_sample(sample, ratio) if sample else (best := self.best(), self.first_layer(best, ratio))
+        if sample:
+            found = self.best_of_sample(sample, ratio)
+        else:
+            best = self.best()
+            found = self.first_layer(best, ratio), list(self.refinements(best, ratio))
         self.report("search", 1.0)
         return found
 
@@ -234,12 +246,23 @@ class Search:
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
 
+    def refinements(self, settings: Settings, ratio: int) -> Iterator[Settings]:
+        """Settings that may suit refinements, each of which has one stream: with rotations, of tips alone, and
+        without."""
+        if ratio == 1 or not any(settings.rotation_step_factors):
+            yield settings
+            return
+        factor = settings.rotation_step_factors[self.prelude(settings).plan.main_level]
+        for own, only_tips in {(factor, settings.only_tips): 0, (factor, True): 0, (0, False): 0}:
+            candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
+            yield candidate if self.effort == "fast" else self._with_learned_modes(candidate)
+
     def _report(self, worth: int = 0) -> None:
         """Reports progress after work that counts as `worth` trials in addition to those made."""
         self._extra_trials += worth
         self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
 
-    def best_of_sample(self, sample: PlantSample, ratio: int) -> tuple[Settings, Settings]:
+    def best_of_sample(self, sample: PlantSample, ratio: int) -> tuple[Settings, list[Settings]]:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
@@ -253,9 +276,8 @@ class Search:
         samples = [segment.of_plant(sample) for segment in self.samples]
         search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
         found = search.best()
-        settings = self._from_sample(search, found, start)
-        first = search.first_layer(found, ratio)
-        return settings, self._from_sample(search, first, _coarser(start, ratio))
+        refinements = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
+        return self._from_sample(search, search.first_layer(found, ratio), _coarser(start, ratio)), refinements
 
     def _from_sample(self, search: Search, found: Settings, start: Settings) -> Settings:
         """What was found last for a sample of the plant, for all of it; start: what does not depend on that."""
@@ -268,6 +290,7 @@ class Search:
             level_steps=found.level_steps,
             rest_step=found.rest_step,
             rotation_step_factors=found.rotation_step_factors,
+            only_tips=found.only_tips,
             learned_bases=found.learned_bases,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
@@ -283,6 +306,7 @@ class Search:
             settings.level_steps.tobytes(),
             settings.rest_step,
             settings.rotation_step_factors,
+            settings.only_tips,
             settings.learned_bases,
             settings.sheet.tobytes(),
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
@@ -324,7 +348,7 @@ class Search:
         """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
         if settings.learned_pieces is None and not everywhere:
             return None
-        known = settings.rotation_step_factors, settings.sheet.tobytes()
+        known = settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
         if known not in self._components:
             prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
@@ -422,7 +446,9 @@ class Search:
         candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
         per_level = np.array([levels for _, levels in self._costs(candidates)])
         mixed = replace(settings, rotation_step_factors=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
-        return self._cheapest([settings, mixed, *candidates])
+        best = self._cheapest([settings, mixed, *candidates])
+        tips = [replace(own, only_tips=True) for own in (best, *candidates[1:]) if any(own.rotation_step_factors)]
+        return self._cheapest([best, *tips])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
         return self._cheapest_of(dict(enumerate(candidates)))[1]

@@ -141,6 +141,7 @@ class Settings:
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
+    only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
 
     def step_of(self, level: int) -> float:
@@ -238,7 +239,8 @@ class StreamBasis:
 def _level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
     level_streams = []
     for level in range(levels):
-        stream = LevelStream(settings.step_of(level), float(settings.rotation_step_factors[level]))
+        factor = float(settings.rotation_step_factors[level])
+        stream = LevelStream(settings.step_of(level), factor, only_tips=settings.only_tips)
         if level in bases:
             stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
         level_streams.append(stream)
@@ -337,7 +339,7 @@ def analyse(
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
     """Of the stems of a level, whose time basis is among `bases` where it is learned."""
-    head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level])
+    head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level], only_tips=settings.only_tips)
     if level in bases:
         own = bases[level]
         head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
