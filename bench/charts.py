@@ -57,9 +57,10 @@ def _large(axes, rows: Rows) -> None:
 
 
 def _forest(axes, rows: Rows) -> None:
-    for ((clips, phases), own), style in zip(_grouped(rows, "clips", "phases"), _styles()):
+    rows = [{"ladder": "none"} | row for row in rows]
+    for ((clips, phases, ladder), own), style in zip(_grouped(rows, "clips", "phases", "ladder"), _styles()):
         instances = [row["instances"] for row in own]
-        name = f"{clips} clip{'s' * (clips > 1)}, {phases} phases"
+        name = f"{clips} clip{'s' * (clips > 1)}, {phases} phases, ladder {ladder}"
         axes.loglog(instances, [row["ms"] for row in own], label=name, **style)
         axes.loglog(instances, [row["predicted ms"] for row in own], **style | {"marker": "", "linestyle": ":"})
     _label(axes, "A forest on one thread (dotted: predicted)", "instances", "ms a picture")

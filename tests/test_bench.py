@@ -333,22 +333,21 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path,
     )
     forests, parts, units = tables_of(result)
     assert result["broken"] == []
-    assert [(row["instances"], row["clips"], row["phases"]) for row in forests] == [
-        (1, 1, 2),
-        (900, 1, 2),
-        (900, 1, "own"),
-        (900, 3, 2),
-        (900, 3, "own"),
+    scenes = [(1, 1, 2), (900, 1, 2), (900, 1, "own"), (900, 3, 2), (900, 3, "own")]
+    assert [(row["instances"], row["clips"], row["phases"], row["ladder"]) for row in forests] == [
+        (*scene, ladder) for scene in scenes for ladder in ("none", "decades")
     ]
     assert all(sum(row["levels"]) == row["instances"] for row in forests)
     for row in forests:
         assert row["kB/s"] == pytest.approx(row["predicted kB/s"], rel=0.1) and 0 < row["ms"]
         shown = sum(count > 0 for count in row["levels"])
         assert row["poses"] == 900 if row["phases"] == "own" else row["poses"] <= 2 * shown * row["clips"]
-    one, three = (row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2)
-    assert 2 < three / one < 4
+    own = {(row["clips"], row["ladder"]): row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2}
+    assert 2 < own[3, "none"] / own[1, "none"] < 4
+    assert own[3, "decades"] < own[3, "none"], "layers of precision send far plants less"
     assert all(row["prepare"] > 0 for row in parts), "of five segments one goes and one comes"
-    assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(units) if finer["level"] > row["level"])
+    single = [row for row in units if row["ladder"] == "none"]
+    assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(single) if finer["level"] > row["level"])
 
 
 @pytest.mark.slow
@@ -362,6 +361,8 @@ def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
         "20",
         "--clips",
         "2",
+        "--ladder",
+        "none",
         "--phases",
         "3",
         "--frames",
