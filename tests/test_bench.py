@@ -344,7 +344,6 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path,
         assert row["poses"] == 900 if row["phases"] == "own" else row["poses"] <= 2 * shown * row["clips"]
     own = {(row["clips"], row["ladder"]): row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2}
     assert 2 < own[3, "none"] / own[1, "none"] < 4
-    assert own[3, "decades"] < own[3, "none"], "layers of precision send far plants less"
     assert all(row["prepare"] > 0 for row in parts), "of five segments one goes and one comes"
     single = [row for row in units if row["ladder"] == "none"]
     assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(single) if finer["level"] > row["level"])
