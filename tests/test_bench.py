@@ -308,6 +308,27 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
     assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
 
 
+def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_them(tmp_path, bushy_file):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "ratios.png"
+    _, result = run_bench(tmp_path, "progressive", bushy_file, "--rel-error", "1e-3", "--picture", picture)
+    prefixes, at_errors, _ = tables_of(result)
+    errors = {(row["ladder"], row["level"]): row for row in prefixes}
+    assert {row["error"] for row in at_errors} >= {1e-2, 3e-3, 1e-3}
+    for row in at_errors:
+        for measure in ("max", "RMS"):
+            if (level := row.get(f"level at {measure}")) is None:
+                continue
+            assert errors[row["ladder"], level][measure] <= row["error"]
+            assert row[f"/own at {measure}"] == pytest.approx(
+                row[f"bytes at {measure}"] / row[f"own at {measure}"], rel=1e-3
+            )
+    [whole] = [row for row in at_errors if row["error"] == 1e-3 and row["ladder"] == "none"]
+    assert whole["/own at max"] == pytest.approx(1, abs=0.02)
+    steps = [(row["measure"], row["error"]) for row in result["chart"] if row["step"] and row["ladder"] == "layers"]
+    assert len(steps) >= 4 and picture.stat().st_size > 10_000
+
+
 # ---- beyond one clip and one machine ----
 
 
