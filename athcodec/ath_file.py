@@ -50,6 +50,9 @@ class Level:
     ----------
     level : int
         Its number, 0 for the coarsest.
+    name : str
+        What it is: "depth 1", branches down to an order; "all branches", or "layer 2 of 3" in a file with layers of
+        precision; "lossless".
     nodes : int
         Parts that the plant is made of: exact stems, and subtrees that move as one.
     bytes : int
@@ -61,6 +64,7 @@ class Level:
     """
 
     level: int
+    name: str
     nodes: int
     bytes: int
     max_error: float
@@ -529,6 +533,7 @@ class AthFile:
         return [
             Level(
                 level,
+                self.core.level_name(level),
                 self.nodes_at(level),
                 self._level_end(level),
                 *self.core.level_error(level, segments),
@@ -536,6 +541,27 @@ class AthFile:
             )
             for level in range(self.level_count)
         ]
+
+    def level_within(self, max_error: float, segments: range | None = None) -> int:
+        """The coarsest stored level whose largest error is not above one.
+
+        Parameters
+        ----------
+        max_error : float
+            Scene units.
+        segments : range, optional
+            Of the file; by default all.
+
+        Raises
+        ------
+        LevelUnavailable
+            Where the deepest level's is larger.
+        """
+        segments = segments or range(self.segment_count)
+        largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
+        if not (within := np.flatnonzero(largest <= max_error)).size:
+            raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")
+        return int(within[0])
 
     @cached_property
     def errors(self) -> np.ndarray:

@@ -32,6 +32,7 @@ from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
 FAULT_TEXT = 256
+LEVEL_NAME = 32
 OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
 
@@ -286,6 +287,12 @@ class File:
         largest, rms = c_double(), c_double()
         lib.ath_level_error(self._file, level, segments[0], segments[-1], byref(largest), byref(rms))
         return largest.value, rms.value
+
+    def level_name(self, level: int) -> str:
+        """What a level is, for people."""
+        text = ctypes.create_string_buffer(LEVEL_NAME)
+        lib.ath_level_name(self._file, level, text, len(text))
+        return text.value.decode()
 
     def segment_starts(self, segments: range) -> list[int]:
         """The first frame of each of these segments, and that behind the last of them."""

@@ -262,6 +262,26 @@ class Decoder:
         """
         return self.file.core.level_for(self.clip.segments, distance, fov, height, pixels)
 
+    def level_within(self, max_error: float) -> int:
+        """The level to use where vertices may be off by no more than a length.
+
+        Parameters
+        ----------
+        max_error : float
+            Scene units.
+
+        Returns
+        -------
+        int
+            The coarsest stored level whose largest error in this clip is at most that.
+
+        Raises
+        ------
+        LevelUnavailable
+            Where that of the deepest level is larger.
+        """
+        return self.file.level_within(max_error, self.clip.segments)
+
     # ---- motion ----
 
     def positions(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 
-import numpy as np
-
 from athcodec import container as ct
 from athcodec.ath_file import AthFile
 from athcodec.atomic_files import new_file
@@ -58,7 +56,7 @@ def truncate(
         raise TypeError("truncate: expected one of level, max_error and target_size")
     with open(os.fspath(source), "rb") as opened, AthFile(opened) as file:
         if max_error is not None:
-            last = _first_within(file, max_error)
+            last = file.level_within(max_error)
         elif target_size is not None:
             last = _last_within(file, target_size)
         else:
@@ -93,13 +91,6 @@ def _present(file: AthFile, level: int | None) -> int:
     if level is None or not 0 <= level < file.level_count:
         raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
     return level
-
-
-def _first_within(file: AthFile, max_error: float) -> int:
-    largest = file.errors[:, :, 0].max(axis=1)
-    if not (within := np.flatnonzero(largest <= max_error)).size:
-        raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")
-    return int(within[0])
 
 
 def _last_within(file: AthFile, target_size: int) -> int:

@@ -1,6 +1,7 @@
 """Charts of the verbs' tables, one PNG per result, in the style of plots.py.
 
-Each function of CHARTS draws the rows of a result's first table; a verb without one has no picture.
+Each function of CHARTS draws the rows under "chart" of a result or those of its first table; a verb without one has no
+picture.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def draw(verb: str, name: str, result: dict[str, Any], folder: Path) -> list[Pat
     figure, axes = pyplot(INCHES)()
     axes.grid(True, color="#dddddd", linewidth=0.8)
     axes.set_axisbelow(True)
-    CHARTS[verb](axes, result["tables"][0]["rows"])
+    CHARTS[verb](axes, result.get("chart", result["tables"][0]["rows"]))
     axes.legend(fontsize=8)
     return [save(figure, folder / f"{name}.png")]
 
@@ -57,9 +58,10 @@ def _large(axes, rows: Rows) -> None:
 
 
 def _forest(axes, rows: Rows) -> None:
-    for ((clips, phases), own), style in zip(_grouped(rows, "clips", "phases"), _styles()):
+    rows = [{"ladder": "none"} | row for row in rows]
+    for ((clips, phases, ladder), own), style in zip(_grouped(rows, "clips", "phases", "ladder"), _styles()):
         instances = [row["instances"] for row in own]
-        name = f"{clips} clip{'s' * (clips > 1)}, {phases} phases"
+        name = f"{clips} clip{'s' * (clips > 1)}, {phases} phases, ladder {ladder}"
         axes.loglog(instances, [row["ms"] for row in own], label=name, **style)
         axes.loglog(instances, [row["predicted ms"] for row in own], **style | {"marker": "", "linestyle": ":"})
     _label(axes, "A forest on one thread (dotted: predicted)", "instances", "ms a picture")
@@ -91,7 +93,33 @@ def _remote(axes, rows: Rows) -> None:
     _label(axes, f"A file of {own[0]['file']:,} bytes behind a URL", "bytes", "")
 
 
-CHARTS = {"scale": _scale, "large": _large, "forest": _forest, "batch": _batch, "remote": _remote}
+def _progressive(axes, rows: Rows) -> None:
+    clips = list(dict.fromkeys(row["clip"] for row in rows))
+    for (clip, ladder, measure), own in _grouped(rows, "clip", "ladder", "measure"):
+        line = ("-", "--", ":", "-.")[clips.index(clip) % 4]
+        colour = COLOURS[2 * (ladder == "none") + (measure == "RMS")]
+        what = "single layer" if ladder == "none" else "layers"
+        name = f"{clip}, {what}: {'largest' if measure == 'max' else measure} error"
+        axes.semilogx([row["error"] for row in own], [row["ratio"] for row in own], line, color=colour, label=name)
+        steps = [row for row in own if row["step"]]
+        axes.plot([row["error"] for row in steps], [row["ratio"] for row in steps], "o", color=colour, markersize=4)
+    axes.set_yscale("log", base=2)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.axhline(1, color="black", linewidth=0.8)
+    axes.invert_xaxis()
+    _label(
+        axes, "A prefix that keeps an error, over a file of its own (dots: levels)", "error / diagonal", "prefix / own"
+    )
+
+
+CHARTS = {
+    "progressive": _progressive,
+    "scale": _scale,
+    "large": _large,
+    "forest": _forest,
+    "batch": _batch,
+    "remote": _remote,
+}
 
 
 def _grouped(rows: Rows, *names: str) -> Iterator[tuple[Any, Rows]]:

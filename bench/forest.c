@@ -20,6 +20,7 @@ enum { LEVELS = 32, SLOTS = 3, MOTION = 16, STATIC = 32, SHAPES = 19, UNIT_POSES
 static const double FOV = 1.0471975511965976, SCREEN = 1080.0, PIXELS = 1.0; /* vertical; radians, pixels */
 static const double GOLDEN = 0.6180339887498949;
 static const double HASTE = 1.25; /* preparations go on so much faster than they have to */
+static const double ALIKE = 1.25; /* a deeper level in use whose segments are at most so much larger is shown instead */
 
 /* A clip, at each level in use with the segment that plays, the one before and the one behind it. It has the file to
  * itself and all of its segments; clips that share a file would share `file` and have some each. */
@@ -28,11 +29,15 @@ typedef struct {
     size_t size, memory; /* memory: of the file and what its segments share */
     ath_file *file;
     ath_info info;
-    int32_t frame, segment; /* that play: the later one of those that are blended */
-    int32_t shortest;       /* frames of the shortest segment */
-    long number;            /* of the segment that plays, counted on from loop to loop */
-    double ahead, loop;     /* seconds that the clip is ahead of the clock; of one round */
-    int32_t refined;        /* the deepest level whose layers of precision are built */
+    int32_t frame, segment;                  /* that play: the later one of those that are blended */
+    int32_t shortest;                        /* frames of the shortest segment */
+    long number;                             /* of the segment that plays, counted on from loop to loop */
+    double ahead, loop;                      /* seconds that the clip is ahead of the clock; of one round */
+    int32_t refined;                         /* the deepest level whose layers of precision are built */
+    int32_t nodes[LEVELS], vertices[LEVELS]; /* of a level: matrices, exact vertices */
+    double from[LEVELS];                     /* the distance from which a level will do */
+    int32_t effort[LEVELS];                  /* of a step of preparing it, about */
+    int32_t shown_as[LEVELS];                /* the level that is shown where it will do */
     int used[LEVELS];
     ath_segment *slots[LEVELS][SLOTS];
 } clip;
@@ -59,7 +64,8 @@ typedef struct {
     int32_t *pose_of; /* by clip, level and phase; -1: nobody shows it */
     int32_t *shown;   /* the pose of each instance in this picture */
     int32_t clip_count, instance_count, pose_count, phases;
-    int32_t job_count, first_job, job_room, steps_left, steps_per_picture;
+    int32_t job_count, first_job, job_room, steps_left;
+    int64_t effort_per_picture;
     int begun; /* the first job has been */
     void *work;
     size_t work_bytes;
@@ -103,6 +109,21 @@ static void read_file(const char *path, clip *clip)
     fclose(stream);
 }
 
+/* What is asked for in every picture. */
+static void note_levels(clip *clip)
+{
+    double pixels_per_unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* from a distance of 1 */
+    for (int32_t level = 0; level < clip->info.level_count; level++) {
+        double error;
+        ath_level_error(clip->file, level, 0, clip->info.segment_count - 1, &error, 0);
+        clip->from[level] = error * pixels_per_unit / PIXELS;
+        ath_cut_size(clip->file, level, 0, clip->nodes + level, clip->vertices + level);
+        int32_t refinements = level < clip->info.depth_levels ? 0 : level + 1 - clip->info.depth_levels;
+        clip->effort[level] = (clip->nodes[level] + clip->vertices[level]) * (1 + refinements);
+        clip->shown_as[level] = level;
+    }
+}
+
 /* From the prelude alone. */
 static void open_clip(const char *path, clip *clip)
 {
@@ -123,6 +144,15 @@ static void open_clip(const char *path, clip *clip)
         int32_t frames = ath_segment_start(clip->file, s + 1) - ath_segment_start(clip->file, s);
         if (frames < clip->shortest) clip->shortest = frames;
     }
+    note_levels(clip);
+}
+
+/* What ath_level_for says. */
+static int32_t level_at(const clip *clip, double distance)
+{
+    int32_t level = 0, deepest = clip->info.level_count - 1;
+    while (level < deepest && distance < clip->from[level]) level++;
+    return level;
 }
 
 /* Feeds what a segment lacks for a level, and builds what the level's segments share; how many bytes were lacking. */
@@ -161,20 +191,19 @@ static int stays(const clip *clip) { return clip->info.segment_count <= SLOTS; }
 
 static size_t pose_floats(const clip *clip, int32_t level)
 {
-    int32_t nodes, vertices;
-    ath_cut_size(clip->file, level, 0, &nodes, &vertices);
-    return 12 * (size_t)nodes + 3 * (size_t)vertices;
+    return 12 * (size_t)clip->nodes[level] + 3 * (size_t)clip->vertices[level];
 }
 
 /* Matrices, and exact vertices behind them; whether a frame was held. */
 static int write_pose(const clip *clip, int32_t level, double place, float *out)
 {
     const ath_segment *const *slots = (const ath_segment *const *)clip->slots[level];
-    int32_t nodes;
-    ath_cut_size(clip->file, level, 0, &nodes, 0);
-    int result = ath_matrices(clip->file, slots, SLOTS, place, out, 12 * sizeof(float));
-    int exact = ath_exact(clip->file, slots, SLOTS, place, out + 12 * nodes, 3 * sizeof(float));
-    expect(result != ATH_NOT_PREPARED && exact == result, "a pose was asked for that is not prepared");
+    int32_t nodes = clip->nodes[level];
+    int result = ATH_OK;
+    if (nodes > 0) result = ath_matrices(clip->file, slots, SLOTS, place, out, 12 * sizeof(float));
+    if (clip->vertices[level] > 0)
+        result = ath_exact(clip->file, slots, SLOTS, place, out + 12 * nodes, 3 * sizeof(float));
+    expect(result != ATH_NOT_PREPARED, "a pose was asked for that is not prepared");
     return result == ATH_HELD;
 }
 
@@ -206,6 +235,8 @@ static void print_preparing(clip *clip, int rounds, void *work, size_t work_byte
         for (int32_t level = 0; level < levels; level++)
             values[level * rounds + (round < 0 ? 0 : round)] = prepare_ms(clip, level, work, work_bytes);
     print_medians("", "prepare_ms", values, rounds, levels);
+    for (int32_t level = 0; level < levels; level++) values[level] = (double)ath_segment_size(clip->file, level);
+    print_medians(", ", "segment_bytes", values, 1, levels);
     free(values);
 }
 
@@ -263,7 +294,10 @@ static void units(char **paths, int count, int rounds)
         free(work);
     }
     double start = now_ms();
-    for (int i = 0; i < CHOICES; i++) ath_level_for(clips[i % count].file, 0, 0, 10.0 + i, FOV, SCREEN, PIXELS);
+    for (int i = 0; i < CHOICES; i++) {
+        volatile int32_t level = level_at(clips + i % count, 10.0 + i); /* or a compiler would leave this out */
+        (void)level;
+    }
     put("],\n ", "choice_us", (now_ms() - start) * 1e3 / CHOICES);
     print_poses(clips, count, levels, rounds);
     printf("}\n");
@@ -279,7 +313,26 @@ static int32_t *slot_of_pose(const forest *forest, int32_t clip, int32_t level, 
 static int32_t level_of(const forest *forest, const instance *instance)
 {
     const clip *played = forest->clips + instance->clip;
-    return ath_level_for(played->file, 0, played->info.segment_count - 1, instance->distance, FOV, SCREEN, PIXELS);
+    return played->shown_as[level_at(played, instance->distance)];
+}
+
+/* Nothing is prepared twice that takes about as much memory, and so time, to show: the deeper one will do for both. */
+static void merge_levels(clip *clip)
+{
+    for (int32_t level = clip->info.level_count - 1; level >= 0; level--) {
+        double most = ALIKE * (double)ath_segment_size(clip->file, level);
+        for (int32_t deeper = level + 1; clip->used[level] && deeper < clip->info.level_count; deeper++)
+            if (clip->used[deeper] && (double)ath_segment_size(clip->file, deeper) <= most)
+                clip->shown_as[level] = deeper;
+        if (clip->shown_as[level] != level) clip->used[level] = 0;
+    }
+}
+
+static void choose_levels(forest *forest)
+{
+    for (const instance *each = forest->instances; each < forest->instances + forest->instance_count; each++)
+        forest->clips[each->clip].used[level_of(forest, each)] = 1;
+    for (int32_t c = 0; c < forest->clip_count; c++) merge_levels(forest->clips + c);
 }
 
 static void read_scene(const char *path, forest *forest)
@@ -324,7 +377,6 @@ static void plan_poses(forest *forest)
         if (!is_shown) continue;
         forest->poses[forest->pose_count++] = (pose){clip, level, phase, floats};
         floats += pose_floats(forest->clips + clip, level);
-        forest->clips[clip].used[level] = 1;
     }
     forest->floats = (float *)memory_of(floats * sizeof(float));
     memset(forest->floats, 0, floats * sizeof(float));
@@ -357,8 +409,8 @@ static void add_job(forest *forest, clip *of, int32_t level, int32_t segment, lo
     forest->jobs[(forest->first_job + forest->job_count++) % forest->job_room] = (job){of, level, segment, number};
 }
 
-/* Goes on with the oldest preparation for at most so many steps, and returns those left. */
-static int32_t go_on(forest *forest, int32_t steps)
+/* Goes on with the oldest preparation for at most so much effort, or a step, and returns what is left of it. */
+static int64_t go_on(forest *forest, int64_t effort)
 {
     job *job = forest->jobs + forest->first_job;
     clip *of = job->of;
@@ -369,15 +421,16 @@ static int32_t go_on(forest *forest, int32_t steps)
         forest->steps_left = ath_prepare_steps(of->file, job->segment, job->level);
         forest->begun = 1;
     }
-    int32_t now = steps < forest->steps_left ? steps : forest->steps_left;
+    int64_t each = of->effort[job->level], most = effort / each + (effort % each > 0);
+    int32_t now = most < forest->steps_left ? (int32_t)most : forest->steps_left;
     int result = ath_prepare_step((ath_work *)forest->work, now);
     forest->steps_left -= now;
-    if (result == ATH_MORE) return steps - now;
+    if (result == ATH_MORE) return effort - now * each;
     expect_ok("ath_prepare_step", result);
     forest->begun = 0;
     forest->first_job = (forest->first_job + 1) % forest->job_room;
     forest->job_count--;
-    return steps - now;
+    return effort - now * each;
 }
 
 /* The segments around the one that a clip is at. */
@@ -392,7 +445,7 @@ static void start_clip(forest *forest, clip *clip, double clock)
             long number = stays(clip) ? i : clip->number - 1 + i;
             add_job(forest, clip, level, (int32_t)(number % count), number);
         }
-    while (forest->job_count > 0) go_on(forest, INT32_MAX);
+    while (forest->job_count > 0) go_on(forest, INT64_MAX);
 }
 
 /* When the next segment begins, the one behind it is asked for, and the one before the last can go. */
@@ -408,7 +461,7 @@ static void advance(forest *forest, clip *clip, double clock)
         if (!clip->used[level]) continue;
         while (ath_segment_index(clip->slots[level][clip->number % SLOTS]) != clip->segment) {
             forest->late++;
-            go_on(forest, INT32_MAX);
+            go_on(forest, INT64_MAX);
         }
         add_job(forest, clip, level, (clip->segment + 1) % count, clip->number + 1);
     }
@@ -417,12 +470,12 @@ static void advance(forest *forest, clip *clip, double clock)
 /* So that preparing is spread evenly over the pictures. */
 static void set_pace(forest *forest, double rate)
 {
-    double steps = 0.0;
+    double effort = 0.0;
     for (const clip *clip = forest->clips; clip < forest->clips + forest->clip_count; clip++)
         for (int32_t level = 0; !stays(clip) && level < clip->info.level_count; level++)
             for (int32_t s = 0; clip->used[level] && s < clip->info.segment_count; s++)
-                steps += ath_prepare_steps(clip->file, s, level) / (clip->loop * rate);
-    forest->steps_per_picture = (int32_t)ceil(HASTE * steps);
+                effort += (double)clip->effort[level] * ath_prepare_steps(clip->file, s, level) / (clip->loop * rate);
+    forest->effort_per_picture = (int64_t)ceil(HASTE * effort);
 }
 
 /* ---- playing ---- */
@@ -448,7 +501,8 @@ static parts show(forest *forest, double clock)
     }
     double chosen = now_ms();
     for (int32_t c = 0; c < forest->clip_count; c++) advance(forest, forest->clips + c, clock);
-    for (int32_t steps = forest->steps_per_picture; steps > 0 && forest->job_count > 0;) steps = go_on(forest, steps);
+    for (int64_t effort = forest->effort_per_picture; effort > 0 && forest->job_count > 0;)
+        effort = go_on(forest, effort);
     double prepared = now_ms();
     for (int32_t i = 0; i < forest->pose_count; i++) {
         const pose *pose = forest->poses + i;
@@ -475,6 +529,7 @@ static void play(const char *scene, double seconds, double rate)
 {
     forest forest = {0};
     read_scene(scene, &forest);
+    choose_levels(&forest);
     plan_poses(&forest);
     size_t bytes = plan_slots(&forest);
     int pictures = (int)ceil(seconds * rate);

@@ -2,8 +2,10 @@
 
 The forest. A camera looks into a wedge of 90 degrees, about what a vertical field of view of 60 degrees shows on a
 screen of 16:9. Plants stand evenly in it, one in each square as wide as the plant; the nearest is as far away as that.
-Each shows the level that `ath_level_for` gives for its distance: an error of at most 1 pixel on 1,080 lines. Plant i,
-by distance, plays clip i modulo the clips.
+Each shows the level that `ath_level_for` gives for its distance: an error of at most 1 pixel on 1,080 lines; or a
+deeper one that its clip shows nearby anyway, where prepared segments of both take about the same memory: levels with
+many matrices are as dear to show as exact ones, and nothing is prepared twice. Plant i, by distance, plays clip i
+modulo the clips. The same forest is played from files with one layer of precision and with several (`--ladder`).
 
 The player works like an engine's. Clips loop and are streamed: of each clip and level in use the segment that plays is
 prepared, the one before, and, a few steps a picture, the next one; nothing else is kept, so that memory does not depend
@@ -25,8 +27,10 @@ read once, at the start. The prediction leaves out maps of coarser levels, which
 as one.
 
 The measured forest is played by forest.c, one thread, files in memory, for the length of a clip; milliseconds are
-processor time, bytes are those fed to its decoders. Its clips are variants of one clip: turned, mirrored, with a larger
-or smaller sway and another start; they play forwards and backwards, slowing down before they turn, so that they loop.
+processor time, bytes are those fed to its decoders. Of a file it notes once what is asked for in
+every picture: the distance from which a level will do, its numbers of matrices and of exact vertices. Its clips are
+variants of one clip: turned, mirrored, with a larger or smaller sway and another start; they play forwards and
+backwards, slowing down before they turn, so that they loop.
 """
 
 from __future__ import annotations
@@ -48,6 +52,7 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
+from athcodec.encoding.layers import LADDERS
 from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program
 from bench.tables import table
@@ -57,6 +62,7 @@ FRAMES, RATE, ROUNDS = 480, 60, 3
 FOV, SCREEN, WEDGE = radians(60), 1080, radians(90)
 GOLDEN = 0.6180339887498949
 SLOTS = 3  # segments that forest.c keeps prepared for a clip and level
+ALIKE = 1.25  # it shows a deeper level in use in place of one whose segments are at most so much smaller
 
 NOTE = """
 Each clip: {frames} frames of {vertices:,} vertices, {seconds:g} s in {segments} segments, made of {source}, bound
@@ -90,6 +96,7 @@ class Unit:
     path: Path
     choice_us: float
     prepare_ms: list[float]  # all segments, by level
+    segment_bytes: list[float]  # one, prepared, by level
     pose_us: list[float]  # one, by level
 
     @cached_property
@@ -103,6 +110,17 @@ class Unit:
                 "prelude": decoder.file.prelude_length,
                 "chunks": [(chunk.kind, chunk.level, chunk.length) for chunk in chunks],
             }
+
+    def shown(self, wanted: np.ndarray) -> np.ndarray:
+        """The levels that plants of this clip show, for those that would do."""
+        merged: dict[int, int] = {}
+        for level in sorted(set(wanted.tolist()), reverse=True):
+            alike = [other for other, own in merged.items() if own == other and self._alike(level, other)]
+            merged[level] = max(alike, default=level)
+        return np.array([merged[level] for level in wanted.tolist()], int)
+
+    def _alike(self, level: int, deeper: int) -> bool:
+        return self.segment_bytes[deeper] <= ALIKE * self.segment_bytes[level]
 
     @property
     def seconds(self) -> float:
@@ -138,6 +156,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="phases of the instances of a clip; 0: one each",
     )
+    parser.add_argument(
+        "--ladder",
+        nargs="+",
+        choices=LADDERS,
+        default=["none", "decades"],
+        help="layers of precision of the files, one forest after the other (default: both)",
+    )
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help="of a clip (default %(default)s)")
     parser.add_argument("--rounds", type=int, default=ROUNDS, metavar="N", help="(default %(default)s)")
     add_effort(parser, "fast")
@@ -149,17 +174,25 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         program = compile_program(folder, "forest")
-        files = _make_clips(args, folder)
-        units = {count: _units(program, files[:count], args.rounds) for count in args.clips}
-        side = _side(files[0])
+        made = {ladder: _make_clips(args, folder / ladder, ladder) for ladder in args.ladder}
+        units = {
+            ladder: {count: _units(program, files[:count], args.rounds) for count in args.clips}
+            for ladder, files in made.items()
+        }
+        side = _side(made[args.ladder[0]][0])
         for scene in _scenes(args, units, side):
             played = scene.play(program, folder, args.rounds)
             predicted = scene.predict()
             rows.append(scene.row(predicted, played))
             parts.append(scene.parts(predicted, played))
             broken += scene.differences(played)
-        unit_rows = [row for clips in units.values() for row in _unit_rows(clips)]
-        facts = units[args.clips[0]][0].facts
+        unit_rows = [
+            {"ladder": ladder} | row
+            for ladder, own in units.items()
+            for clips in own.values()
+            for row in _unit_rows(clips)
+        ]
+        facts = units[args.ladder[0]][args.clips[0]][0].facts
     note = NOTE.format(
         **facts, frames=args.frames, source=args.of.stem, bound=args.rel_error, rate=RATE, rounds=args.rounds
     )
@@ -176,8 +209,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 # ---- clips ----
 
 
-def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
+def _make_clips(args: argparse.Namespace, folder: Path, ladder: str) -> list[Path]:
     """Files of as many different clips as the largest forest has."""
+    folder.mkdir()
     files = [folder / f"clip_{number}.ath" for number in range(max(args.clips))]
     with athcodec.read_hdf5(args.of) as clip:
         for number, file in enumerate(files):
@@ -187,6 +221,7 @@ def _make_clips(args: argparse.Namespace, folder: Path) -> list[Path]:
                 rel_error=args.rel_error,
                 effort=args.effort,
                 attributes="none",
+                ladder=ladder,
             )
     return files
 
@@ -227,7 +262,7 @@ def _side(file: Path) -> float:
 def _units(program: Path, files: list[Path], rounds: int) -> list[Unit]:
     measured = _output(program, "units", rounds, *files)
     return [
-        Unit(file, measured["choice_us"], clip["prepare_ms"], measured["pose_us"])
+        Unit(file, measured["choice_us"], clip["prepare_ms"], clip["segment_bytes"], measured["pose_us"])
         for file, clip in zip(files, measured["clips"], strict=True)
     ]
 
@@ -257,6 +292,7 @@ def _unit_rows(units: list[Unit]) -> Iterator[dict[str, Any]]:
 class Scene:
     """Instances of clips, near ones first. phases 0: each instance its own."""
 
+    ladder: str
     units: list[Unit]
     distances: np.ndarray
     phases: int
@@ -277,8 +313,9 @@ class Scene:
         levels = np.zeros(len(self.distances), int)
         for clip, unit in enumerate(self.units):
             with athcodec.open(unit.path) as decoder:
-                for instance in range(clip, len(levels), len(self.units)):
-                    levels[instance] = decoder.level_for(self.distances[instance], FOV, SCREEN)
+                own = slice(clip, None, len(self.units))
+                wanted = [decoder.level_for(distance, FOV, SCREEN) for distance in self.distances[own].tolist()]
+                levels[own] = unit.shown(np.array(wanted, int))
         return levels.tolist()
 
     @cached_property
@@ -341,7 +378,12 @@ class Scene:
         return self._name() | columns | {"late": played["late"], "start ms": played["start_ms"], "start kB": once / 1e3}
 
     def _name(self) -> dict[str, Any]:
-        return {"instances": len(self.distances), "clips": len(self.units), "phases": self.phases or "own"}
+        return {
+            "instances": len(self.distances),
+            "clips": len(self.units),
+            "phases": self.phases or "own",
+            "ladder": self.ladder,
+        }
 
     def differences(self, played: dict[str, Any]) -> list[str]:
         """Where the played forest differs from the predicted one."""
@@ -359,14 +401,15 @@ def _ms(figures: dict[str, float]) -> float:
     return figures["choose_ms"] + figures["prepare_ms"] + figures["pose_ms"]
 
 
-def _scenes(args: argparse.Namespace, units: dict[int, list[Unit]], side: float) -> Iterator[Scene]:
-    """Every number of instances with every number of clips up to it."""
+def _scenes(args: argparse.Namespace, units: dict[str, dict[int, list[Unit]]], side: float) -> Iterator[Scene]:
+    """Every number of instances with every number of clips up to it, of the files of every ladder."""
     for instances in args.instances:
         for clips in args.clips:
             if clips > instances:
                 continue
             for phases in args.phases if instances > clips else args.phases[:1]:
-                yield Scene(units[clips], _distances(instances, side), phases)
+                for ladder, own in units.items():
+                    yield Scene(ladder, own[clips], _distances(instances, side), phases)
 
 
 def _distances(count: int, side: float) -> np.ndarray:

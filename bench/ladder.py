@@ -1,28 +1,39 @@
 """Prefixes of one file, with and without layers of precision, against files of their own of the same error.
 
-Own files are coded without layers, for bounds from 2e-2 down to that of the file. Each row is the prefix that ends with
-a level of one of the two files; its errors are those of the file's table.
+Own files are coded without layers, for bounds from 0.1 down to a little below that of the file. A prefix ends with a
+level of one of the two files; its errors are those of the file's table. Prefixes are compared at their own errors, and
+at errors between them: whoever asks for such a one gets the next level, which is more precise than asked for.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.encoding.layers import LADDERS, ladder_of
+from bench import charts, plots
 from bench.clips import Encoded, add_clips, add_rel_error, encoded
 from bench.curves import Curve
 from bench.progressive import diagonal, single_files
 from bench.tables import table
 
-LOOSEST, OWN_PER_DECADE = 2e-2, 4
+LOOSEST, OWN_PER_DECADE = 0.1, 4
+BELOW = 0.9  # of the bound: the last of them has the errors of whole files too
+JUST_BELOW = 1 - 1e-6
+MEASURES = ("max", "RMS")
 
 NOTE = """
 Max and RMS over the diagonal. Own: bytes of a file of its own with the same largest or RMS error, interpolated
 (log-log); no figure beyond the loosest of them. A prefix has everything up to a level, without attributes.
+"""
+
+ERRORS_NOTE = """
+The shortest prefix whose largest or RMS error is not above this one, over the diagonal, and a file of its own of just
+this error.
 """
 
 
@@ -36,41 +47,90 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ERROR,...",
         help="largest errors of the layers over the diagonal (default: decades)",
     )
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw prefix/own over the error there")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    rows, sizes = [], []
+    rows, at_errors, drawn, sizes = [], [], [], []
     for path in args.clips:
-        own = single_files(path, _bounds(args.rel_error))
+        own = _own_files(path, args.rel_error)
         found = {}
         for name, ladder in (("none", ()), ("layers", args.ladder)):
             with encoded(path, args.rel_error, ladder=ladder) as result:
-                found[name] = result.summary.bytes
-                rows += [{"clip": path.stem, "ladder": name} | row for row in _prefixes(result, own)]
+                found[name], prefixes = result.summary.bytes, list(_prefixes(result, own))
+            about = {"clip": path.stem, "ladder": name}
+            rows += [about | row for row in prefixes]
+            at_errors += [about | row for row in _at_errors(prefixes, own)]
+            drawn += [about | row for row in _ratios(prefixes, own)]
         sizes.append({"clip": path.stem} | found | {"more %": 100 * (found["layers"] / found["none"] - 1)})
-    return {
+    result = {
         "tables": [
             table(f"Prefixes of files of {args.rel_error:g}", rows, NOTE),
+            table("At an error", at_errors, ERRORS_NOTE),
             table("Bytes of the whole files", sizes),
         ],
+        "chart": drawn,
         "broken": [],
     }
+    if args.picture:
+        _draw(result, args.picture)
+    return result
+
+
+def _draw(result: dict[str, Any], picture: Path) -> None:
+    try:
+        charts.draw("progressive", picture.stem, result, picture.parent)
+    except plots.NoPlots as error:
+        raise SystemExit(str(error)) from None
+
+
+def _own_files(path: Path, rel_error: float) -> dict[str, Curve]:
+    """Sizes of files of their own by each measure of their error."""
+    files = single_files(path, _bounds(rel_error))
+    sizes = [row["bytes"] for row in files]
+    return {measure: Curve.of([row[measure.lower()] for row in files], sizes) for measure in MEASURES}
 
 
 def _bounds(rel_error: float) -> list[float]:
     count = 1 + max(1, round(OWN_PER_DECADE * np.log10(LOOSEST / rel_error)))
-    return np.geomspace(LOOSEST, rel_error, count).tolist()
+    return [*np.geomspace(LOOSEST, rel_error, count).tolist(), rel_error * BELOW]
 
 
-def _prefixes(result: Encoded, own: list[dict[str, float]]) -> Iterator[dict[str, Any]]:
-    sizes, scale = [row["bytes"] for row in own], diagonal(result)
-    by_max, by_rms = (Curve.of([row[error] for row in own], sizes) for error in ("max", "rms"))
+def _prefixes(result: Encoded, own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+    scale = diagonal(result)
     for level in result.decoder.levels:
-        at_max, at_rms = level.max_error / scale, level.rms_error / scale
-        row = {"level": level.level, "bytes": level.bytes, "max": at_max, "RMS": at_rms}
-        for name, own_size in (("max", by_max.size_at(at_max)), ("RMS", by_rms.size_at(at_rms))):
-            row |= {
-                f"own at {name}": own_size and round(own_size),
-                f"/own at {name}": own_size and level.bytes / own_size,
-            }
+        row = {"level": level.level, "bytes": level.bytes}
+        row |= {"max": level.max_error / scale, "RMS": level.rms_error / scale}
+        for measure in MEASURES:
+            size = own[measure].size_at(row[measure])
+            row |= {f"own at {measure}": size and round(size), f"/own at {measure}": size and level.bytes / size}
         yield row
+
+
+def _at_errors(prefixes: list[dict[str, Any]], own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+    """At 1e-2, 3e-3, 1e-3 and so on, by both measures."""
+    for error in (digit * 10.0**-decade for decade in range(1, 9) for digit in (1, 0.3)):
+        row: dict[str, Any] = {}
+        for measure in MEASURES:
+            if found := _at(error, measure, prefixes, own[measure]):
+                prefix, size = found
+                row |= {f"level at {measure}": prefix["level"], f"bytes at {measure}": prefix["bytes"]}
+                row |= {f"own at {measure}": round(size), f"/own at {measure}": prefix["bytes"] / size}
+        if row:
+            yield {"error": error} | row
+
+
+def _ratios(prefixes: list[dict[str, Any]], own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+    """The corners of what the picture shows: at the errors of both, and just below those of the prefixes."""
+    for measure, curve in own.items():
+        steps = {prefix[measure] for prefix in prefixes}
+        for error in sorted({*curve.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}):
+            if found := _at(error, measure, prefixes, curve):
+                prefix, size = found
+                yield {"measure": measure, "error": error, "ratio": prefix["bytes"] / size, "step": error in steps}
+
+
+def _at(error: float, measure: str, prefixes: list[dict[str, Any]], own: Curve) -> tuple[dict[str, Any], float] | None:
+    """The shortest prefix of at most this error, and the size of a file of its own of this error."""
+    prefix, size = next((row for row in prefixes if row[measure] <= error), None), own.size_at(error)
+    return (prefix, size) if prefix and size else None

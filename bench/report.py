@@ -21,6 +21,7 @@ TITLES = {
     "decode": "The decoder",
     "sizes": "Sizes and what they are made of",
     "levels": "Levels of detail",
+    "progressive": "Prefixes",
     "speed": "Encoding and decoding in Python",
     "memory": "Memory of encoding",
     "large": "Large clips",

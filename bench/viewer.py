@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 import athcodec
+from athcodec.encoding.layers import LADDERS
 from bench.browser import chromium
-from bench.clips import add_clips, add_rel_error
+from bench.clips import add_clips, add_rel_error, encoded
 from bench.tables import table
 from bench.throttled_server import WEB, ThrottledServer
 
@@ -65,6 +66,15 @@ MODES = """async ([name, mode, levels, frames]) => {
   loader.dispose();
   return found;
 }"""
+COMPARE = """([left, right, seconds]) => {
+  const press = (group, value) => document.querySelector(`#${group} [data-value="${value}"]`).click();
+  athcodecViewer.setPlaying(false);
+  press("compare", "levels");
+  press("colour", "distance");
+  document.getElementById("compare-level").value = left;
+  athcodecViewer.setLevel(String(right));
+  athcodecViewer.seek(seconds);
+}"""
 
 NOTE_START = """
 Seconds from the request of the file until a picture is drawn, until a different one is drawn (motion), and until the
@@ -92,9 +102,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--line", type=float, default=10.0, metavar="MBIT", help="megabits a second (default 10)")
     parser.add_argument("--rounds", type=int, default=5, metavar="N", help="how often a file is opened (default 5)")
     parser.add_argument("--instances", type=int, nargs="+", default=[10, 30, 100, 300, 1000], metavar="N")
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE.png", help="measure nothing: write a picture of the page with two levels"
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    if args.picture:
+        return _picture(args.clips[0], args.rel_error, args.picture)
     starts, tasks, forests, modes, broken = [], [], [], [], []
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         for path in args.clips:
@@ -119,6 +134,21 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ],
         "broken": broken,
     }
+
+
+def _picture(clip: Path, rel_error: float, out: Path) -> dict[str, Any]:
+    """Two levels of a file with layers of precision side by side, coloured by their distance from the deepest one."""
+    with encoded(clip, rel_error, ladder=LADDERS["decades"]) as result, chromium() as browser:
+        data, right = result.summary.path.read_bytes(), result.decoder.deepest - 1
+        with ThrottledServer({clip.with_suffix(".ath").name: data}) as server:
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.goto(server.page(clip.with_suffix(".ath").name))
+            page.wait_for_function(f"() => {COMPLETE}")
+            page.evaluate(COMPARE, [right - 1, right, result.decoder.time[-1] / 2])
+            page.wait_for_function(f"() => athcodecViewer.motion.level === {right}")
+            page.wait_for_timeout(3000)
+            page.screenshot(path=out)
+    return {"tables": [table("picture", [{"clip": clip.stem, "file": out.name}])], "broken": []}
 
 
 def _files(path: Path, folder: Path, rel_error: float) -> dict[str, bytes]:

@@ -308,6 +308,27 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
     assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
 
 
+def test_prefixes_are_compared_with_files_of_their_own_at_levels_and_between_them(tmp_path, bushy_file):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "ratios.png"
+    _, result = run_bench(tmp_path, "progressive", bushy_file, "--rel-error", "1e-3", "--picture", picture)
+    prefixes, at_errors, _ = tables_of(result)
+    errors = {(row["ladder"], row["level"]): row for row in prefixes}
+    assert {row["error"] for row in at_errors} >= {1e-2, 3e-3, 1e-3}
+    for row in at_errors:
+        for measure in ("max", "RMS"):
+            if (level := row.get(f"level at {measure}")) is None:
+                continue
+            assert errors[row["ladder"], level][measure] <= row["error"]
+            assert row[f"/own at {measure}"] == pytest.approx(
+                row[f"bytes at {measure}"] / row[f"own at {measure}"], rel=1e-3
+            )
+    [whole] = [row for row in at_errors if row["error"] == 1e-3 and row["ladder"] == "none"]
+    assert whole["/own at max"] == pytest.approx(1, abs=0.02)
+    steps = [(row["measure"], row["error"]) for row in result["chart"] if row["step"] and row["ladder"] == "layers"]
+    assert len(steps) >= 4 and picture.stat().st_size > 10_000
+
+
 # ---- beyond one clip and one machine ----
 
 
@@ -333,22 +354,20 @@ def test_a_forest_that_is_played_reads_and_shows_what_the_formula_says(tmp_path,
     )
     forests, parts, units = tables_of(result)
     assert result["broken"] == []
-    assert [(row["instances"], row["clips"], row["phases"]) for row in forests] == [
-        (1, 1, 2),
-        (900, 1, 2),
-        (900, 1, "own"),
-        (900, 3, 2),
-        (900, 3, "own"),
+    scenes = [(1, 1, 2), (900, 1, 2), (900, 1, "own"), (900, 3, 2), (900, 3, "own")]
+    assert [(row["instances"], row["clips"], row["phases"], row["ladder"]) for row in forests] == [
+        (*scene, ladder) for scene in scenes for ladder in ("none", "decades")
     ]
     assert all(sum(row["levels"]) == row["instances"] for row in forests)
     for row in forests:
         assert row["kB/s"] == pytest.approx(row["predicted kB/s"], rel=0.1) and 0 < row["ms"]
         shown = sum(count > 0 for count in row["levels"])
         assert row["poses"] == 900 if row["phases"] == "own" else row["poses"] <= 2 * shown * row["clips"]
-    one, three = (row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2)
-    assert 2 < three / one < 4
+    own = {(row["clips"], row["ladder"]): row["kB/s"] for row in forests if row["instances"] > 1 and row["phases"] == 2}
+    assert 2 < own[3, "none"] / own[1, "none"] < 4
     assert all(row["prepare"] > 0 for row in parts), "of five segments one goes and one comes"
-    assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(units) if finer["level"] > row["level"])
+    single = [row for row in units if row["ladder"] == "none"]
+    assert all(finer["bytes"] > row["bytes"] for row, finer in pairwise(single) if finer["level"] > row["level"])
 
 
 @pytest.mark.slow
@@ -362,6 +381,8 @@ def test_clips_of_few_segments_stay_and_read_nothing_more(tmp_path, bushy_file):
         "20",
         "--clips",
         "2",
+        "--ladder",
+        "none",
         "--phases",
         "3",
         "--frames",

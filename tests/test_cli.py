@@ -108,7 +108,7 @@ def test_info_prints_the_papers_table_and_one_row_per_level(encoded, facts, caps
     out = capsys.readouterr().out
     assert "ATH: depth 3, 99 nodes, " in out and "lambda 0" in out
     for level in facts["levels"]:
-        cells = (level["level"], level["nodes"], f"{level['added_bytes']:,}", f"{level['share']:.1%}")
+        cells = (level["level"], level["name"], level["nodes"], f"{level['added_bytes']:,}", f"{level['share']:.1%}")
         assert re.search(r"^ *" + r" +".join(map(re.escape, map(str, cells))), out, re.MULTILINE)
 
 
@@ -152,6 +152,18 @@ def test_a_level_and_a_range_of_frames_are_those_of_the_whole(encoded, tmp_path)
         assert np.array_equal(part.time, decoder.time[20:70])
 
 
+def test_decode_takes_the_coarsest_level_within_a_length(encoded, facts, tmp_path, capsys):
+    error = facts["levels"][2]["max_error"]
+    assert run("decode", encoded, tmp_path / "a.h5", "--max-error", f"{100.1 * error}cm") == 0
+    assert "level 2 (depth 2)" in capsys.readouterr().out
+    with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as part:
+        assert np.array_equal(part.block(0, 120), decoder.positions(level=2))
+    assert run("decode", encoded, tmp_path / "b.h5", "--max-error", "1e-12") == 1
+    with pytest.raises(SystemExit):
+        run("decode", encoded, tmp_path / "b.h5", "--max-error", "1m", "--level", 1)
+    assert not (tmp_path / "b.h5").exists()
+
+
 def test_depth_is_another_word_for_level(encoded, tmp_path):
     for word in ("level", "depth"):
         assert run("truncate", encoded, tmp_path / f"{word}.ath", f"--{word}", 1) == 0
@@ -177,7 +189,7 @@ def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_
     assert err == ""
     rows = [line.split() for line in out.splitlines() if re.match(r"\d ", line)]
     assert [row[0] for row in rows] == ["0", "1", "2", "3"]
-    assert float(rows[-1][6]) <= 1e-4 < float(rows[0][6])
+    assert float(rows[-1][-3]) <= 1e-4 < float(rows[0][-3])
     names = sorted(path.name for path in (tmp_path / "new").iterdir())
     levels = [f"tree_1k_120f_level_{level}.h5" for level in range(4)]
     assert names == ["athcodec_demo.html", "tree_1k_120f.ath", *levels]

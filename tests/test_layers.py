@@ -243,7 +243,36 @@ def test_layers_take_no_more_memory_than_the_limit(tmp_path):
             decoder.positions(level=last)
 
 
+# ---- what levels are called ----
+
+
+def names_of(path) -> list[str]:
+    with athcodec.open(path) as decoder:
+        return [level.name for level in decoder.levels]
+
+
+def test_levels_are_called_by_depth_then_by_layer_in_prefixes_too(layered, bushy_clip, tmp_path):
+    names = names_of(layered)
+    depths = [f"depth {level}" for level in range(len(names) - 4)]
+    assert names == [*depths, *(f"layer {layer} of 4" for layer in range(1, 5))]
+    for last in (1, len(depths), len(depths) + 1):
+        athcodec.truncate(layered, tmp_path / "cut.ath", last)
+        assert names_of(tmp_path / "cut.ath") == names[: last + 1]
+    athcodec.encode(bushy_clip, tmp_path / "single.ath", rel_error=1e-3, lossless=True)
+    assert names_of(tmp_path / "single.ath") == [*depths, "all branches", "lossless"]
+
+
 # ---- which level to keep ----
+
+
+def test_the_coarsest_level_within_a_length_is_found(layered):
+    with athcodec.open(layered) as decoder:
+        for level in decoder.levels:
+            found = decoder.level_within(level.max_error)
+            assert decoder.levels[found].max_error <= level.max_error
+            assert all(before.max_error > level.max_error for before in decoder.levels[:found])
+        with pytest.raises(LevelUnavailable, match="expected at least"):
+            decoder.level_within(1e-9)
 
 
 def test_truncate_keeps_the_first_level_within_an_error(layered, tmp_path):

@@ -593,6 +593,7 @@ def test_only_the_level_that_is_looked_at_is_fetched(opened, gusty_ath):
         )
         settle(page, line)
         assert page.evaluate("athcodecViewer.motion.level") == 1
+        page.wait_for_function("() => document.getElementById('facts').textContent.includes(': depth 1')")
         assert line.sent("tree.ath") < 0.6 * len(data) and decoder.level_count > 2
 
 

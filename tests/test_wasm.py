@@ -168,6 +168,11 @@ class Native:
         name = "ath_positions" if dtype == np.float32 else "ath_positions_float64"
         return self.show(name, (self.info.vertex_count, 3), dtype, segments, frame, c_int(order))
 
+    def level_name(self, level: int) -> str:
+        text = create_string_buffer(32)
+        self.lib.ath_level_name(self.file, level, text, c_size_t(len(text)))
+        return text.value.decode()
+
     def level_error(self, level: int, first: int) -> dict:
         last = self.info.segment_count - 1
         most, rms = c_double(), c_double()
@@ -306,6 +311,7 @@ answer({
     (_, clip) => seconds.map((s) => file.frameAt(s, wrap, clip)))),
   clips: file.clips.map((clip, i) => [clip.name, clip.duration, clip.firstFrame, clip.frameCount, clip.firstSegment,
                                       clip.segmentCount, clip.loop, levels.map((level) => file.seamError(i, level))]),
+  names: levels.map((level) => file.levelName(level)),
   levelFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.levelFor(d, 0.8, 1080, 1)),
 });
 """
@@ -359,6 +365,7 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
             ]
             for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])
         ],
+        "names": [native.level_name(level) for level in range(info.level_count)],
         "levelFor": [
             lib.ath_level_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
             for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)

@@ -339,12 +339,20 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         help="the clip to decode; without it glTF holds all of a file that has several, as animations of their names",
     )
     _stats_argument(verb)
-    verb.add_argument(
+    shown = verb.add_mutually_exclusive_group()
+    shown.add_argument(
         "--level",
         "--depth",
         metavar="LEVEL",
         type=_argument(_whole),
-        help="level of detail, from 0, the whole plant as one piece (default: the deepest complete one)",
+        help="level of detail, from 0, the whole plant as one piece; `athcodec info` lists them "
+        "(default: the deepest complete one)",
+    )
+    shown.add_argument(
+        "--max-error",
+        metavar="LENGTH",
+        type=_argument(_positive_length),
+        help="the coarsest level whose largest error is this or less, in scene units or such as 1mm",
     )
     verb.add_argument(
         "--frames",

@@ -72,12 +72,16 @@ def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """What of a file is decoded: frames of a clip, or all clips."""
-    if args.clip is not None or len(decoder.clips) == 1:
-        return ClipView(decoder, args.level, _frames(args.frames, decoder.frame_count))
+    level, of_one = args.level, args.clip is not None or len(decoder.clips) == 1
+    if args.max_error is not None:
+        length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
+        level = decoder.level_within(length) if of_one else decoder.file.level_within(length)
+    if of_one:
+        return ClipView(decoder, level, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
         names = ", ".join(clip.name for clip in decoder.clips)
         raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
-    return ClipView(decoder, args.level, all_clips=True)
+    return ClipView(decoder, level, all_clips=True)
 
 
 def with_sources(

@@ -26,7 +26,7 @@ from athcodec.metrics import ErrorMeter
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""
 
-LEVEL_COLUMNS = ["level", "nodes", "bytes", "share"]
+LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
@@ -107,15 +107,15 @@ def _level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[l
     """One row per level, ending in its `cells`, between what the file holds before and behind them."""
     levels, total = facts["levels"], facts["bytes"]
 
-    def row(name: str, nodes: str, size: int) -> list[str]:
-        return [name, nodes, f"{size:,}", f"{size / total:.1%}"]
+    def row(level: str, name: str, nodes: str, size: int) -> list[str]:
+        return [level, name, nodes, f"{size:,}", f"{size / total:.1%}"]
 
-    rows = [row("prelude", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
+    rows = [row("prelude", "", "", levels[0]["bytes"] - levels[0]["added_bytes"])]
     for level, more in zip(levels, cells, strict=True):
-        name = f"{level['level']}" if level["available"] else f"{level['level']} (incomplete)"
-        rows.append(row(name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
+        name = level["name"] if level["available"] else f"{level['name']} (incomplete)"
+        rows.append(row(f"{level['level']}", name, f"{level['nodes']:,}", level["added_bytes"]) + list(more))
     behind = total - levels[-1]["bytes"]
-    return [*rows, row("arrays", "", behind)] if behind else rows
+    return [*rows, row("arrays", "", "", behind)] if behind else rows
 
 
 def print_demo(facts: dict[str, Any], meters: Sequence[ErrorMeter]) -> None:

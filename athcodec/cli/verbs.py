@@ -180,7 +180,11 @@ def decode(args: argparse.Namespace) -> int:
             athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
         if decoder.missing:
             say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
-        print(f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, level {motion.level}")
+        level = decoder.levels[motion.level]
+        print(
+            f"{args.output}: {motion.frame_count:,} frames, {motion.vertex_count:,} vertices, "
+            f"level {level.level} ({level.name})"
+        )
     return 0
 
 

@@ -293,6 +293,12 @@ ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t first_
 /* The same as stored: level_count x segment_count pairs of them. */
 ATH_API const float *ath_errors(const ath_file *file);
 
+/* What a level is, for people: "depth 1", the levels of the branch hierarchy; "layer 2 of 3", each of all branches ("all
+ * branches" where there is one layer); "lossless". Writes it with a zero behind it into at most `capacity` bytes, and
+ * returns its length without the zero. ATH_LEVEL_NAME bytes hold any. */
+enum { ATH_LEVEL_NAME = 32 };
+ATH_API size_t ath_level_name(const ath_file *file, int32_t level, char *text, size_t capacity);
+
 /* First frame of a segment (for segment_count: frame_count), and the segment that a frame is in. */
 ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
 ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);

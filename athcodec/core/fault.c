@@ -1,5 +1,5 @@
-/* Why a file was refused: the numbers, and the sentence that is written from them. */
-#include "container.h"
+/* Text for people: why a file was refused, the numbers and the sentence that is written from them; what a level is. */
+#include "file.h"
 
 const char *ath_result_name(int result)
 {
@@ -72,6 +72,13 @@ static void put_character(writer *out, char character)
 static void put(writer *out, const char *text)
 {
     while (*text) put_character(out, *text++);
+}
+
+/* Puts the zero behind the text; its length. */
+static size_t ended(writer *out)
+{
+    if (out->capacity > 0) out->text[out->length < out->capacity ? out->length : out->capacity - 1] = 0;
+    return out->length;
 }
 
 static void put_integer(writer *out, uint64_t value)
@@ -232,6 +239,25 @@ size_t ath_fault_text(const ath_fault_info *fault, char *text, size_t capacity)
     writer out = {text, capacity, 0};
     int known = fault->field > ATH_FIELD_NONE && fault->field < (int32_t)(sizeof sentences / sizeof *sentences);
     put_sentence(&out, fault, known ? sentences[fault->field] : ath_result_name(fault->code));
-    if (capacity > 0) text[out.length < capacity ? out.length : capacity - 1] = 0;
-    return out.length;
+    return ended(&out);
+}
+
+size_t ath_level_name(const ath_file *file, int32_t level, char *text, size_t capacity)
+{
+    writer out = {text, capacity, 0};
+    int32_t layers = (int32_t)file->header.layer_count;
+    if (level <= file->plan.height) {
+        put(&out, "depth ");
+        put_integer(&out, (uint64_t)level);
+    } else if (level >= ath_lossy_levels(file)) {
+        put(&out, "lossless");
+    } else if (layers == 1) {
+        put(&out, "all branches");
+    } else {
+        put(&out, "layer ");
+        put_integer(&out, (uint64_t)ath_layer_of(file, level) + 1);
+        put(&out, " of ");
+        put_integer(&out, (uint64_t)layers);
+    }
+    return ended(&out);
 }

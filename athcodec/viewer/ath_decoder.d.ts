@@ -218,6 +218,8 @@ export class AthFile {
   /** Largest and root-mean-square error of showing a level, measured by the encoder, over the segments `first`
    * to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): { max: number; rms: number };
+  /** What a level is, for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
+  levelName(level: number): string;
   /** How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is
    * off; 0 for clips that are no loops. Known of all fullLevelCount levels, stored or not. */
   seamError(clip: number | string, level: number): number;

@@ -30,7 +30,7 @@ const CHUNK_SIZE = 32;
 const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth"];
 const PART = ["first", "count", "branch", "index"];
 const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
-const FAULT_SIZE = 56, FAULT_TEXT = 256;
+const FAULT_SIZE = 56, FAULT_TEXT = 256, LEVEL_NAME = 32;
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
 const TYPES = {
@@ -450,6 +450,14 @@ export class AthFile {
       return this.#core.copy(Float64Array, at, 2);
     });
     return { max, rms };
+  }
+
+  levelName(level) {
+    this.#level(level);
+    return this.#core.with(LEVEL_NAME, (text) => {
+      this.#c.ath_level_name(this.#at, level, text, LEVEL_NAME);
+      return this.#core.text(text);
+    });
   }
 
   seamError(clip, level) {

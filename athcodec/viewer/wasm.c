@@ -18,3 +18,4 @@ _Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_
                "result codes");
 _Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
 _Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2 && ATH_AS_MARKED == 3, "WRAPS");
+_Static_assert(ATH_LEVEL_NAME == 32, "LEVEL_NAME");

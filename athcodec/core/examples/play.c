@@ -35,6 +35,7 @@ typedef struct {
     int preparing;
     int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
     int32_t level, bound_level; /* that the camera asks for; that `binding` is for */
+    int32_t nodes;              /* of that one: its matrices */
     int32_t *binding;
     float *matrices, *positions;
     double drawn_per_frame; /* frames on the screen for one of the file */
@@ -239,7 +240,7 @@ static void set_pace(player *p, double fps)
 static void bind_vertices(player *p, int32_t level)
 {
     int32_t count;
-    ath_cut_size(p->file, level, &count, NULL, NULL);
+    ath_cut_size(p->file, level, &count, &p->nodes, NULL);
     ath_part *parts = allocate((size_t)count * sizeof *parts);
     ath_cut(p->file, level, parts);
     for (const ath_part *part = parts; part < parts + count; part++)
@@ -257,7 +258,7 @@ static int draw(player *p, double place)
     if (level < 0) return ATH_NOT_PREPARED; /* the rest pose is shown until there is motion */
     if (level != p->bound_level) bind_vertices(p, level);
     size_t matrix = 12 * sizeof(float), vertex = 3 * sizeof(float);
-    if (level == p->info.full_level_count - 1) /* no matrices; without a GPU this is the call for all levels */
+    if (p->nodes == 0) /* without a GPU this is the call for all levels */
         return ath_positions(p->file, segments, count, place, ATH_FILE_ORDER, p->positions, vertex);
     ath_matrices(p->file, segments, count, place, p->matrices, matrix);
     return ath_exact(p->file, segments, count, place, p->positions, vertex);

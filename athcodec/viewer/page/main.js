@@ -8,7 +8,7 @@ import { limbMaterial } from "./limbs.js";
 import { lineMaterial, meshMaterial, Plant } from "./plant.js";
 import { readback } from "./readback.js";
 import { Stage } from "./stage.js";
-import { $, bytesText, Choice, countText, lengthText, paintReady, rateText, rows } from "./ui.js";
+import { $, bytesText, Choice, countText, lengthText, paintReady, rateText, rows, upper } from "./ui.js";
 
 const SPEEDS = ["0.1", "0.25", "0.5", "1", "2", "4"];
 const GOLDEN = Math.PI * (3 - Math.sqrt(5));
@@ -237,14 +237,13 @@ show.set("mesh");
 compare.set("off");
 $("scale").querySelector("i").style.background = heatGradient;
 
-const levelName = (motion, level) => `Level ${level}${motion.refines(level) ? " · refined" : ""}`;
 const within = ({ ath, motion }, level) => lengthText(motion.error(level).max, ath.metadata.unit);
 
 function levelControls() {
   const most = Math.max(...plants.map(({ motion }) => motion.levelCount)) - 1;
   const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
   const deepest = plants.find(({ motion }) => motion.levelCount > most);
-  const titles = values.slice(1).map((value) => `${levelName(deepest.motion, value)}, within ${within(deepest, value)}`);
+  const titles = values.slice(1).map((value) => `${upper(deepest.motion.levelName(value))}, to ${within(deepest, value)}`);
   if (values.length <= 9) level.fill(values, ["Auto", ...values.slice(1)], ["Automatic", ...titles]);
   else level.fill(["auto"], ["Automatic"]);
   for (const id of ["level", "compare-level"]) $(id).max = most;
@@ -269,7 +268,7 @@ $("compare-level").addEventListener("input", () => setLevel(level.value));
 
 function labels() {
   const names = plants.length < 2 ? [] : plants.map(({ ath, motion }) => (compare.value === "file" ? `${ath.fileName}, level ${motion.level}`
-    : `${levelName(motion, Math.max(motion.level, 0))} · ${rateText(motion.bitRate())}`));
+    : `${upper(motion.levelName(Math.max(motion.level, 0)))} · ${rateText(motion.bitRate())}`));
   const text = names.join("|");
   if (labels.text === text) return;
   labels.text = text;
@@ -384,7 +383,7 @@ forestNumbers();
 
 function forestBars() {
   const { counts, culled } = state.forest, most = Math.max(1, ...counts, culled);
-  const all = [...counts.map((count, level) => [`Level ${level}`, count]), ["Unseen", culled]];
+  const { motion } = plants.at(-1), all = [...counts.map((count, level) => [upper(motion.levelName(level)), count]), ["Unseen", culled]];
   if ($("forest-bars").children.length !== all.length)
     $("forest-bars").replaceChildren(...all.map(() => {
       const row = document.createElement("div");
@@ -535,15 +534,15 @@ function tell() {
   rows($("facts"), [
     ["Fetched", `${bytesText(motion.bytesFetched)} of ${bytesText(motion.bytesTotal)}`],
     ["This view", `${rateText(motion.bitRate(shown))}`],
-    ["Level", `${shown} of ${motion.levelCount - 1}${motion.refines(shown) ? " · refined" : ""}`],
+    ["Level", `${shown} of ${motion.levelCount - 1}: ${motion.levelName(shown)}`],
     ["Within", within(main, shown)],
     ...(motion.clip.loop ? [["Loop seam", lengthText(motion.seamError(shown), unit)]] : []),
     ["Decoding", `${motion.milliseconds.toFixed(1)} ms`],
     ["Frames", `${counters.fps.toFixed(0)} per second`],
     ["Vertices", countText(state.forest ? state.forest.vertices : plants.reduce((sum, plant) => sum + plant.vertices, 0))],
   ]);
-  $("level-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${shown} keeps the error below a pixel`
-    : motion.level < motion.target ? `Level ${motion.target} is still on its way` : `No vertex is further off than ${within(main, shown)}`;
+  $("level-hint").textContent = motion.automatic && !state.forest ? `Automatic: ${motion.levelName(shown)} keeps the error below a pixel`
+    : motion.level < motion.target ? `Level ${motion.target}, ${motion.levelName(motion.target)}, is still on its way` : `${upper(motion.levelName(shown))}: no vertex is further off than ${within(main, shown)}`;
   if (motion.automatic) $("level").value = motion.target;
   $("scale-title").textContent = "Distance from the deepest level";
   $("scale-middle").textContent = lengthText(main.heatMost / 4, unit);

@@ -13,6 +13,7 @@ export function rateText(bits) {
   return bits < 1e6 ? `${(bits / 1e3).toFixed(1)} kbit/s` : `${(bits / 1e6).toFixed(2)} Mbit/s`;
 }
 
+export const upper = (text) => text[0].toUpperCase() + text.slice(1);
 export const countText = (number) => String(number).replace(/\B(?=(\d{3})+$)/g, ",");
 
 /** A length of the file, in millimetres and the like where its unit is known. */

@@ -102,9 +102,9 @@ export class ATHMotion extends EventDispatcher {
     return this.info.levelCount;
   }
 
-  /** Whether a level refines all of the plant, rather than showing more of its branches. */
-  refines(level) {
-    return level >= this.info.depthLevels;
+  /** What a level is, for people. */
+  levelName(level) {
+    return this.info.levelNames[level];
   }
 
   /** The last of the events "stopped" and "damaged", null where there was none. */

@@ -88,6 +88,7 @@ export class Session {
 
   #tellOfFile() {
     const file = this.#file, { info } = file, statics = readPrelude(file), clips = this.#clips();
+    const levelNames = Array.from({ length: info.levelCount }, (_, level) => file.levelName(level));
     this.#faces = statics.faces;
     this.#first = this.clip === null ? 0 : clips.findIndex(({ name }) => name === this.clip);
     if (this.#first < 0) {
@@ -96,7 +97,7 @@ export class Session {
     }
     this.#order = file.vertexSource();
     this.post({
-      type: "opened", info: { ...info }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
+      type: "opened", info: { ...info, levelNames }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
       vertexSource: this.#order, branchSource: file.branchSource(), clips, first: this.#first,
       chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
       segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),

@@ -142,8 +142,9 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */
   readonly duration: number;
   readonly levelCount: number;
-  /** Whether a level refines all of the plant, rather than showing more of its branches: those from info.depthLevels on. */
-  refines(level: number): boolean;
+  /** What a level is, for people: "depth 1" shows branches down to an order, "all branches" or "layer 2 of 3" all of them,
+   * the further the layer the more precisely; "lossless". */
+  levelName(level: number): string;
 
   /** Seconds, as asked for; those of the clip's first frame. */
   readonly time: number;
