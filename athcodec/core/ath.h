@@ -382,13 +382,15 @@ ATH_API int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int
  * where they take no more than that.
  *     ath_prepare_onward, in place of ath_prepare_start, of the segment that `from` is. `from` and `kept` stay as they
  * are until the last step, which comes after at most ath_prepare_steps; `from` can be played whatever comes of it.
- * ATH_BAD_ARGUMENT, too, where `level` is no deeper than that of `from`, or `kept` is not of its segment and level.
+ * ATH_BAD_ARGUMENT, too, where ath_goes_on says 0: `level` is no deeper than that of `from`, or `kept` is not of its
+ * segment and level.
  *     ath_onward_ranges: ath_ranges without what only levels up to `from_level` need.
  * ath_keep_size is 0 where nothing is to be kept: at levels that no other goes on from, and at the one before the
  * source's own numbers, which go on from the positions of `from`, and null for `kept`. */
 ATH_API size_t ath_keep_size(const ath_file *file, int32_t level);
 ATH_API int ath_keep(ath_work *work, void *memory, size_t memory_bytes);
 ATH_API size_t ath_kept_size(const void *kept);
+ATH_API int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level);
 ATH_API int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from,
                                const void *kept, int32_t level, void *memory, size_t memory_bytes);
 ATH_API int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,

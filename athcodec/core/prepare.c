@@ -903,16 +903,22 @@ int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t seg
     return result;
 }
 
+static int is_last_lossy(const ath_file *file, int32_t level) { return level == ath_lossy_levels(file) - 1; }
+
+int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level)
+{
+    const kept_head *head = (const kept_head *)kept;
+    if (from->level < 0 || from->level >= level || level >= file->info.level_count) return 0;
+    if (is_last_lossy(file, from->level)) return 1;
+    return head && head->bytes > 0 && head->segment == from->index && head->level == from->level;
+}
+
 int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from, const void *kept,
                        int32_t level, void *memory, size_t memory_bytes)
 {
-    const kept_head *head = (const kept_head *)kept;
-    if (from->level < 0 || from->level >= level) return ATH_BAD_ARGUMENT;
-    if (from->level == ath_lossy_levels(file) - 1)
-        head = 0;
-    else if (!head || head->bytes == 0 || head->segment != from->index || head->level != from->level)
-        return ATH_BAD_ARGUMENT;
-    return start(work, work_bytes, file, from->index, level, memory, memory_bytes, from, head);
+    if (!ath_goes_on(file, from, kept, level)) return ATH_BAD_ARGUMENT;
+    return start(work, work_bytes, file, from->index, level, memory, memory_bytes, from,
+                 is_last_lossy(file, from->level) ? 0 : kept);
 }
 
 void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }
