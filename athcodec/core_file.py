@@ -32,7 +32,7 @@ from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
 MOST_STEPS = 2**31 - 1
-KEPT_SHARE = 4  # of a segment's memory, at most, goes to what a deeper level goes on from; a hundredth is usual
+KEPT_SHARE = 2  # of a segment's memory, at most, goes to what a deeper level goes on from; a hundredth is usual
 FAULT_TEXT = 256
 OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1

@@ -26,60 +26,13 @@ typedef struct {
 ATH_INLINE size_t kept_row_most(int32_t frames) { return KEPT_NUMBER * (1 + 3 * (size_t)frames); }
 
 /* Where the next `size` bytes go; null: nowhere. */
-static void *kept_take(kept_writer *to, size_t size)
-{
-    uint8_t *at = to->at && (size_t)(to->end - to->at) >= size ? to->at : 0;
-    to->at = at ? at + size : 0;
-    return at;
-}
-
-ATH_INLINE uint8_t *put_number(uint8_t *at, uint32_t number)
-{
-    for (; number > 127; number >>= 7) *at++ = (uint8_t)(number | 128);
-    *at++ = (uint8_t)number;
-    return at;
-}
-
-ATH_INLINE const uint8_t *get_number(const uint8_t *at, uint32_t *number)
-{
-    int32_t shift = 0;
-    for (*number = 0; *at > 127; shift += 7) *number |= (uint32_t)(*at++ & 127) << shift;
-    *number |= (uint32_t)*at++ << shift;
-    return at;
-}
-
-static void keep_number(kept_writer *to, int32_t number)
-{
-    uint8_t *at = (uint8_t *)kept_take(to, KEPT_NUMBER);
-    if (at) to->at = put_number(at, (uint32_t)number);
-}
-
+void *ath_kept_take(kept_writer *to, size_t size);
+void ath_keep_number(kept_writer *to, int32_t number);
 /* Three axes of `frames` integers, of which those from `count` on are 0. */
-static void keep_row(kept_writer *to, const int32_t *row, int32_t frames, int32_t count)
-{
-    uint8_t *at = (uint8_t *)kept_take(to, kept_row_most(count));
-    if (!at) return;
-    at = put_number(at, (uint32_t)count);
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = 0; k < count; k++) {
-            int32_t number = row[axis * frames + k];
-            at = put_number(at, (uint32_t)number << 1 ^ (number < 0 ? 0xffffffffu : 0));
-        }
-    to->at = at;
-}
+void ath_keep_row(kept_writer *to, const int32_t *row, int32_t frames, int32_t count);
 
-/* The row is zero on entry. */
-static const uint8_t *kept_row(const uint8_t *at, int32_t *row, int32_t frames, int32_t *count)
-{
-    uint32_t number;
-    at = get_number(at, &number);
-    *count = (int32_t)number;
-    for (int32_t axis = 0; axis < 3; axis++)
-        for (int32_t k = 0; k < *count; k++) {
-            at = get_number(at, &number);
-            row[axis * frames + k] = (int32_t)(number >> 1) ^ -(int32_t)(number & 1);
-        }
-    return at;
-}
+/* What is read, and where the next is. A row is zero on entry. */
+const uint8_t *ath_kept_number(const uint8_t *at, int32_t *number);
+const uint8_t *ath_kept_row(const uint8_t *at, int32_t *row, int32_t frames, int32_t *count);
 
 #endif

@@ -233,9 +233,9 @@ static void keep_streams(ath_work *work)
         kept_stream kept = {stream->step, stream->rotation_step_factor, stream->temporal_rank, stream->root};
         size_t learned = learned_numbers(work, stream);
         if (!has_stream(work->file, d)) continue;
-        void *at = kept_take(&work->keeping, sizeof kept);
+        void *at = ath_kept_take(&work->keeping, sizeof kept);
         if (at) memcpy(at, &kept, sizeof kept);
-        float *waves = (float *)kept_take(&work->keeping, learned * sizeof(float));
+        float *waves = (float *)ath_kept_take(&work->keeping, learned * sizeof(float));
         for (size_t i = 0; waves && i < learned; i++) waves[i] = (float)stream->temporal[i];
     }
 }
@@ -245,13 +245,13 @@ static void keep_piece(ath_work *work, const ath_piece *piece)
     const layer_work *layer = work->layers + work->layer;
     const ath_piece_rows *rows = &layer->rows;
     int32_t T = layer->motion.frames, shapes = rows->shape_count;
-    keep_number(&work->keeping, shapes);
+    ath_keep_number(&work->keeping, shapes);
     for (int32_t s = 0; s < shapes; s++)
-        keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
-    keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
-    keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
+        ath_keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
+    ath_keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
+    ath_keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
     for (int32_t m = 0; m < piece->count; m++)
-        keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
+        ath_keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
 }
 
 /* Pieces follow. */
@@ -284,16 +284,14 @@ static void restore_piece(ath_work *work, const ath_piece *piece)
     layer_work *layer = work->layers + work->first_layer;
     ath_piece_rows *rows = &layer->rows;
     int32_t T = layer->motion.frames, count;
-    uint32_t shapes;
-    work->kept = get_number(work->kept, &shapes);
-    rows->shape_count = (int32_t)shapes;
+    work->kept = ath_kept_number(work->kept, &rows->shape_count);
     for (int32_t s = 0; s < rows->shape_count; s++)
-        work->kept = kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
+        work->kept = ath_kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
     ath_unit_shapes(rows->shape_count, layer->shape_integers, layer->unit_shapes);
-    work->kept = kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
-    work->kept = kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
+    work->kept = ath_kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
+    work->kept = ath_kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
     for (int32_t m = 0; m < piece->count; m++)
-        work->kept = kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
+        work->kept = ath_kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
 }
 
 /* ---- start ---- */

@@ -8,6 +8,7 @@ const WASM = "@WASM@"; // zlib, base64
 const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68;
 const ORDERS = { file: 0, source: 1 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
+const KEPT_SHARE = 2; // of a segment's memory, at most, goes to what a deeper level goes on from
 const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
@@ -128,6 +129,16 @@ class Core {
     }
     const last = this.free[this.free.length - 1];
     if (last.at + last.size === this.end) this.end = this.free.pop().at;
+  }
+
+  // Gives all but the first bytes of a block back; all of it for 0, which is then returned.
+  shrink(at, bytes) {
+    const size = this.sizes.get(at), left = Math.ceil(bytes / 16) * 16;
+    if (left === size) return at;
+    this.sizes.set(at, left);
+    this.sizes.set(at + left, size - left);
+    this.give(at + left);
+    return left > 0 ? at : 0;
   }
 
   // A copy of a typed array, in memory.
@@ -303,7 +314,7 @@ export class AthFile {
   #own = null;            // the Core, until dispose()
   #at = 0;                // the ath_file
   #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
-  #pointers = new Map();  // of segments that are prepared
+  #pointers = new Map();  // of segments that are prepared: {at, kept}
   #preparing = new Map(); // index of a segment: how many preparations of it are under way
   #works = [];            // ath_works that nobody uses
   #scratch = { at: 0, size: 0 };
@@ -520,14 +531,15 @@ export class AthFile {
     }
   }
 
-  ranges(level, first = 0, last = this.info.segmentCount - 1, all = false) {
+  ranges(level, first = 0, last = this.info.segmentCount - 1, all = false, after = -1) {
     const c = this.#c;
     this.#level(level);
     this.#segment(first);
     this.#segment(last);
-    const count = c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, 0, 0);
+    whole(after, -1, level, "after");
+    const count = c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, 0, 0);
     return this.#core.with(count * RANGE_SIZE, (at) => {
-      c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, at, count);
+      c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, at, count);
       return Array.from({ length: count }, (_, i) => this.#core.struct(RANGE, at + i * RANGE_SIZE));
     });
   }
@@ -562,13 +574,13 @@ export class AthFile {
 
   // ---- preparing ----
 
-  preparation(segment, level) {
+  preparation(segment, level, { from = null, keep = false } = {}) {
     const c = this.#c, core = this.#core;
     this.#segment(segment);
     this.#level(level);
     const workSize = c.ath_work_size(this.#at) >>> 0, size = c.ath_segment_size(this.#at, level) >>> 0;
-    const work = this.#works.pop() ?? core.take(workSize);
-    let at = 0;
+    const before = this.#before(from, segment, level), work = this.#works.pop() ?? core.take(workSize);
+    let at = 0, kept = 0;
     const end = () => {
       this.#works.push(work);
       const left = this.#preparing.get(segment) - 1;
@@ -577,9 +589,13 @@ export class AthFile {
     };
     const fail = () => {
       end();
-      if (at) core.give(at);
+      for (const block of [at, kept]) if (block) core.give(block);
     };
     const step = (steps) => {
+      if (before && from.freed) {
+        fail();
+        throw new Error("step: got a segment to go on from that has been freed");
+      }
       const code = this.#c.ath_prepare_step(work, steps);
       if (code === MORE) return null;
       try {
@@ -589,20 +605,32 @@ export class AthFile {
         throw error;
       }
       end();
-      return this.#prepared(segment, level, at);
+      return this.#prepared(segment, level, at, kept && core.shrink(kept, this.#c.ath_kept_size(kept) >>> 0));
     };
     this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
     try {
       this.#refine(level);
       at = core.take(size);
-      const code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      const code = before
+        ? c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size)
+        : c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
       if (code === MISSING) this.#checkWork(code, work);
       this.#check(code, `segment ${segment} at level ${level}`);
+      const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, Math.floor(size / KEPT_SHARE)) : 0;
+      if (room >= 16) c.ath_keep(work, kept = core.take(room), room);
     } catch (error) {
       fail();
       throw error;
     }
     return new Preparation(segment, level, step, fail);
+  }
+
+  // What is in memory of a segment, where this one at a deeper level can go on from it.
+  #before(from, segment, level) {
+    const c = this.#c, at = this.#pointer(from);
+    if (!at || from.index !== segment) return null;
+    const there = this.#pointers.get(from);
+    return c.ath_goes_on(this.#at, at, there.kept, level) ? there : null;
   }
 
   // Builds what the layers of precision up to a level's share, in memory that stays as long as the file.
@@ -617,17 +645,17 @@ export class AthFile {
     this.#check(code, `the layers of level ${level}, ${size} bytes`);
   }
 
-  #prepared(index, level, at) {
+  #prepared(index, level, at, kept) {
     const segment = new Segment(index, level, (freed) => {
       this.#pointers.delete(freed);
-      if (this.#own) this.#own.give(at);
+      for (const block of [at, kept]) if (block) this.#own?.give(block);
     });
-    this.#pointers.set(segment, at);
+    this.#pointers.set(segment, { at, kept });
     return segment;
   }
 
-  prepare(segment, level) {
-    const preparation = this.preparation(segment, level);
+  prepare(segment, level, options) {
+    const preparation = this.preparation(segment, level, options);
     while (!preparation.step(MOST_STEPS));
     return preparation.segment;
   }
@@ -668,7 +696,7 @@ export class AthFile {
   }
 
   #pointer(segment) {
-    const at = segment ? this.#pointers.get(segment) : 0;
+    const at = segment ? this.#pointers.get(segment)?.at : 0;
     if (at !== undefined) return at;
     if (segment instanceof Segment && segment.freed) return 0;
     throw new TypeError("segments: got something else, expected what prepare() of this file returned");
