@@ -558,7 +558,7 @@ def test_a_deeper_level_goes_on_from_the_one_before_without_its_bytes(layered_at
     assert result["same"] == result["ranges"] == [True] * 2
     assert result["anew"] == ["MISSING", True, True, True] * 2
     assert [message.split(",")[0] for message in result["freed"]] == [
-        "step: got a segment to go on from that has been freed",
+        "step: got a freed segment",
         "step: got a preparation that has ended",
     ] * 2
 

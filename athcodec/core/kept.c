@@ -1,4 +1,4 @@
-/* Small integers as bytes: seven bits each, low ones first, the sign below them; kept between two preparations. */
+/* Integers are kept as bytes of seven bits, low ones first, the sign below them. */
 #include "kept.h"
 
 void *ath_kept_take(kept_writer *to, size_t size)
@@ -6,6 +6,19 @@ void *ath_kept_take(kept_writer *to, size_t size)
     uint8_t *at = to->at && (size_t)(to->end - to->at) >= size ? to->at : 0;
     to->at = at ? at + size : 0;
     return at;
+}
+
+void ath_keep_waves(kept_writer *to, const double *waves, size_t count)
+{
+    float *at = (float *)ath_kept_take(to, count * sizeof *at);
+    for (size_t i = 0; at && i < count; i++) at[i] = (float)waves[i];
+}
+
+const uint8_t *ath_kept_waves(const uint8_t *at, double *waves, size_t count)
+{
+    const float *from = (const float *)(const void *)at;
+    for (size_t i = 0; i < count; i++) waves[i] = (double)from[i];
+    return at + count * sizeof *from;
 }
 
 static uint8_t *put(uint8_t *at, int32_t number)

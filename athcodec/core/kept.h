@@ -27,11 +27,13 @@ ATH_INLINE size_t kept_row_most(int32_t frames) { return KEPT_NUMBER * (1 + 3 * 
 
 /* Where the next `size` bytes go; null: nowhere. */
 void *ath_kept_take(kept_writer *to, size_t size);
+void ath_keep_waves(kept_writer *to, const double *waves, size_t count);
 void ath_keep_number(kept_writer *to, int32_t number);
 /* Three axes of `frames` integers, of which those from `count` on are 0. */
 void ath_keep_row(kept_writer *to, const int32_t *row, int32_t frames, int32_t count);
 
 /* What is read, and where the next is. A row is zero on entry. */
+const uint8_t *ath_kept_waves(const uint8_t *at, double *waves, size_t count);
 const uint8_t *ath_kept_number(const uint8_t *at, int32_t *number);
 const uint8_t *ath_kept_row(const uint8_t *at, int32_t *row, int32_t frames, int32_t *count);
 

@@ -193,7 +193,7 @@ static int can_be_kept(const ath_file *file, int32_t level)
 size_t ath_keep_size(const ath_file *file, int32_t level)
 {
     const ath_plan *plan = &file->plan;
-    if (level < 0 || !can_be_kept(file, level)) return 0;
+    if (!can_be_kept(file, level)) return 0;
     uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
     size += ((uint64_t)plan->vertex_count + 2 * pieces) * kept_row_most(file->longest) + pieces * KEPT_NUMBER;
     for (int32_t d = 0; d <= level; d++) {
@@ -228,15 +228,14 @@ static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
 
 static void keep_streams(ath_work *work)
 {
-    for (int32_t d = 0; d <= work->level; d++) {
+    for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
         const ath_stream *stream = work->streams + d;
         kept_stream kept = {stream->step, stream->rotation_step_factor, stream->temporal_rank, stream->root};
         size_t learned = learned_numbers(work, stream);
         if (!has_stream(work->file, d)) continue;
         void *at = ath_kept_take(&work->keeping, sizeof kept);
         if (at) memcpy(at, &kept, sizeof kept);
-        float *waves = (float *)ath_kept_take(&work->keeping, learned * sizeof(float));
-        for (size_t i = 0; waves && i < learned; i++) waves[i] = (float)stream->temporal[i];
+        ath_keep_waves(&work->keeping, stream->temporal, learned);
     }
 }
 
@@ -270,11 +269,7 @@ static void restore_streams(ath_work *work)
         stream->temporal_rank = kept.temporal_rank;
         stream->root = kept.root;
         size_t learned = learned_numbers(work, stream);
-        for (size_t i = 0; i < learned; i++, work->kept += sizeof(float)) {
-            float wave;
-            memcpy(&wave, work->kept, sizeof wave);
-            waves[i] = (double)wave;
-        }
+        work->kept = ath_kept_waves(work->kept, waves, learned);
         if (learned > 0) stream->temporal = waves;
     }
 }

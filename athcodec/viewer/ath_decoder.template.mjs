@@ -5,10 +5,9 @@
 
 const WASM = "@WASM@"; // zlib, base64
 
-const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68;
+const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
-const KEPT_SHARE = 2; // of a segment's memory, at most, goes to what a deeper level goes on from
 const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
@@ -115,7 +114,9 @@ class Core {
     }
   }
 
+  // 0: nothing.
   give(at) {
+    if (!at) return;
     const block = { at, size: this.sizes.get(at) };
     this.sizes.delete(at);
     let i = this.free.findIndex((other) => other.at > at);
@@ -131,14 +132,11 @@ class Core {
     if (last.at + last.size === this.end) this.end = this.free.pop().at;
   }
 
-  // Gives all but the first bytes of a block back; all of it for 0, which is then returned.
-  shrink(at, bytes) {
-    const size = this.sizes.get(at), left = Math.ceil(bytes / 16) * 16;
-    if (left === size) return at;
-    this.sizes.set(at, left);
-    this.sizes.set(at + left, size - left);
-    this.give(at + left);
-    return left > 0 ? at : 0;
+  // The first bytes of a block, moved to one of their size; 0: none.
+  shrunk(at, bytes) {
+    const kept = this.copy(Uint8Array, at, bytes);
+    this.give(at);
+    return bytes > 0 ? this.put(kept) : 0;
   }
 
   // A copy of a typed array, in memory.
@@ -579,8 +577,8 @@ export class AthFile {
     this.#segment(segment);
     this.#level(level);
     const workSize = c.ath_work_size(this.#at) >>> 0, size = c.ath_segment_size(this.#at, level) >>> 0;
-    const before = this.#before(from, segment, level), work = this.#works.pop() ?? core.take(workSize);
-    let at = 0, kept = 0;
+    let before = this.#pointer(from) && from.index === segment ? this.#pointers.get(from) : null, at = 0, kept = 0;
+    const work = this.#works.pop() ?? core.take(workSize);
     const end = () => {
       this.#works.push(work);
       const left = this.#preparing.get(segment) - 1;
@@ -589,12 +587,13 @@ export class AthFile {
     };
     const fail = () => {
       end();
-      for (const block of [at, kept]) if (block) core.give(block);
+      core.give(at);
+      core.give(kept);
     };
     const step = (steps) => {
       if (before && from.freed) {
         fail();
-        throw new Error("step: got a segment to go on from that has been freed");
+        throw new Error("step: got a freed segment");
       }
       const code = this.#c.ath_prepare_step(work, steps);
       if (code === MORE) return null;
@@ -605,32 +604,27 @@ export class AthFile {
         throw error;
       }
       end();
-      return this.#prepared(segment, level, at, kept && core.shrink(kept, this.#c.ath_kept_size(kept) >>> 0));
+      return this.#prepared(segment, level, at, kept && core.shrunk(kept, this.#c.ath_kept_size(kept) >>> 0));
     };
     this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
     try {
       this.#refine(level);
       at = core.take(size);
-      const code = before
-        ? c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size)
-        : c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      let code = BAD_ARGUMENT; // of what cannot be gone on from
+      if (before) code = c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size);
+      if (code === BAD_ARGUMENT) {
+        before = null;
+        code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      }
       if (code === MISSING) this.#checkWork(code, work);
       this.#check(code, `segment ${segment} at level ${level}`);
-      const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, Math.floor(size / KEPT_SHARE)) : 0;
+      const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, size >>> 1) : 0; // a hundredth is usual
       if (room >= 16) c.ath_keep(work, kept = core.take(room), room);
     } catch (error) {
       fail();
       throw error;
     }
     return new Preparation(segment, level, step, fail);
-  }
-
-  // What is in memory of a segment, where this one at a deeper level can go on from it.
-  #before(from, segment, level) {
-    const c = this.#c, at = this.#pointer(from);
-    if (!at || from.index !== segment) return null;
-    const there = this.#pointers.get(from);
-    return c.ath_goes_on(this.#at, at, there.kept, level) ? there : null;
   }
 
   // Builds what the layers of precision up to a level's share, in memory that stays as long as the file.
@@ -648,7 +642,8 @@ export class AthFile {
   #prepared(index, level, at, kept) {
     const segment = new Segment(index, level, (freed) => {
       this.#pointers.delete(freed);
-      for (const block of [at, kept]) if (block) this.#own?.give(block);
+      this.#own?.give(at);
+      this.#own?.give(kept);
     });
     this.#pointers.set(segment, { at, kept });
     return segment;
@@ -669,7 +664,7 @@ export class AthFile {
   // The memory that results pass through, `bytes` at least.
   #passage(bytes) {
     if (bytes > this.#scratch.size) {
-      if (this.#scratch.at) this.#core.give(this.#scratch.at);
+      this.#core.give(this.#scratch.at);
       this.#scratch = { at: 0, size: 0 };
       this.#scratch = { at: this.#core.take(bytes), size: bytes };
     }

@@ -350,8 +350,9 @@ export class Session {
 
   // The deepest that is decoded of a segment short of this level: decoding goes on from there, if it can.
   #before(index, level) {
-    const levels = Array.from({ length: level }, (_, i) => level - 1 - i);
-    return levels.map((shown) => this.#prepared.get(`${index}/${shown}`)).find((segment) => segment) ?? null;
+    let before = null;
+    while (!before && level > 0) before = this.#prepared.get(`${index}/${--level}`);
+    return before;
   }
 
   #damaged(segment, level, error) {
