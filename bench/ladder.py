@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.encoding.layers import LADDERS, ladder_of
-from bench.clips import Encoded, add_clips, add_rel_error, encoded
+from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded
 from bench.curves import Curve
 from bench.progressive import diagonal, single_files
 from bench.tables import table
@@ -29,13 +28,7 @@ Max and RMS over the diagonal. Own: bytes of a file of its own with the same lar
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
-    parser.add_argument(
-        "--ladder",
-        type=ladder_of,
-        default=LADDERS["decades"],
-        metavar="ERROR,...",
-        help="largest errors of the layers over the diagonal (default: decades)",
-    )
+    add_ladder(parser, "decades")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
