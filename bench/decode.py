@@ -99,7 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="motion clips, which are encoded first, or .ath files; by default the sample that ships with athcodec",
     )
     add_rel_error(parser)
-    add_ladder(parser, "none")
+    add_ladder(parser, "decades")
     for name, count, what in (
         ("rounds", ROUNDS, "runs of everything"),
         ("seeks", SEEKS, "random frames"),
