@@ -796,7 +796,9 @@ class AthFile:
         level : int
             One that is stored.
         spare : core_file.Segment, optional
-            A prepared segment that nobody needs any more; its memory is taken where it is large enough.
+            A prepared segment that nobody needs any more. Where it is this one, at a coarser level of all vertices,
+            decoding goes on from there, and its bytes are not read again; else its memory is taken if it is large
+            enough.
 
         Returns
         -------
@@ -814,17 +816,23 @@ class AthFile:
         needed, limit = size + self.core.work_size(), self.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {level}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
-        ready = spare if spare is not None and len(spare.memory) >= size else core_file.Segment(size)
+        before = (
+            spare
+            if spare and needed + len(spare.memory) <= limit and self.core.goes_on(spare, segment, level)
+            else None
+        )
+        ready = spare if spare and not before and len(spare.memory) >= size else core_file.Segment(size)
         with self._lock:
-            self._decode(segment, level, ready)
+            self._decode(segment, level, ready, before)
         return ready
 
-    def _decode(self, segment: int, level: int, ready: core_file.Segment) -> None:
-        with self._fed(self.core.missing(level, segment), f"level {level}, segment {segment}"):
+    def _decode(self, segment: int, level: int, ready: core_file.Segment, before: core_file.Segment | None) -> None:
+        after = self.core.level_of(before) if before else -1
+        with self._fed(self.core.missing(level, segment, after=after), f"level {level}, segment {segment}"):
             needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
             if needed > limit:
                 raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
-            self.core.prepare(self._work, segment, level, ready)
+            self.core.prepare(self._work, segment, level, ready, before)
         self._rests_read = max(self._rests_read, level)
 
     @contextmanager

@@ -31,6 +31,8 @@ from athcodec import container
 from athcodec._native import BRANCH, as_bytes, lib
 
 ALIGNMENT = 16
+MOST_STEPS = 2**31 - 1
+KEPT_SHARE = 2  # of a segment's memory, at most, goes to what a deeper level goes on from; a hundredth is usual
 FAULT_TEXT = 256
 LEVEL_NAME = 32
 OK, HELD, MISSING = 0, 65, 66
@@ -159,14 +161,23 @@ def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
 
 
 class Segment:
-    """One segment prepared at one level, in memory of its own that another preparation may take over."""
+    """One segment prepared at one level, in memory of its own that another preparation may take over, and what a deeper
+    level goes on from."""
 
     def __init__(self, size: int):
-        self.memory = aligned(size)
+        self.memory, self._kept = aligned(size), aligned(0)
 
     @property
     def pointer(self) -> int:
         return self.memory.ctypes.data
+
+    @property
+    def kept_pointer(self) -> int | None:
+        return self._kept.ctypes.data if len(self._kept) else None
+
+    def keep(self, kept: np.ndarray) -> None:
+        self._kept = aligned(len(kept))
+        self._kept[:] = kept
 
 
 class Work:
@@ -174,6 +185,10 @@ class Work:
 
     def __init__(self, size: int):
         self.memory = aligned(size)
+
+    @property
+    def pointer(self) -> int:
+        return self.memory.ctypes.data
 
 
 class File:
@@ -308,12 +323,13 @@ class File:
 
     # ---- bytes ----
 
-    def missing(self, level: int, segment: int, last: int | None = None) -> list[tuple[int, int]]:
-        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last."""
+    def missing(self, level: int, segment: int, last: int | None = None, after: int = -1) -> list[tuple[int, int]]:
+        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last, of the levels
+        behind `after`."""
         last = segment if last is None else last
-        count = lib.ath_ranges(self._file, level, segment, last, 0, None, 0)
+        count = lib.ath_onward_ranges(self._file, after, level, segment, last, 0, None, 0)
         ranges = (Range * count)()
-        lib.ath_ranges(self._file, level, segment, last, 0, ranges, count)
+        lib.ath_onward_ranges(self._file, after, level, segment, last, 0, ranges, count)
         return [(found.offset, found.size) for found in ranges]
 
     def feed(self, data: np.ndarray, offset: int) -> None:
@@ -331,15 +347,36 @@ class File:
     def segment_size(self, level: int) -> int:
         return lib.ath_segment_size(self._file, level)
 
-    def prepare(self, work: Work, segment: int, level: int, into: Segment) -> None:
-        """Decodes a segment at a level."""
+    def goes_on(self, before: Segment, segment: int, level: int) -> bool:
+        """Whether what was prepared is this segment, at a level that this one goes on from."""
+        same = lib.ath_segment_index(before.pointer) == segment
+        return same and bool(lib.ath_goes_on(self._file, before.pointer, before.kept_pointer, level))
+
+    def level_of(self, segment: Segment) -> int:
+        """That it is prepared at; -1: at none."""
+        return lib.ath_segment_level(segment.pointer)
+
+    def prepare(self, work: Work, segment: int, level: int, into: Segment, before: Segment | None = None) -> None:
+        """Decodes a segment at a level, from the beginning or from what goes_on() is true of."""
         self.build()
         self.refine(level)
-        memory, fault = work.memory.ctypes.data, Fault()
-        result = lib.ath_prepare(memory, len(work.memory), self._file, segment, level, into.pointer, len(into.memory))
+        fault, keeping = Fault(), self._room_to_keep(level, into)
+        place, rooms = (work.pointer, len(work.memory), self._file), (into.pointer, len(into.memory))
+        if before is None:
+            result = lib.ath_prepare_start(*place, segment, level, *rooms)
+        else:
+            result = lib.ath_prepare_onward(*place, before.pointer, before.kept_pointer, level, *rooms)
+        if result == OK:
+            self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
+            result = lib.ath_prepare_step(work.pointer, MOST_STEPS)
         if result != OK:
-            lib.ath_work_fault(memory, byref(fault))
+            lib.ath_work_fault(work.pointer, byref(fault))
         self._check(result, fault)
+        into.keep(keeping[: lib.ath_kept_size(keeping.ctypes.data)])
+
+    def _room_to_keep(self, level: int, segment: Segment) -> np.ndarray:
+        most = min(lib.ath_keep_size(self._file, level), len(segment.memory) // KEPT_SHARE)
+        return aligned(max(most, ALIGNMENT))
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fills `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""

@@ -15,6 +15,7 @@ import numpy as np
 
 import athcodec
 from athcodec.encoding import EFFORTS
+from athcodec.encoding.layers import LADDERS, ladder_of
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
 
@@ -49,6 +50,16 @@ def add_rel_error(parser: argparse.ArgumentParser) -> None:
         default=REL_ERROR,
         metavar="FRACTION",
         help="error bound over the bounding box's diagonal (default %(default)s)",
+    )
+
+
+def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--ladder",
+        type=ladder_of,
+        default=LADDERS[default],
+        metavar="ERROR,...",
+        help=f"largest errors of the layers over the diagonal (default: {default})",
     )
 
 

@@ -247,6 +247,102 @@ static void measure_levels(const opened *clip, int rounds, level_run *runs)
     free(xyz);
 }
 
+/* ---- going on ---- */
+
+/* A level of all vertices and one that goes on from it. */
+typedef struct {
+    int32_t from, to;
+    ath_segment *before, *after;
+    uint8_t *kept;
+    size_t room, kept_bytes;                  /* the latter of all segments */
+    double *keeping_ms, *onward_ms, *anew_ms; /* of all segments, one per round */
+} pair_run;
+
+static void ready_pair(const opened *clip, int rounds, pair_run *run)
+{
+    run->before = (ath_segment *)memory_of(ath_segment_size(clip->file, run->from));
+    run->after = (ath_segment *)memory_of(ath_segment_size(clip->file, run->to));
+    run->room = ath_keep_size(clip->file, run->from) + 16;
+    run->kept = (uint8_t *)memory_of(run->room);
+    run->keeping_ms = figures(rounds + 1);
+    run->onward_ms = figures(rounds + 1);
+    run->anew_ms = figures(rounds + 1);
+}
+
+static void finish_pair(pair_run *run)
+{
+    free(run->before);
+    free(run->after);
+    free(run->kept);
+    free(run->keeping_ms);
+    free(run->onward_ms);
+    free(run->anew_ms);
+}
+
+static void prepare_and_keep(const opened *clip, int32_t segment, const pair_run *run)
+{
+    ath_work *work = (ath_work *)clip->work;
+    size_t size = ath_segment_size(clip->file, run->from);
+    expect_ok("ath_prepare_start",
+              ath_prepare_start(work, clip->work_bytes, clip->file, segment, run->from, run->before, size));
+    expect_ok("ath_keep", ath_keep(work, run->kept, run->room));
+    expect_ok("ath_prepare_step", ath_prepare_step(work, INT32_MAX));
+}
+
+static void go_on(const opened *clip, const pair_run *run)
+{
+    ath_work *work = (ath_work *)clip->work;
+    size_t size = ath_segment_size(clip->file, run->to);
+    expect_ok("ath_prepare_onward", ath_prepare_onward(work, clip->work_bytes, clip->file, run->before, run->kept,
+                                                       run->to, run->after, size));
+    expect_ok("ath_prepare_step", ath_prepare_step(work, INT32_MAX));
+}
+
+static void measure_pair(const opened *clip, int round, pair_run *run)
+{
+    run->kept_bytes = 0;
+    run->keeping_ms[round] = run->onward_ms[round] = run->anew_ms[round] = 0.0;
+    for (int32_t s = 0; s < clip->info.segment_count; s++) {
+        double start = now_ms();
+        prepare_and_keep(clip, s, run);
+        double before = now_ms();
+        go_on(clip, run);
+        double after = now_ms();
+        prepare(clip, s, run->to, run->after);
+        run->anew_ms[round] += now_ms() - after;
+        run->onward_ms[round] += after - before;
+        run->keeping_ms[round] += before - start;
+        run->kept_bytes += ath_kept_size(run->kept);
+    }
+}
+
+static void print_pair(const pair_run *run, int rounds)
+{
+    put("\n  {", "from", run->from);
+    put(", ", "to", run->to);
+    put(", ", "keeping_ms", median(run->keeping_ms + 1, rounds));
+    put(", ", "onward_ms", median(run->onward_ms + 1, rounds));
+    put(", ", "anew_ms", median(run->anew_ms + 1, rounds));
+    put(", ", "kept_bytes", (double)run->kept_bytes);
+    printf("}");
+}
+
+static void measure_onward(const opened *clip, int rounds)
+{
+    int32_t first = clip->info.depth_levels - 1, levels = clip->info.level_count;
+    printf(",\n \"onward\": [");
+    for (int32_t from = first; from < levels - 1; from++)
+        for (int32_t to = from + 1; to < levels; to++) {
+            pair_run run = {.from = from, .to = to};
+            ready_pair(clip, rounds, &run);
+            for (int round = 0; round <= rounds; round++) measure_pair(clip, round, &run);
+            if (to > first + 1) printf(",");
+            print_pair(&run, rounds);
+            finish_pair(&run);
+        }
+    printf("]");
+}
+
 /* ---- seeking ---- */
 
 /* The same frames in every run and on every machine. */
@@ -383,6 +479,7 @@ static void all(opened *clip, int rounds, int seeks, int instances)
     put(",\n ", "open_ms", open_ms);
     put(", ", "build_ms", build_ms);
     measure_levels(clip, rounds, runs);
+    measure_onward(clip, rounds);
     measure_seeks(clip, seeks);
     measure_instances(clip, rounds, instances, runs);
     printf("}\n");

@@ -13,7 +13,7 @@ import re
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import product
@@ -27,7 +27,7 @@ import numpy as np
 import athcodec
 from athcodec._native import crc32c
 from athcodec.metrics import ErrorMeter
-from bench.clips import add_rel_error
+from bench.clips import add_ladder, add_rel_error
 from bench.codecs.coder import CORE, compile_c
 from bench.codecs.program import arrays_of, from_arrays
 from bench.tables import table
@@ -38,7 +38,7 @@ except ImportError:
     pysz = None
 
 ROUNDS, SEEKS, INSTANCES = 9, 1000, 1000
-TABLES = ("target", "whole", "levels", "memory", "instances")
+TABLES = ("target", "whole", "levels", "onward", "memory", "instances")
 GZIP_CHUNK = 1 << 20
 SZ3_LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T", "T,3N", "3N,T")
 SZ3_ALGORITHMS = ("LORENZO_REG", "INTERP_LORENZO", "INTERP")
@@ -70,6 +70,12 @@ microseconds for one picture between two frames, from prepared segments; playing
 preparation. CRC-32C: of all frames, float32, source order. Bytes with the prelude.
 """
 
+ONWARD_NOTE = """
+From each level of all vertices to each that refines it, all segments, in ms. Keep: preparing the first, with what is
+kept of it; onward: the second, from that; anew: the second, from the first layer; the three in turn, segment by
+segment. Kept: bytes, of all segments; share: of the memory of the prepared segments of the first level.
+"""
+
 MEMORY_NOTE = """
 Bytes. File: all of it in memory; opened: ath_open; bases: ath_build; work: one preparation; segments: prepared
 ones. Nothing else is allocated. Over positions: their sum over the float32 positions of the longest
@@ -93,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="motion clips, which are encoded first, or .ath files; by default the sample that ships with athcodec",
     )
     add_rel_error(parser)
+    add_ladder(parser, "decades")
     for name, count, what in (
         ("rounds", ROUNDS, "runs of everything"),
         ("seeks", SEEKS, "random frames"),
@@ -108,13 +115,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         folder = Path(name)
         program = compile_program(folder)
         for path in args.clips:
-            case = Case(path, folder, args.rel_error, program)
+            case = Case(path, folder, args.rel_error, program, args.ladder)
             whole = _whole(case, folder, args.rounds)
             figures = case.program("all", args.rounds, args.seeks, args.instances)
             rows = {
                 "target": _target_rows(figures, whole),
                 "whole": whole,
                 "levels": level_rows(figures),
+                "onward": onward_rows(figures),
                 "memory": memory_rows(figures),
                 "instances": _instance_rows(figures),
             }
@@ -128,6 +136,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             table(f"Decoding, bound {args.rel_error:g}, beside the targets", tables["target"], TARGET_NOTE),
             table("Whole decoding, medians in ms", tables["whole"], whole_note),
             table("Levels, medians", tables["levels"], LEVELS_NOTE),
+            table("Going on to a deeper level, medians", tables["onward"], ONWARD_NOTE),
             table("Memory", tables["memory"], MEMORY_NOTE),
             table("Instances", tables["instances"], INSTANCES_NOTE),
         ],
@@ -141,12 +150,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 class Case:
     """A clip's float32 positions and its .ath file, with the program that times the decoder on it."""
 
-    def __init__(self, path: Path, folder: Path, rel_error: float, program: Path) -> None:
+    def __init__(self, path: Path, folder: Path, rel_error: float, program: Path, ladder: Sequence[float] = ()) -> None:
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
             with athcodec.read_hdf5(path) as clip:
-                athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none")
+                athcodec.encode(clip, self.file, rel_error=rel_error, attributes="none", ladder=ladder)
                 self.positions = np.asarray(clip.block(0, clip.frame_count), np.float32)
         with athcodec.open(self.file, strict=True) as decoder:
             self.bound, self.rest = decoder.max_error_bound, np.asarray(decoder.rest, np.float32)
@@ -352,6 +361,25 @@ def level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
                 "playing vertices": share + vertices,
                 "playing matrices": share + matrices,
                 "CRC-32C": f"{level['crc']:08x}",
+            }
+        )
+    return rows
+
+
+def onward_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    rows = []
+    for pair in figures["onward"]:
+        segments = figures["segments"] * figures["levels"][pair["from"]]["segment_bytes"]
+        rows.append(
+            {
+                "from": pair["from"],
+                "to": pair["to"],
+                "keep": pair["keeping_ms"],
+                "onward": pair["onward_ms"],
+                "anew": pair["anew_ms"],
+                "onward/anew": pair["onward_ms"] / pair["anew_ms"],
+                "kept": pair["kept_bytes"],
+                "share": pair["kept_bytes"] / segments,
             }
         )
     return rows

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.encoding.layers import LADDERS, ladder_of
 from bench import charts, plots
-from bench.clips import Encoded, add_clips, add_rel_error, encoded
+from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded
 from bench.curves import Curve
 from bench.progressive import diagonal, single_files
 from bench.tables import table
@@ -40,13 +39,7 @@ this error.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
-    parser.add_argument(
-        "--ladder",
-        type=ladder_of,
-        default=LADDERS["decades"],
-        metavar="ERROR,...",
-        help="largest errors of the layers over the diagonal (default: decades)",
-    )
+    add_ladder(parser, "decades")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw prefix/own over the error there")
 
 

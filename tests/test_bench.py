@@ -112,7 +112,7 @@ def test_the_picture_has_a_panel_for_every_level(tmp_path):
 def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_less(tmp_path, sample_ath):
     quick = ("--rounds", "1", "--seeks", "2", "--instances", "3")
     text, result = run_bench(tmp_path, "decode", str(sample_ath), *quick)
-    targets, whole, levels, memory, instances = tables_of(result)
+    _, whole, levels, _, memory, instances = tables_of(result)
     with athcodec.open(sample_ath) as decoder:
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32))
         assert [row["level"] for row in levels] == [level.level for level in decoder.levels]
@@ -125,6 +125,17 @@ def test_the_timed_decoder_decodes_what_athcodec_decodes_and_coarse_levels_cost_
     assert cells_of(text, "Decoding")["target"] == "<= 100"
     assert {"athcodec", "HDF5 gzip 4"} <= {row["reader"] for row in whole}
     assert all(row["error/bound"] <= 1 for row in whole if "ms" in row)
+
+
+def test_the_timed_decoder_goes_on_from_each_level_of_all_vertices_to_each_deeper_one(tmp_path, layered_ath):
+    quick = ("--rounds", "1", "--seeks", "1", "--instances", "1")
+    text, result = run_bench(tmp_path, "decode", str(layered_ath), *quick)
+    onward = tables_of(result)[3]
+    with athcodec.open(layered_ath) as decoder:
+        last = decoder.level_count - 1
+    assert [(row["from"], row["to"]) for row in onward] == [(last - 2, last - 1), (last - 2, last), (last - 1, last)]
+    assert all(0 < row["kept"] and 0 < row["onward"] < 10 * row["anew"] for row in onward)
+    assert "kept" in cells_of(text, "Going on")
 
 
 # ---- rate and distortion ----

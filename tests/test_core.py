@@ -29,11 +29,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from files import Parts, with_header
+from plants import awkward
 
 import athcodec
 from athcodec import container as ct
 from athcodec import errors
 from athcodec._library import load_library
+from athcodec.encoding.search import Search
+from athcodec.encoding.segment import Settings
 
 OK, BAD_CHECKSUM, BAD_CHUNK, LIMIT_EXCEEDED = 0, 5, 9, 10
 MORE, HELD, MISSING, NOT_PREPARED, NO_MEMORY, BAD_ARGUMENT = range(64, 70)
@@ -157,6 +160,12 @@ _SIGNATURES = {
     "ath_prepare_step": (c_int, [c_void_p, c_int32]),
     "ath_prepare_steps": (c_int32, [c_void_p, c_int32, c_int32]),
     "ath_prepare": (c_int, [c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_size_t]),
+    "ath_keep_size": (c_size_t, [c_void_p, c_int32]),
+    "ath_keep": (c_int, [c_void_p, c_void_p, c_size_t]),
+    "ath_kept_size": (c_size_t, [c_void_p]),
+    "ath_goes_on": (c_int, [*[c_void_p] * 3, c_int32]),
+    "ath_prepare_onward": (c_int, [c_void_p, c_size_t, *[c_void_p] * 3, c_int32, c_void_p, c_size_t]),
+    "ath_onward_ranges": (c_int32, [c_void_p, *[c_int32] * 4, c_int, c_void_p, c_int32]),
     "ath_segment_index": (c_int32, [c_void_p]),
     "ath_segment_level": (c_int32, [c_void_p]),
     "ath_frame_at": (c_double, [c_void_p, c_int32, c_double, c_int]),
@@ -321,6 +330,47 @@ class Player:
         work.check()
         into.check()
         return into
+
+    def keep(self, work: Memory, level: int) -> Memory:
+        """Room for what a deeper level goes on from, of a preparation that has begun."""
+        room = Memory(max(16, core.ath_keep_size(self.address, level)))
+        assert core.ath_keep(work.address, room.address, room.size) == OK
+        return room
+
+    def finish(self, work: Memory, into: Memory, room: Memory) -> tuple[Memory, Memory]:
+        """The segment and what was kept of it, moved to memory of its own size."""
+        result = core.ath_prepare_step(work.address, 2**31 - 1)
+        assert result == OK, core.ath_result_name(result)
+        for memory in (work, into, room):
+            memory.check()
+        kept = Memory(core.ath_kept_size(room.address))
+        kept.bytes[:] = room.bytes[: kept.size]
+        room.bytes[:] = GUARD
+        return into, kept
+
+    def prepare_and_keep(self, segment: int, level: int) -> tuple[Memory, Memory]:
+        work, into = self.work(), self.room(level)
+        assert self.start(segment, level, work, into) == OK
+        return self.finish(work, into, self.keep(work, level))
+
+    def start_onward(self, before: tuple[Memory, Memory], level: int, work: Memory, into: Memory) -> int:
+        assert self.refine(level) == OK
+        shown, kept = before
+        return core.ath_prepare_onward(
+            work.address,
+            work.size,
+            self.address,
+            shown.address,
+            kept.size and kept.address,
+            level,
+            into.address,
+            into.size,
+        )
+
+    def go_on(self, before: tuple[Memory, Memory], level: int) -> tuple[Memory, Memory]:
+        work, into = self.work(), self.room(level)
+        assert self.start_onward(before, level, work, into) == OK
+        return self.finish(work, into, self.keep(work, level))
 
     def prepare_all(self, level: int) -> list[Memory]:
         return [self.prepare(segment, level) for segment in self.segments]
@@ -801,6 +851,170 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
         for frame in range(player.start_of(segment), player.start_of(segment + 1)):
             one, *others = [player.frame([done[segment, level]], frame) for done in (alone, *together)]
             assert all(np.array_equal(one, other) for other in others)
+
+
+# ---- going on ----
+
+
+def levels_to_go_on_from(player: Player) -> range:
+    return range(player.info.depth_levels - 1, player.info.level_count - 1)
+
+
+def shown_of(player: Player, segment: Memory) -> np.ndarray:
+    """The segment's memory from the last of its positions back: all that it shows."""
+    index = core.ath_segment_index(segment.address)
+    frames = range(player.start_of(index), player.start_of(index + 1))
+    xyz = np.empty((len(frames), player.info.vertex_count, 3))
+    for frame, out in zip(frames, xyz):
+        assert core.ath_positions_float64(*player.at([segment], frame), SOURCE_ORDER, out.ctypes.data, 24) == OK
+    return xyz
+
+
+LADDER = (1e-2, 1e-3)
+REFINED = {
+    "layers": ("bushy_clip", {"ladder": LADDER}),
+    "shapes": ("full_clip", {"ladder": LADDER}),
+    "time bases": ("bushy_clip", {"ladder": (1e-1, 1e-2), "rel_error": 1e-3, "segment_frames": 32}),
+    "clips": ("medley_clips", {"ladder": LADDER}),
+    "lossless": ("full_clip", {"ladder": LADDER, "lossless": True}),
+    "float64": ("distant_clip", {"ladder": LADDER, "lossless": True}),
+    "one layer": ("full_clip", {"lossless": True}),
+}
+
+
+@pytest.fixture(scope="module")
+def distant_clip():
+    """So far away that its positions are doubles."""
+    return awkward(seed=8, branches=9, frames=40, dtype=np.float64, offset=1e3, motion="sway")
+
+
+def all_learned(search: Search, settings: Settings) -> Settings:
+    return replace(settings, learned_bases=(True,) * search.levels)
+
+
+@pytest.fixture(scope="module", params=REFINED)
+def refined(request, scratch) -> Player:
+    """Files with all that is kept: learned shapes and time bases, rotations and shifts, float64; several clips."""
+    name, options = REFINED[request.param]
+    clip, path = request.getfixturevalue(name), scratch / "onward.ath"
+    clip = athcodec.join(clip) if isinstance(clip, dict) else clip
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "time bases":
+            patch.setattr(Search, "_with_learned_bases", all_learned)
+        athcodec.encode(clip, path, **{"rel_error": 1e-4, "segment_frames": 16, "attributes": "none"} | options)
+    return Player(path.read_bytes())
+
+
+def test_going_on_from_any_level_to_any_deeper_one_gives_what_preparing_it_does(refined):
+    """Level by level, too, where each keeps what the next goes on from."""
+    for segment in refined.segments:
+        levels = [*levels_to_go_on_from(refined), refined.levels[-1]]
+        expected = {level: shown_of(refined, refined.prepare(segment, level)) for level in levels}
+        chain = refined.prepare_and_keep(segment, levels[0])
+        for level in levels[:-1]:
+            before = refined.prepare_and_keep(segment, level)
+            for deeper in range(level + 1, levels[-1] + 1):
+                assert np.array_equal(shown_of(refined, refined.go_on(before, deeper)[0]), expected[deeper])
+            chain = refined.go_on(chain, level + 1)
+            assert np.array_equal(shown_of(refined, chain[0]), expected[level + 1])
+            assert core.ath_segment_level(chain[0].address) == level + 1
+
+
+def test_bytes_of_earlier_levels_may_be_dropped_before_going_on(refined):
+    player, last = Player(refined.data), refined.segments[-1]
+    for level in levels_to_go_on_from(player):
+        deeper = level + 1
+        expected = shown_of(refined, refined.prepare(last, deeper))
+        before = player.prepare_and_keep(last, level)
+        core.ath_drop(player.address, 0, len(player.data))
+        assert player.result_of_preparing(last, deeper) == MISSING
+        ranges = (Range * 100)()
+        count = core.ath_onward_ranges(player.address, level, deeper, last, last, 0, ranges, 100)
+        for wanted in ranges[:count]:
+            player.feed(wanted.offset, wanted.size)
+        assert core.ath_onward_ranges(player.address, level, deeper, last, last, 0, None, 0) == 0
+        assert sum(r.size for r in ranges[:count]) < sum(size for _, size in player.ranges(deeper, last, last, True))
+        assert np.array_equal(shown_of(player, player.go_on(before, deeper)[0]), expected)
+        player.feed(0, len(player.data))
+
+
+def test_what_is_kept_is_small_and_kept_only_where_it_serves(player):
+    for level in player.levels:
+        room = core.ath_keep_size(player.address, level)
+        segment, kept = player.prepare_and_keep(0, level)
+        assert (kept.size > 0) == (room > 0) and kept.size <= room
+        assert kept.size < core.ath_segment_size(player.address, level)
+        if room == 0:
+            lossless = level == player.info.level_count - 2 and kept.size == 0
+            assert not core.ath_goes_on(player.address, segment.address, None, level + 1) or lossless
+
+
+def test_without_room_nothing_is_kept_and_the_segment_is_prepared(layered):
+    player = Player(layered)
+    level = player.info.depth_levels - 1
+    expected, kept = player.prepare_and_keep(0, level)
+    for size in (16, 17, 64, kept.size // 2, kept.size):
+        work, into, room = player.work(), player.room(level), Memory(size)
+        assert player.start(0, level, work, into) == OK
+        assert core.ath_keep(work.address, room.address, room.size) == OK
+        segment, found = player.finish(work, into, room)
+        assert found.size == 0 and np.array_equal(shown_of(player, segment), shown_of(player, expected))
+        assert player.start_onward((segment, room), level + 1, work, player.room(level + 1)) == BAD_ARGUMENT
+    assert player.start(0, level, work, into) == OK
+    for address, size in too_little(16):
+        assert core.ath_keep(work.address, address, size) == NO_MEMORY
+
+
+def test_going_on_from_what_does_not_fit_is_a_bad_argument(layered):
+    player = Player(layered)
+    level, deepest = player.info.depth_levels - 1, player.levels[-1]
+    before, other, coarse = (player.prepare_and_keep(*place) for place in ((0, level), (1, level), (0, level - 1)))
+    deeper, unprepared = player.go_on(before, level + 1), (player.room(level), before[1])
+    assert player.start(0, level, player.work(), unprepared[0]) == OK
+    nothing = Memory(0)
+    for (segment, kept), wanted in [
+        *[(before, place) for place in (-1, 0, level, deepest + 1)],
+        *[((before[0], of), deepest) for of in (nothing, other[1], deeper[1])],
+        *[(of, deepest) for of in (coarse, (coarse[0], before[1]), unprepared)],
+    ]:
+        address = kept.size and kept.address
+        assert core.ath_goes_on(player.address, segment.address, address, wanted) == 0
+        work, into = player.work(), player.room(deepest)
+        arguments = work.address, work.size, player.address, segment.address, address, wanted, into.address, into.size
+        assert core.ath_prepare_onward(*arguments) == BAD_ARGUMENT
+    assert core.ath_goes_on(player.address, before[0].address, before[1].address, deepest) == 1
+
+
+def test_a_damaged_refinement_leaves_the_level_before_playable(refined):
+    level = refined.info.depth_levels - 1
+    player = Player(refined.data)
+    (offset, size), *_ = [
+        (chunk.offset, chunk.length)
+        for chunk in core.ath_chunks(player.address)[: player.info.chunk_count]
+        if chunk.level == level + 1 and chunk.segment == 0 and chunk.kind in (ct.STEMS, ct.EXACT)
+    ]
+    before = player.prepare_and_keep(0, level)
+    expected, kept = shown_of(player, before[0]), before[1].bytes.copy()
+    damaged = bytearray(player.data[offset : offset + size])
+    damaged[size // 2] ^= 1
+    player.kept.append(damaged := bytes(damaged))
+    core.ath_feed(player.address, damaged, offset, size)
+    work, into = player.work(), player.room(level + 1)
+    assert player.start_onward(before, level + 1, work, into) == OK
+    assert core.ath_prepare_step(work.address, 2**31 - 1) == BAD_CHECKSUM
+    assert core.ath_segment_level(into.address) == -1
+    assert np.array_equal(shown_of(player, before[0]), expected) and np.array_equal(before[1].bytes, kept)
+    player.feed(offset, size)
+    assert player.go_on(before, level + 1)
+
+
+def test_going_on_takes_no_more_steps_than_preparing(layered):
+    player = Player(layered)
+    for level in levels_to_go_on_from(player):
+        work, into = player.work(), player.room(level + 1)
+        assert player.start_onward(player.prepare_and_keep(0, level), level + 1, work, into) == OK
+        steps = core.ath_prepare_steps(player.address, 0, level + 1)
+        assert core.ath_prepare_step(work.address, steps) == OK
 
 
 # ---- what is shown ----

@@ -290,9 +290,9 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     monkeypatch.setattr(
         core_file.File,
         "prepare",
-        lambda file, work, segment, level, into: (
+        lambda file, work, segment, level, *memory: (
             prepared.append((segment, level)),
-            prepare(file, work, segment, level, into),
+            prepare(file, work, segment, level, *memory),
         ),
     )
     (first, stop), last = decoder.segments[1], decoder.level_count - 1

@@ -533,6 +533,43 @@ def test_a_file_that_cannot_be_opened_is_an_error_with_a_code(sample_ath, tmp_pa
     assert re.fullmatch(f"{name}: {sentence}", error["message"])
 
 
+GOING_ON = """
+const first = file.info.depthLevels - 1, last = file.info.levelCount - 1, keep = true;
+let kept = file.prepare(0, first, { keep });
+const result = { same: [], anew: [], ranges: [], freed: [] };
+for (let level = first + 1; level <= last; level++) {
+  const alone = digest(file.positions([file.prepare(0, level)], 1.5));
+  const ranges = file.ranges(level, 0, 0, true, level - 1), whole = file.ranges(level, 0, 0, true);
+  result.ranges.push(ranges.reduce((sum, { size }) => sum + size, 0) < whole.reduce((sum, { size }) => sum + size, 0));
+  for (const { offset, size } of file.ranges(level - 1, 0, 0, true)) file.drop(offset, size);
+  result.anew.push(thrown(() => file.prepare(0, level, { from: file.prepare(0, level - 1) }))?.codeName);
+  const before = digest(file.positions([kept], 1.5)), deeper = file.prepare(0, level, { from: kept, keep });
+  result.same.push(digest(file.positions([deeper], 1.5)) === alone && digest(file.positions([kept], 1.5)) === before);
+  file.feed(bytes, 0);
+  for (const from of [null, file.prepare(1, level - 1, { keep }), file.prepare(0, level - 1)])
+    result.anew.push(digest(file.positions([file.prepare(0, level, { from })], 1.5)) === alone);
+  const preparation = file.preparation(0, level, { from: kept });
+  preparation.step(1);
+  kept.free();
+  result.freed.push(thrown(() => preparation.step(1))?.message, thrown(() => preparation.step(1))?.message);
+  kept = deeper;
+}
+answer(result);
+"""
+
+
+def test_a_deeper_level_goes_on_from_the_one_before_without_its_bytes(layered_ath, tmp_path):
+    """From what was kept where there is any, else from the first layer; the segment before can be shown on."""
+    prelude = "const bytes = read(path), file = AthFile.open(bytes);"
+    result = run_node(tmp_path, prelude + GOING_ON, layered_ath)
+    assert result["same"] == result["ranges"] == [True] * 2
+    assert result["anew"] == ["MISSING", True, True, True] * 2
+    assert [message.split(",")[0] for message in result["freed"]] == [
+        "step: got a freed segment",
+        "step: got a preparation that has ended",
+    ] * 2
+
+
 MISUSE = """
 const file = AthFile.open(read(path)), { levelCount, segmentCount } = file.info;
 const foreign = AthFile.open(read(path)).prepare(0, 0);

@@ -5,6 +5,7 @@
  *     ath_refine                                once per level that refines another
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
+ *     ath_keep, ath_prepare_onward              a deeper level of a segment, from the one that is prepared
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
  *     ath_level_for                             which level to draw at a distance
  *
@@ -377,6 +378,29 @@ ATH_API int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t
 /* Both at once. */
 ATH_API int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
                         void *memory, size_t memory_bytes);
+
+/* Going on. A segment that is prepared at a level of all vertices, from info.depth_levels - 1 on, can be prepared at a
+ * deeper one from there: chunks of levels up to its own are not read again, and may have been dropped. For that the
+ * preparation at the first of the two levels keeps its integers, in memory of the caller's:
+ *     ath_keep, between the call that begins that preparation and its first step. No size below ath_keep_size is sure to
+ * do, but a hundredth mostly does: where there is no room, nothing is kept. ATH_NO_MEMORY: not even for a few bytes.
+ *     ath_kept_size, after its last step: how many bytes are in use; 0: nothing is kept. They hold no pointers: copy them
+ * where they take no more than that.
+ *     ath_prepare_onward, in place of ath_prepare_start, of the segment that `from` is. `from` and `kept` stay as they
+ * are until the last step, which comes after at most ath_prepare_steps; `from` can be played whatever comes of it.
+ * ATH_BAD_ARGUMENT, too, where ath_goes_on says 0: `level` is no deeper than that of `from`, or `kept` is not of its
+ * segment and level.
+ *     ath_onward_ranges: ath_ranges without what only levels up to `from_level` need.
+ * ath_keep_size is 0 where nothing is to be kept: at levels that no other goes on from, and at the one before the
+ * source's own numbers, which go on from the positions of `from`, and null for `kept`. */
+ATH_API size_t ath_keep_size(const ath_file *file, int32_t level);
+ATH_API int ath_keep(ath_work *work, void *memory, size_t memory_bytes);
+ATH_API size_t ath_kept_size(const void *kept);
+ATH_API int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level);
+ATH_API int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from,
+                               const void *kept, int32_t level, void *memory, size_t memory_bytes);
+ATH_API int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
+                                  int32_t last_segment, int all, ath_range *ranges, int32_t capacity);
 
 /* Of a prepared segment; -1 where it is not (not yet, or damaged). */
 ATH_API int32_t ath_segment_index(const ath_segment *segment);

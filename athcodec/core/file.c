@@ -795,12 +795,12 @@ static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level,
 
 /* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
  * chunks for each. */
-int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
-                   ath_range *ranges, int32_t capacity)
+int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
+                          int32_t last_segment, int all, ath_range *ranges, int32_t capacity)
 {
     int32_t count = 0;
     uint64_t end = 0;
-    for (int32_t d = 0; d <= level; d++) {
+    for (int32_t d = from_level + 1; d <= level; d++) {
         if (first_segment > 0) /* what all segments share stands with segment 0 */
             for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
                 if (ath_is_shared(kind) && is_used(file, kind, d, level, all))
@@ -813,6 +813,12 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
         }
     }
     return count;
+}
+
+int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
+                   ath_range *ranges, int32_t capacity)
+{
+    return ath_onward_ranges(file, -1, level, first_segment, last_segment, all, ranges, capacity);
 }
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)

@@ -2,6 +2,7 @@
  * piece is placed as soon as its integers are decoded, so that only attach caches are kept. */
 #include "decode.h"
 #include "exact_model.h"
+#include "kept.h"
 #include "motion_streams.h"
 #include "segment.h"
 
@@ -72,10 +73,15 @@ struct ath_work {
     ath_node_rows node;
     void *prelude_model;
     prepare_phase phase;
-    int32_t index, level; /* of the segment in preparation */
-    int32_t layer;        /* the last one that it takes */
-    int32_t next;         /* level of CHECKSUMS and HEADS, piece of PIECES */
-    int32_t next_kind;    /* of CHECKSUMS */
+    const ath_segment *shown_before; /* whose positions are those before make_exact; null: none */
+    const uint8_t *kept;             /* what the next piece is restored from; null: it is decoded */
+    kept_head *keeps;                /* what this preparation keeps, written at `keeping`; null: nothing */
+    kept_writer keeping;
+    int32_t index, level;       /* of the segment in preparation */
+    int32_t first_level;        /* whose chunks are read: those before serve what was prepared before */
+    int32_t first_layer, layer; /* that it takes */
+    int32_t next;               /* level of CHECKSUMS and HEADS, piece of PIECES */
+    int32_t next_kind;          /* of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
     ath_fault_info fault;
@@ -174,11 +180,125 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
     return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 0));
 }
 
+/* ---- what is kept ---- */
+
+static int has_stream(const ath_file *file, int32_t d) { return file->stems_levels >> d & 1; }
+
+/* All of the plant at a precision that a stored level refines. */
+static int can_be_kept(const ath_file *file, int32_t level)
+{
+    return level > file->plan.height && level < ath_min(file->info.level_count, ath_lossy_levels(file)) - 1;
+}
+
+size_t ath_keep_size(const ath_file *file, int32_t level)
+{
+    const ath_plan *plan = &file->plan;
+    if (!can_be_kept(file, level)) return 0;
+    uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
+    size += ((uint64_t)plan->vertex_count + 2 * pieces) * kept_row_most(file->longest) + pieces * KEPT_NUMBER;
+    for (int32_t d = 0; d <= level; d++) {
+        if (!has_stream(file, d)) continue;
+        size += sizeof(kept_stream) + T * T * sizeof(float);
+        if (ath_file_chunk(file, ATH_SHAPES, d, 0)) size += pieces * MOST_SHAPES * kept_row_most(ATH_SHAPE_MODES);
+    }
+    return ath_size_or_most(size);
+}
+
+int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
+{
+    kept_head *head = (kept_head *)memory;
+    if (!ath_fits(memory, memory_bytes, sizeof *head)) return ATH_NO_MEMORY;
+    head->bytes = 0;
+    if (!can_be_kept(work->file, work->level)) return ATH_OK;
+    head->segment = work->index;
+    head->level = work->level;
+    work->keeps = head;
+    work->keeping.at = (uint8_t *)(head + 1);
+    work->keeping.end = (uint8_t *)memory + memory_bytes;
+    return ATH_OK;
+}
+
+size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
+
+/* Of the waves of a basis that is not of cosines. */
+static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
+{
+    return stream->root < 0 ? 0 : (size_t)stream->temporal_rank * (size_t)work->segment->frames;
+}
+
+static void keep_streams(ath_work *work)
+{
+    for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
+        const ath_stream *stream = work->streams + d;
+        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->temporal_rank, stream->root};
+        size_t learned = learned_numbers(work, stream);
+        if (!has_stream(work->file, d)) continue;
+        void *at = ath_kept_take(&work->keeping, sizeof kept);
+        if (at) memcpy(at, &kept, sizeof kept);
+        ath_keep_waves(&work->keeping, stream->temporal, learned);
+    }
+}
+
+static void keep_piece(ath_work *work, const ath_piece *piece)
+{
+    const layer_work *layer = work->layers + work->layer;
+    const ath_piece_rows *rows = &layer->rows;
+    int32_t T = layer->motion.frames, shapes = rows->shape_count;
+    ath_keep_number(&work->keeping, shapes);
+    for (int32_t s = 0; s < shapes; s++)
+        ath_keep_row(&work->keeping, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, ATH_SHAPE_MODES);
+    ath_keep_row(&work->keeping, rows->shift, T, layer->counts[SHIFT_SLOT]);
+    ath_keep_row(&work->keeping, rows->rotation, T, layer->counts[ROTATION_SLOT]);
+    for (int32_t m = 0; m < piece->count; m++)
+        ath_keep_row(&work->keeping, ath_row(rows->modes, m, T), T, layer->counts[m]);
+}
+
+/* Pieces follow. */
+static void restore_streams(ath_work *work)
+{
+    work->kept += sizeof(kept_head);
+    for (int32_t d = 0; d < work->first_level; d++) {
+        kept_stream kept;
+        ath_stream *stream = work->streams + d;
+        double *waves = work->stems[d].temporal;
+        if (!has_stream(work->file, d)) continue;
+        memcpy(&kept, work->kept, sizeof kept);
+        work->kept += sizeof kept;
+        stream->step = kept.step;
+        stream->rotation_step_factor = kept.rotation_step_factor;
+        stream->temporal_rank = kept.temporal_rank;
+        stream->root = kept.root;
+        size_t learned = learned_numbers(work, stream);
+        work->kept = ath_kept_waves(work->kept, waves, learned);
+        if (learned > 0) stream->temporal = waves;
+    }
+}
+
+static void restore_piece(ath_work *work, const ath_piece *piece)
+{
+    layer_work *layer = work->layers + work->first_layer;
+    ath_piece_rows *rows = &layer->rows;
+    int32_t T = layer->motion.frames, count;
+    work->kept = ath_kept_number(work->kept, &rows->shape_count);
+    for (int32_t s = 0; s < rows->shape_count; s++)
+        work->kept = ath_kept_row(work->kept, layer->shape_integers + s * ATH_SHAPE_NUMBERS, ATH_SHAPE_MODES, &count);
+    ath_unit_shapes(rows->shape_count, layer->shape_integers, layer->unit_shapes);
+    work->kept = ath_kept_row(work->kept, rows->shift, T, layer->counts + SHIFT_SLOT);
+    work->kept = ath_kept_row(work->kept, rows->rotation, T, layer->counts + ROTATION_SLOT);
+    for (int32_t m = 0; m < piece->count; m++)
+        work->kept = ath_kept_row(work->kept, ath_row(rows->modes, m, T), T, layer->counts + m);
+}
+
 /* ---- start ---- */
 
 static const ath_chunk *wanted_chunk(const ath_file *file, int32_t segment, int32_t level, int32_t kind, int32_t d)
 {
     return ath_file_needs(file, kind, d, level) ? ath_file_chunk(file, kind, d, segment) : 0;
+}
+
+static const ath_chunk *chunk_of(const ath_work *work, int32_t kind, int32_t d)
+{
+    return d >= work->first_level ? wanted_chunk(work->file, work->index, work->level, kind, d) : 0;
 }
 
 static int32_t checksum_steps(const ath_chunk *chunk)
@@ -218,9 +338,9 @@ static int find_chunks(ath_work *work)
 {
     int result = ATH_OK;
     for (int32_t d = 0; d <= work->level; d++) {
-        const ath_chunk *stems = wanted_chunk(work->file, work->index, work->level, ATH_STEMS, d);
-        const ath_chunk *affines = wanted_chunk(work->file, work->index, work->level, ATH_AFFINES, d);
-        const ath_chunk *shapes = wanted_chunk(work->file, work->index, work->level, ATH_SHAPES, d);
+        const ath_chunk *stems = chunk_of(work, ATH_STEMS, d);
+        const ath_chunk *affines = chunk_of(work, ATH_AFFINES, d);
+        const ath_chunk *shapes = chunk_of(work, ATH_SHAPES, d);
         work->shapes[d].chunk = shapes;
         work->stems[d].chunk = stems;
         work->affines[d].chunk = affines;
@@ -228,9 +348,8 @@ static int find_chunks(ath_work *work)
         if (result == ATH_OK) result = check_fed(work, affines);
         if (result == ATH_OK) result = check_fed(work, shapes);
     }
-    work->corrections.chunk = wanted_chunk(work->file, work->index, work->level, ATH_CORRECTIONS,
-                                           ath_min(work->level, ath_lossy_levels(work->file) - 1));
-    work->exact_level.chunk = wanted_chunk(work->file, work->index, work->level, ATH_EXACT, work->level);
+    work->corrections.chunk = chunk_of(work, ATH_CORRECTIONS, ath_min(work->level, ath_lossy_levels(work->file) - 1));
+    work->exact_level.chunk = chunk_of(work, ATH_EXACT, work->level);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
 }
@@ -256,18 +375,19 @@ static void ready_layer(ath_work *work, int32_t q)
 static void ready_motion(ath_work *work)
 {
     work->layer = ath_layer_of(work->file, work->level);
-    for (int32_t q = 0; q <= work->layer; q++) ready_layer(work, q);
+    for (int32_t q = work->first_layer; q <= work->layer; q++) ready_layer(work, q);
     work->node.step = &work->node_step;
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
-        work->streams[d].temporal = work->layers[0].motion.cosines;
+        work->streams[d].temporal = work->file->cosines[work->segment->frames];
         work->streams[d].root = -1;
         work->streams[d].temporal_rank = work->segment->frames;
     }
 }
 
-int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
-                      void *segment_memory, size_t segment_bytes)
+/* `before` and `kept`: what was prepared before, null: nothing. */
+static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
+                 void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
     ath_work *work = (ath_work *)memory;
     ath_segment *segment = (ath_segment *)segment_memory;
@@ -289,10 +409,23 @@ int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int
     work->index = index;
     work->level = level;
     work->next_kind = ATH_STEMS;
+    if (before) {
+        work->first_level = before->level + 1;
+        work->first_layer = ath_layer_of(file, before->level);
+        work->shown_before = kept ? 0 : before;
+        work->kept = (const uint8_t *)kept;
+    }
     ready_motion(work);
+    if (kept) restore_streams(work);
     int result = find_chunks(work);
     work->phase = result == ATH_OK ? CHECKSUMS : FAILED;
     return result;
+}
+
+int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
+                      void *segment_memory, size_t segment_bytes)
+{
+    return start(memory, work_bytes, file, index, level, segment_memory, segment_bytes, 0, 0);
 }
 
 /* ---- steps ---- */
@@ -303,10 +436,7 @@ static ath_bytes bytes_of(const ath_chunk *chunk)
     return bytes;
 }
 
-static const ath_chunk *chunk_to_check(const ath_work *work)
-{
-    return wanted_chunk(work->file, work->index, work->level, work->next_kind, work->next);
-}
+static const ath_chunk *chunk_to_check(const ath_work *work) { return chunk_of(work, work->next_kind, work->next); }
 
 static void next_phase(ath_work *work, prepare_phase phase)
 {
@@ -420,6 +550,7 @@ static int open_level(ath_work *work)
             coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
         }
         next_phase(work, PIECES);
+        keep_streams(work);
         return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
     affines_reader *affines = work->affines + d;
@@ -475,6 +606,15 @@ static int read_piece(ath_work *work, int32_t p, int32_t level)
     code_piece(&coder, reader->model, layer->plan, work->streams + level, layer->motion.frames, p, level, &layer->rows);
     reader->coder = coder;
     return blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
+}
+
+static int read_first_layer(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->plan.pieces + p;
+    int result = ATH_OK;
+    if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
+    if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
+    return result;
 }
 
 /* ---- refinements ---- */
@@ -629,16 +769,39 @@ static int make_exact(ath_work *work, const ath_piece *piece)
     return ATH_OK;
 }
 
+/* The piece as the level before, the last lossy one, shows it. */
+static void copy_piece(ath_work *work, const ath_piece *piece)
+{
+    const ath_segment *from = work->shown_before;
+    size_t number = from->is_float64 ? sizeof(double) : sizeof(float), row = 3 * number;
+    for (size_t t = 0; t < (size_t)from->frames; t++) {
+        size_t at = (t * (size_t)from->exact_vertices + (size_t)work->exact) * row;
+        memcpy((uint8_t *)work->segment->positions + at, (const uint8_t *)from->positions + at,
+               (size_t)piece->count * row);
+    }
+}
+
 /* The piece at the first layer, then as each further one refines it. */
+static int place_piece(ath_work *work, int32_t p)
+{
+    const ath_piece *piece = work->file->plan.pieces + p;
+    layer_work *layer = work->layers + work->first_layer;
+    const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    for (int32_t q = work->first_layer + 1; q <= work->layer; q++)
+        if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
+    if (work->keeping.at) keep_piece(work, piece);
+    store_piece(work, piece, placed);
+    if (work->corrections.chunk) correct_piece(work, piece);
+    return ATH_OK;
+}
+
 static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
-    layer_work *layer = work->layers;
-    const double *placed = ath_pose_piece(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
-    for (int32_t q = 1; q <= work->layer; q++)
-        if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
-    store_piece(work, piece, placed);
-    if (work->corrections.chunk) correct_piece(work, piece);
+    if (work->shown_before)
+        copy_piece(work, piece);
+    else if (place_piece(work, p) != ATH_OK)
+        return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
     work->exact += piece->count;
     return result;
@@ -690,6 +853,7 @@ static int finish(ath_work *work)
     ath_cut(work->file, work->level, work->segment->parts);
     work->segment->index = work->index;
     work->segment->level = work->level;
+    if (work->keeping.at) work->keeps->bytes = (uint64_t)(work->keeping.at - (uint8_t *)work->keeps);
     work->phase = DONE;
     return ATH_OK;
 }
@@ -701,15 +865,15 @@ static int do_piece(ath_work *work)
     int32_t p = work->next++, result = ATH_OK;
     if (p == plan->piece_count) return finish(work);
     const ath_piece *piece = plan->pieces + p;
-    if (piece->low_level >= 0 && piece->low_level <= work->level) result = read_piece(work, p, piece->low_level);
-    if (piece->level <= work->level && result == ATH_OK) result = read_piece(work, p, piece->level);
+    if (work->first_level == 0) result = read_first_layer(work, p);
+    if (work->kept) restore_piece(work, piece);
     if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
         result = read_node(work, n);
         if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->level)) show_node(work, n);
     }
     if (result == ATH_OK && piece->level <= work->level) result = show_piece(work, p);
-    for (int32_t q = 0; q <= work->layer; q++) clear_piece(work->layers + q, piece);
+    for (int32_t q = work->first_layer; q <= work->layer; q++) clear_piece(work->layers + q, piece);
     return result;
 }
 
@@ -730,6 +894,24 @@ int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t seg
     if (result == ATH_OK) result = ATH_MORE;
     while (result == ATH_MORE) result = ath_prepare_step((ath_work *)work, INT32_MAX);
     return result;
+}
+
+static int is_last_lossy(const ath_file *file, int32_t level) { return level == ath_lossy_levels(file) - 1; }
+
+int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level)
+{
+    const kept_head *head = (const kept_head *)kept;
+    if (from->level < 0 || from->level >= level || level >= file->info.level_count) return 0;
+    if (is_last_lossy(file, from->level)) return 1;
+    return head && head->bytes > 0 && head->segment == from->index && head->level == from->level;
+}
+
+int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from, const void *kept,
+                       int32_t level, void *memory, size_t memory_bytes)
+{
+    if (!ath_goes_on(file, from, kept, level)) return ATH_BAD_ARGUMENT;
+    return start(work, work_bytes, file, from->index, level, memory, memory_bytes, from,
+                 is_last_lossy(file, from->level) ? 0 : kept);
 }
 
 void ath_work_fault(const ath_work *work, ath_fault_info *fault) { *fault = work->fault; }

@@ -5,7 +5,7 @@
 
 const WASM = "@WASM@"; // zlib, base64
 
-const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68;
+const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
 const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
@@ -114,7 +114,9 @@ class Core {
     }
   }
 
+  // 0: nothing.
   give(at) {
+    if (!at) return;
     const block = { at, size: this.sizes.get(at) };
     this.sizes.delete(at);
     let i = this.free.findIndex((other) => other.at > at);
@@ -128,6 +130,13 @@ class Core {
     }
     const last = this.free[this.free.length - 1];
     if (last.at + last.size === this.end) this.end = this.free.pop().at;
+  }
+
+  // The first bytes of a block, moved to one of their size; 0: none.
+  shrunk(at, bytes) {
+    const kept = this.copy(Uint8Array, at, bytes);
+    this.give(at);
+    return bytes > 0 ? this.put(kept) : 0;
   }
 
   // A copy of a typed array, in memory.
@@ -303,7 +312,7 @@ export class AthFile {
   #own = null;            // the Core, until dispose()
   #at = 0;                // the ath_file
   #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
-  #pointers = new Map();  // of segments that are prepared
+  #pointers = new Map();  // of segments that are prepared: {at, kept}
   #preparing = new Map(); // index of a segment: how many preparations of it are under way
   #works = [];            // ath_works that nobody uses
   #scratch = { at: 0, size: 0 };
@@ -528,14 +537,15 @@ export class AthFile {
     }
   }
 
-  ranges(level, first = 0, last = this.info.segmentCount - 1, all = false) {
+  ranges(level, first = 0, last = this.info.segmentCount - 1, all = false, after = -1) {
     const c = this.#c;
     this.#level(level);
     this.#segment(first);
     this.#segment(last);
-    const count = c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, 0, 0);
+    whole(after, -1, level, "after");
+    const count = c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, 0, 0);
     return this.#core.with(count * RANGE_SIZE, (at) => {
-      c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, at, count);
+      c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, at, count);
       return Array.from({ length: count }, (_, i) => this.#core.struct(RANGE, at + i * RANGE_SIZE));
     });
   }
@@ -570,13 +580,13 @@ export class AthFile {
 
   // ---- preparing ----
 
-  preparation(segment, level) {
+  preparation(segment, level, { from = null, keep = false } = {}) {
     const c = this.#c, core = this.#core;
     this.#segment(segment);
     this.#level(level);
     const workSize = c.ath_work_size(this.#at) >>> 0, size = c.ath_segment_size(this.#at, level) >>> 0;
+    let before = this.#pointer(from) && from.index === segment ? this.#pointers.get(from) : null, at = 0, kept = 0;
     const work = this.#works.pop() ?? core.take(workSize);
-    let at = 0;
     const end = () => {
       this.#works.push(work);
       const left = this.#preparing.get(segment) - 1;
@@ -585,9 +595,14 @@ export class AthFile {
     };
     const fail = () => {
       end();
-      if (at) core.give(at);
+      core.give(at);
+      core.give(kept);
     };
     const step = (steps) => {
+      if (before && from.freed) {
+        fail();
+        throw new Error("step: got a freed segment");
+      }
       const code = this.#c.ath_prepare_step(work, steps);
       if (code === MORE) return null;
       try {
@@ -597,15 +612,22 @@ export class AthFile {
         throw error;
       }
       end();
-      return this.#prepared(segment, level, at);
+      return this.#prepared(segment, level, at, kept && core.shrunk(kept, this.#c.ath_kept_size(kept) >>> 0));
     };
     this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
     try {
       this.#refine(level);
       at = core.take(size);
-      const code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      let code = BAD_ARGUMENT; // of what cannot be gone on from
+      if (before) code = c.ath_prepare_onward(work, workSize, this.#at, before.at, before.kept, level, at, size);
+      if (code === BAD_ARGUMENT) {
+        before = null;
+        code = c.ath_prepare_start(work, workSize, this.#at, segment, level, at, size);
+      }
       if (code === MISSING) this.#checkWork(code, work);
       this.#check(code, `segment ${segment} at level ${level}`);
+      const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, size >>> 1) : 0; // a hundredth is usual
+      if (room >= 16) c.ath_keep(work, kept = core.take(room), room);
     } catch (error) {
       fail();
       throw error;
@@ -625,17 +647,18 @@ export class AthFile {
     this.#check(code, `the layers of level ${level}, ${size} bytes`);
   }
 
-  #prepared(index, level, at) {
+  #prepared(index, level, at, kept) {
     const segment = new Segment(index, level, (freed) => {
       this.#pointers.delete(freed);
-      if (this.#own) this.#own.give(at);
+      this.#own?.give(at);
+      this.#own?.give(kept);
     });
-    this.#pointers.set(segment, at);
+    this.#pointers.set(segment, { at, kept });
     return segment;
   }
 
-  prepare(segment, level) {
-    const preparation = this.preparation(segment, level);
+  prepare(segment, level, options) {
+    const preparation = this.preparation(segment, level, options);
     while (!preparation.step(MOST_STEPS));
     return preparation.segment;
   }
@@ -649,7 +672,7 @@ export class AthFile {
   // The memory that results pass through, `bytes` at least.
   #passage(bytes) {
     if (bytes > this.#scratch.size) {
-      if (this.#scratch.at) this.#core.give(this.#scratch.at);
+      this.#core.give(this.#scratch.at);
       this.#scratch = { at: 0, size: 0 };
       this.#scratch = { at: this.#core.take(bytes), size: bytes };
     }
@@ -676,7 +699,7 @@ export class AthFile {
   }
 
   #pointer(segment) {
-    const at = segment ? this.#pointers.get(segment) : 0;
+    const at = segment ? this.#pointers.get(segment)?.at : 0;
     if (at !== undefined) return at;
     if (segment instanceof Segment && segment.freed) return 0;
     throw new TypeError("segments: got something else, expected what prepare() of this file returned");

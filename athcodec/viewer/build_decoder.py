@@ -26,8 +26,8 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
-SMALL = ("container.c", "decode.c", "fault.c", "file.c", "plan.c")
-"""Run once per file: compiled for size, all else for speed."""
+SMALL = ("container.c", "decode.c", "fault.c", "file.c", "kept.c", "plan.c")
+"""Run once per file, or little: compiled for size, all else for speed."""
 FLAGS = [
     "-target",
     "wasm32-freestanding",

@@ -14,7 +14,8 @@ _Static_assert(offsetof(ath_branch, depth) == 28 && sizeof(ath_branch) == 32, "B
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
 _Static_assert(offsetof(ath_fault_info, chunk) == 8 && sizeof(ath_fault_info) == 56 && ATH_FAULT_TEXT == 256, "FAULT");
-_Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67 && ATH_NO_MEMORY == 68,
+_Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67 && ATH_NO_MEMORY == 68
+                   && ATH_BAD_ARGUMENT == 69,
                "result codes");
 _Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
 _Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2 && ATH_AS_MARKED == 3, "WRAPS");

@@ -2,7 +2,7 @@
  * there, and in which order bytes come and go while segments are prepared and played. */
 #include "harness.h"
 
-enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 10 };
+enum { MOST_MEMORY = 8 << 20, HELD = 3, CALLS = 11 };
 
 typedef struct {
     fuzz_file *opened;
@@ -20,6 +20,15 @@ static void prepare(user *u, int32_t argument)
     ath_segment *made = fuzz_prepare(u->opened, segment, level, 1 + argument, MOST_MEMORY, argument);
     free((void *)(uintptr_t)u->held[argument % HELD]);
     u->held[argument % HELD] = made;
+}
+
+static void refine_shown(user *u, int32_t argument)
+{
+    int32_t least = u->info.depth_levels - 1, levels = u->info.level_count - least;
+    if (levels < 2) return;
+    int32_t level = least + argument % (levels - 1),
+            deeper = level + 1 + argument / 8 % (u->info.level_count - 1 - level);
+    fuzz_go_on(u->opened, argument / 3 % u->info.segment_count, level, deeper, MOST_MEMORY, argument);
 }
 
 static void feed_or_drop(user *u, int32_t argument)
@@ -202,6 +211,7 @@ static void call(user *u, int32_t which, int32_t argument)
     if (which == 7) ask(u, argument);
     if (which == 8) rest(u, argument);
     if (which == 9) misuse(u, argument);
+    if (which == 10) refine_shown(u, argument);
 }
 
 static void use(fuzz_file *opened, const uint8_t *bytes, size_t size, const uint8_t *options)
@@ -218,6 +228,7 @@ static void use(fuzz_file *opened, const uint8_t *bytes, size_t size, const uint
         prepare(&u, level * 7 + options[3]);
         play(&u, options[4] + level, level & 1);
         show_parts(&u, options[5], level & 1);
+        refine_shown(&u, level + options[3]);
     }
     abandon(&u);
     for (int32_t i = 0; i < HELD; i++) free((void *)(uintptr_t)u.held[i]);

@@ -187,6 +187,39 @@ ath_segment *fuzz_prepare(fuzz_file *opened, int32_t segment, int32_t level, int
     return NULL;
 }
 
+static int run_to_end(int result, void *work)
+{
+    return result == ATH_OK ? ath_prepare_step((ath_work *)work, INT32_MAX) : result;
+}
+
+void fuzz_go_on(fuzz_file *opened, int32_t segment, int32_t level, int32_t deeper, uint64_t most, int fill)
+{
+    const ath_file *file = opened->file;
+    size_t work_size = ath_work_size(file), size = ath_segment_size(file, level), room = ath_keep_size(file, level);
+    size_t deeper_size = ath_segment_size(file, deeper);
+    if (room < sizeof(uint64_t) * 2) room = sizeof(uint64_t) * 2;
+    if (work_size > most || size > most || deeper_size > most || room > most) return;
+    if (!fuzz_refine(opened, deeper, most, fill)) return;
+    void *work = fuzz_memory(work_size, fill), *from = fuzz_memory(size, fill), *kept = fuzz_memory(room, fill);
+    int result = ath_prepare_start(work, work_size, file, segment, level, from, size);
+    if (result == ATH_OK) REQUIRE(ath_keep((ath_work *)work, kept, room) == ATH_OK, "there is room to keep");
+    result = run_to_end(result, work);
+    if (result == ATH_OK && ath_goes_on(file, from, kept, deeper)) {
+        void *memory = fuzz_memory(deeper_size, fill);
+        REQUIRE(ath_kept_size(kept) <= room, "what is kept is in its memory");
+        result = ath_prepare_onward(work, work_size, file, from, kept, deeper, memory, deeper_size);
+        result = run_to_end(result, work);
+        ath_segment *alone = fuzz_prepare(opened, segment, deeper, INT32_MAX, most, fill);
+        REQUIRE((alone != NULL) == (result == ATH_OK), "going on is refused where preparing is");
+        if (alone) REQUIRE(fuzz_same(file, alone, memory), "going on gives what preparing does");
+        free(alone);
+        free(memory);
+    }
+    free(kept);
+    free(from);
+    free(work);
+}
+
 int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b)
 {
     size_t vertices = (size_t)file->info.vertex_count, size = 3 * vertices * sizeof(double);

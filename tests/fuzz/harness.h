@@ -60,6 +60,10 @@ int fuzz_refine(fuzz_file *opened, int32_t level, uint64_t most, int fill);
 /* One segment at one level, prepared `steps` steps at a time; null where it is refused or larger than `most`. */
 ath_segment *fuzz_prepare(fuzz_file *opened, int32_t segment, int32_t level, int32_t steps, uint64_t most, int fill);
 
+/* Goes on from a segment at `level`, where that can be prepared, to `deeper`: that has to come out as when it is
+ * prepared alone. */
+void fuzz_go_on(fuzz_file *opened, int32_t segment, int32_t level, int32_t deeper, uint64_t most, int fill);
+
 /* Whether both show the same bits. */
 int fuzz_same(const ath_file *file, const ath_segment *a, const ath_segment *b);
 

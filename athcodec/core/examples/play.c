@@ -32,6 +32,7 @@ typedef struct {
     ath_work *work;
     size_t file_size, build_size, layers_size, work_size, segments_size;
     ath_segment *playing, *next; /* null: none. `next` is prepared while `playing` plays */
+    void *kept, *next_kept;      /* what deeper levels of these go on from */
     int preparing;
     int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
     int32_t level, bound_level; /* that the camera asks for; that `binding` is for */
@@ -124,8 +125,8 @@ static void choose_clip(player *p, const char *name)
 
 static void close_file(player *p)
 {
-    void *const memories[] = {p->playing, p->next,    p->work,     p->bases,     p->layers,
-                              p->file,    p->binding, p->matrices, p->positions, p->bytes};
+    void *const memories[] = {p->playing, p->kept, p->next,    p->next_kept, p->work,      p->bases,
+                              p->layers,  p->file, p->binding, p->matrices,  p->positions, p->bytes};
     for (int32_t i = 0; i < p->layer_count; i++) free(p->layers[i]);
     for (size_t i = 0; i < sizeof memories / sizeof *memories; i++) free(memories[i]);
     fclose(p->download);
@@ -165,6 +166,30 @@ static void refine(player *p, int32_t level)
     p->layers_size += size;
 }
 
+/* Room for the most that may be kept: pages that nobody writes to cost nothing. */
+static void keep(player *p, int32_t level)
+{
+    size_t room = ath_keep_size(p->file, level) + 16;
+    free(p->next_kept);
+    p->next_kept = allocate(room);
+    check(ath_keep(p->work, p->next_kept, room), "keeping");
+}
+
+static void keep_no_more_than_there_is(player *p)
+{
+    size_t size = ath_kept_size(p->next_kept);
+    void *shrunk = realloc(p->next_kept, size > 16 ? size : 16);
+    if (shrunk) p->next_kept = shrunk;
+}
+
+/* A finer level of what is playing goes on from there. */
+static int begin(player *p, int32_t segment, int32_t level, size_t size)
+{
+    if (index_of(p->playing) == segment && ath_goes_on(p->file, p->playing, p->kept, level))
+        return ath_prepare_onward(p->work, p->work_size, p->file, p->playing, p->kept, level, p->next, size);
+    return ath_prepare_start(p->work, p->work_size, p->file, segment, level, p->next, size);
+}
+
 /* Memory is for the level, so that a plant far away takes little. */
 static int start(player *p, int32_t segment, int32_t level)
 {
@@ -174,7 +199,8 @@ static int start(player *p, int32_t segment, int32_t level)
     free(p->next);
     p->next = allocate(size);
     refine(p, level);
-    check(ath_prepare_start(p->work, p->work_size, p->file, segment, level, p->next, size), "preparing");
+    check(begin(p, segment, level, size), "preparing");
+    keep(p, level);
     p->steps = ath_prepare_steps(p->file, segment, level);
     return p->preparing = 1;
 }
@@ -199,8 +225,11 @@ static void take_over(player *p, int32_t now)
 {
     if (p->preparing || index_of(p->next) != now) return;
     free(p->playing);
+    free(p->kept);
     p->playing = p->next;
+    p->kept = p->next_kept;
     p->next = NULL;
+    p->next_kept = NULL;
 }
 
 /* Some steps per drawn frame. All at once where there would be nothing to show: at the start, after a jump in
@@ -219,6 +248,7 @@ static void prepare(player *p, double place)
         if (result == ATH_MORE) return;
         ath_work_fault(p->work, &fault);
         check_fault(&fault, "preparing");
+        keep_no_more_than_there_is(p);
         p->preparing = 0;
     } while (urgent);
     take_over(p, now);

@@ -31,6 +31,7 @@ export class Session {
   #attributes = "missing"; // "here"
   #speed = 0;             // bytes a second
   #busy = false;
+  #goingOnFrom = null;    // the segment that the preparation under way reads
   #failed = new Set();    // damaged chunks, "segment/level"
   #wake = null;
   #stateAt = 0;
@@ -331,7 +332,8 @@ export class Session {
 
   async #prepareInSteps(segment, level) {
     try {
-      const preparation = this.#file.preparation(segment, level);
+      const from = this.#goingOnFrom = this.#before(segment, level);
+      const preparation = this.#file.preparation(segment, level, { from, keep: true });
       let start = performance.now();
       while (!preparation.step(STEPS)) {
         if (performance.now() - start < SLICE_MS) continue;
@@ -344,6 +346,14 @@ export class Session {
     } catch (error) {
       this.#damaged(segment, level, error);
     }
+    this.#goingOnFrom = null;
+  }
+
+  // The deepest that is decoded of a segment short of this level: decoding goes on from there, if it can.
+  #before(index, level) {
+    let before = null;
+    while (!before && level > 0) before = this.#prepared.get(`${index}/${--level}`);
+    return before;
   }
 
   #damaged(segment, level, error) {
@@ -363,6 +373,7 @@ export class Session {
     const most = Math.max(6, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
     for (const [oldest, old] of this.#prepared) {
       if (this.#prepared.size <= most) break;
+      if (old === this.#goingOnFrom) continue;
       old.free();
       this.#prepared.delete(oldest);
     }
@@ -414,7 +425,7 @@ export class Session {
   #now(index, level) {
     const there = this.#segment(index, level);
     if (there) return there;
-    const segment = this.#file.prepare(index, level);
+    const segment = this.#file.prepare(index, level, { from: this.#before(index, level), keep: true });
     this.#keep(segment);
     return segment;
   }
