@@ -96,9 +96,10 @@ def _print_clips(facts: dict[str, Any]) -> None:
 
 
 def _print_levels(facts: dict[str, Any]) -> None:
-    columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
+    measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
+    columns = ["bytes so far", *(_head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [
-        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"] for level in facts["levels"]
+        [f"{level['bytes']:,}", *(f"{level[field]:.3g}" for field in measures.values())] for level in facts["levels"]
     ]
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
 

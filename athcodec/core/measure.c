@@ -124,8 +124,19 @@ static void set_position(int is_float64, void *positions, size_t at, double valu
         ((float *)positions)[at] = (float)value;
 }
 
+/* A length of the error table (ATH_SHORT_FLOATS), not below the distance as far as there is one. */
+static int32_t short_above(double distance)
+{
+    float narrow = (float)distance;
+    uint32_t bits;
+    memcpy(&bits, &narrow, sizeof bits);
+    bits += (double)narrow < distance;
+    bits = (bits + (1u << ATH_SHORT_SHIFT) - 1) >> ATH_SHORT_SHIFT;
+    return ath_min((int32_t)bits, ATH_SHORT_FLOATS - 1);
+}
+
 void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
-               const double origin[3], double *max_error, double *sum_squares)
+               const double origin[3], double *max_error, double *sum_squares, uint32_t *histogram)
 {
     double largest = 0.0, sum = 0.0;
     size_t T = (size_t)frames;
@@ -139,6 +150,7 @@ void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void 
             }
             sum += square;
             if (square > largest) largest = square;
+            if (histogram) histogram[short_above(ath_sqrt(square))]++;
         }
     *max_error = ath_sqrt(largest);
     *sum_squares = sum;
