@@ -20,7 +20,7 @@ SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
 SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 """Of the error table: floats without sign, of which the top bits of binary32 are stored."""
-MEASURES = "largest", "p99", "rms"
+MEASURES = "max", "p99", "rms"
 """ath_measure, in its order."""
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
@@ -101,12 +101,8 @@ class Header(ctypes.Structure):
     """ath_header."""
 
     _fields_ = [("file_length", c_uint64), ("front_length", c_uint64), ("max_error", c_double)]
-    _fields_ += [
-        (name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()
-    ]
-    _fields_ += [
-        (name, c_int32) for name in "level_count full_level_count clip_count layer_count is_float64".split()
-    ]
+    _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
+    _fields_ += [(name, c_int32) for name in "level_count full_level_count clip_count layer_count is_float64".split()]
 
 
 _PLAYING = {  # core/ath.h

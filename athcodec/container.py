@@ -90,8 +90,8 @@ class Limits:
 
 @dataclass
 class Header:
-    """The counts at the front. `max_error` is the promise of the deepest stored level, in scene units; frames and segments are
-    those of all clips."""
+    """The counts at the front. `max_error` is the promise of the deepest stored level, in scene units; frames and
+    segments are those of all clips."""
 
     vertex_count: int
     branch_count: int
@@ -251,15 +251,18 @@ def brief(value: object) -> str:
 
 
 def pack_hierarchy(thresholds, stream: bytes) -> bytes:
-    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam); they are rounded up, counts beyond 65535 are that."""
+    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam); lengths are rounded, counts beyond 65535 are that."""
     epsilon, eta, xi, lam = thresholds
-    return _HIERARCHY.pack(*short_floats([epsilon, xi]), *(min(int(count), 65535) for count in (eta, lam))) + stream
+    most = from_short_float(SHORT_FLOATS - 1)
+    lengths = np.minimum([epsilon, xi], most).astype(np.float32).view(np.uint32)
+    nearest = np.minimum(lengths + (1 << SHORT_SHIFT - 1) >> SHORT_SHIFT, SHORT_FLOATS - 1)
+    return _HIERARCHY.pack(*nearest, *(min(int(count), 65535) for count in (eta, lam))) + stream
 
 
 @dataclass
 class Rest:
-    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps. Origin and step
-    are numbers of float32."""
+    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps. Origin and
+    step are numbers of float32."""
 
     origin: np.ndarray
     step: float

@@ -268,12 +268,13 @@ class File:
         shape = self.info.level_count, self.info.segment_count, len(MEASURES)
         return self._array(lib.ath_errors(self._file), "<f8", math.prod(shape)).reshape(shape)
 
-    def level_error(self, level: int, segments: range) -> tuple[float, ...]:
+    def level_error(self, level: int, segments: range) -> tuple[float, float, float]:
         """Error of a level in these segments by each of MEASURES, scene units."""
-        return tuple(
+        largest, p99, rms = (
             lib.ath_level_error(self._file, level, segments[0], segments[-1], measure)
             for measure in range(len(MEASURES))
         )
+        return largest, p99, rms
 
     def segment_starts(self, segments: range) -> list[int]:
         """The first frame of each of these segments, and that behind the last of them."""
@@ -343,5 +344,7 @@ class File:
         self, segments: range, measure: str, distance: float, fov: float, height: float, pixels: float
     ) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
+        if measure not in MEASURES:
+            raise ValueError(f"measure: got {measure!r}; expected one of {', '.join(MEASURES)}")
         number = MEASURES.index(measure)
         return lib.ath_level_for(self._file, segments[0], segments[-1], number, distance, fov, height, pixels)

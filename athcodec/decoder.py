@@ -241,9 +241,7 @@ class Decoder:
         """The stored levels, coarse to fine, with their errors in this clip."""
         return self.file.levels_in(self.clip.segments)
 
-    def level_for(
-        self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "largest"
-    ) -> int:
+    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
         """The level to show from afar.
 
         Parameters
@@ -256,7 +254,7 @@ class Decoder:
             Of the screen, pixels.
         pixels : float
             By how much vertices may be off on the screen.
-        measure : {"largest", "p99", "rms"}
+        measure : {"max", "p99", "rms"}
             Of the errors of all vertices: with "p99" at most 1 % of them may be off by more.
 
         Returns

@@ -263,7 +263,8 @@ static void units(char **paths, int count, int rounds)
         free(work);
     }
     double start = now_ms();
-    for (int i = 0; i < CHOICES; i++) ath_level_for(clips[i % count].file, 0, 0, 10.0 + i, FOV, SCREEN, PIXELS);
+    for (int i = 0; i < CHOICES; i++)
+        ath_level_for(clips[i % count].file, 0, 0, ATH_LARGEST, 10.0 + i, FOV, SCREEN, PIXELS);
     put("],\n ", "choice_us", (now_ms() - start) * 1e3 / CHOICES);
     print_poses(clips, count, levels, rounds);
     printf("}\n");
@@ -279,7 +280,8 @@ static int32_t *slot_of_pose(const forest *forest, int32_t clip, int32_t level, 
 static int32_t level_of(const forest *forest, const instance *instance)
 {
     const clip *played = forest->clips + instance->clip;
-    return ath_level_for(played->file, 0, played->info.segment_count - 1, instance->distance, FOV, SCREEN, PIXELS);
+    return ath_level_for(played->file, 0, played->info.segment_count - 1, ATH_LARGEST, instance->distance, FOV, SCREEN,
+                         PIXELS);
 }
 
 static void read_scene(const char *path, forest *forest)

@@ -409,7 +409,11 @@ valid(
     lambda: fork().change(rd.STEMS, 1, 1, spelt=True).change(rd.AFFINES, 0, 0, spelt=True),
 )
 valid("time-whole-rate", "times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
-valid("time-whole-step", "times by a step that is one over a whole rate", lambda: lone(frames=7, time=whole_rates(49, method=4)))
+valid(
+    "time-whole-step",
+    "times by a step that is one over a whole rate",
+    lambda: lone(frames=7, time=whole_rates(49, method=4)),
+)
 valid("time-largest-rate", "Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
 valid("time-rate", "times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
 valid(
@@ -699,11 +703,7 @@ valid(
     "an exact rest pose at 1e300: distances overflow, nothing has a length",
     lambda: moving(FORK, 33, rest=exact_rest(FORK, [1e300 * (i * i % 7) for i in range(15)], True), heads=HEADS),
 )
-valid(
-    "rest-steps-tiny",
-    "a subnormal Rest_Step",
-    lambda: moving(FORK, 34, step=FLOAT_TINY, heads=HEADS),
-)
+valid("rest-steps-tiny", "a subnormal Rest_Step", lambda: moving(FORK, 34, step=FLOAT_TINY, heads=HEADS))
 valid(
     "rest-tiny",
     "an exact rest pose of subnormal numbers: squares of distances vanish",
@@ -1668,7 +1668,9 @@ invalid(
     "a bit of a checksum is flipped",
     lambda: flipped(lone().file(), rd.u32(lone().file(), 16) - 2),
 )
-invalid("errors-infinite", "BAD_CHUNK_TABLE", "open", "Level_Max_Error is 8160", lambda: error_table(8160, 0, 0, 0, 0, 0))
+invalid(
+    "errors-infinite", "BAD_CHUNK_TABLE", "open", "Level_Max_Error is 8160", lambda: error_table(8160, 0, 0, 0, 0, 0)
+)
 invalid("errors-negative", "BAD_CHUNK_TABLE", "open", "Level_P99_Error is -1", lambda: error_table(0, -1, 0, 0, 0, 0))
 invalid(
     "errors-largest", "BAD_CHUNK_TABLE", "open", "the last error is 2^29", lambda: error_table(0, 0, 0, 0, 0, 1 << 29)
@@ -2085,7 +2087,9 @@ INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how 
 prelude("empty", rd.REST, "no bytes", b"")
 prelude("short", rd.REST, "16 bytes", lambda: corrupted_rest()[:16])
 for bit in range(6):
-    prelude(f"method-{bit}", rd.REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit))
+    prelude(
+        f"method-{bit}", rd.REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit)
+    )
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(
         f"origin-{what}", rd.REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value))
@@ -2136,7 +2140,9 @@ def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
 prelude("empty", rd.TIME, "no bytes", b"")
 prelude("method-5", rd.TIME, "Method 5", lambda: whole_rates(1, method=5))
 for method in (3, 4):
-    prelude(f"whole-{method}-0", rd.TIME, f"Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method))
+    prelude(
+        f"whole-{method}-0", rd.TIME, f"Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method)
+    )
 prelude("whole-short", rd.TIME, "half of Rate", lambda: whole_rates(2)[:2])
 prelude("whole-long", rd.TIME, "two Rates of one clip", lambda: whole_rates(2, 2))
 prelude("short", rd.TIME, "First and half of Step", lambda: steady_time()[:13])

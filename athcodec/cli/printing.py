@@ -65,7 +65,7 @@ def _print_facts(facts: dict[str, Any]) -> None:
     )
     print(
         f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves; "
-        f"epsilon {ath['epsilon']:g}, eta {ath['eta']}, xi {ath['xi']:g}, lambda {ath['lam']}"
+        f"epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")

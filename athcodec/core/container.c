@@ -198,7 +198,7 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         chunk.offset = offset;
         code_chunk(coder, &model, header->segment_count, &chunk);
         chunk.checksum = u32_at(checksums + CHECKSUM_SIZE * (size_t)i);
-        chunk.level = ath_is_motion(&chunk) ? (uint8_t)ath_min(model.level, ATH_NO_LEVEL) : ATH_NO_LEVEL;
+        chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
         chunk.bytes = chunk.length == 0 ? checksums : 0; /* there is nothing to wait for */
         uint64_t key = key_of(&chunk);
         int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;

@@ -34,9 +34,22 @@ static uint64_t code_raw_bits(ath_coder *coder, int32_t count, uint64_t value)
     return coded;
 }
 
-ATH_INLINE uint32_t code_from(ath_coder *coder, number_model *model, uint32_t least, uint32_t expected, uint32_t value)
+/* Not inlined everywhere, as in the loops of the motion: the front is short. */
+static uint32_t code_magnitude(ath_coder *coder, number_model *model, uint32_t expected, uint32_t value)
 {
-    return least + code_unsigned(coder, model, expected, value - least);
+    return code_unsigned(coder, model, expected, value);
+}
+
+static int32_t code_change(ath_coder *coder, number_model *model, uint32_t expected, int32_t value)
+{
+    uint32_t magnitude = code_magnitude(coder, model, expected, magnitude_of(value));
+    if (magnitude == 0) return 0;
+    return coder_raw_bit(coder, value < 0) ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+static uint32_t code_from(ath_coder *coder, number_model *model, uint32_t least, uint32_t expected, uint32_t value)
+{
+    return least + code_magnitude(coder, model, expected, value - least);
 }
 
 static void code_counts(ath_coder *coder, ath_header *header)
@@ -45,14 +58,14 @@ static void code_counts(ath_coder *coder, ath_header *header)
     uint64_t bits;
     number_model_init(&counts);
     header->vertex_count = code_from(coder, &counts, 1, 1 << 16, header->vertex_count);
-    uint32_t branches = header->vertex_count < MAGNITUDE_CLIP ? header->vertex_count : MAGNITUDE_CLIP;
-    header->branch_count = code_from(coder, &counts, 1, 2 * branches, header->branch_count);
+    uint32_t branches = 2 * clipped((int32_t)header->vertex_count);
+    header->branch_count = code_from(coder, &counts, 1, branches, header->branch_count);
     header->frame_count = code_from(coder, &counts, 1, 1 << 11, header->frame_count);
     header->segment_count = code_from(coder, &counts, 1, header->frame_count / 4, header->segment_count);
     header->full_level_count = (int32_t)code_from(coder, &counts, 2, 64, (uint32_t)header->full_level_count);
-    header->level_count = header->full_level_count
-                          - (int32_t)code_from(coder, &counts, 0, 0,
-                                                (uint32_t)(header->full_level_count - header->level_count));
+    header->level_count =
+        header->full_level_count
+        - (int32_t)code_from(coder, &counts, 0, 0, (uint32_t)(header->full_level_count - header->level_count));
     header->clip_count = (int32_t)code_from(coder, &counts, 1, 0, (uint32_t)header->clip_count);
     header->layer_count = (int32_t)code_from(coder, &counts, 1, 16, (uint32_t)header->layer_count);
     header->is_float64 = coder_raw_bit(coder, header->is_float64);
@@ -97,9 +110,10 @@ static void code_place(ath_coder *coder, chunk_model *model, uint32_t segment_co
     }
     int usual = coder_bit(coder, &model->usual[model->before], chunk->level == level && chunk->segment == segment);
     if (!usual) {
-        level = model->level + (int32_t)code_unsigned(coder, &model->place, 16, (uint32_t)(chunk->level - model->level));
+        level =
+            model->level + (int32_t)code_magnitude(coder, &model->place, 16, (uint32_t)(chunk->level - model->level));
         uint32_t first = level == model->level ? model->segment : 0;
-        segment = first + code_unsigned(coder, &model->place, 16, chunk->segment - first);
+        segment = first + code_magnitude(coder, &model->place, 16, chunk->segment - first);
     }
     model->level = level;
     model->segment = chunk->segment = segment;
@@ -111,7 +125,7 @@ static void code_chunk(ath_coder *coder, chunk_model *model, uint32_t segment_co
     int32_t index = code_kind(coder, model, &chunk->kind), motion = ath_is_motion(chunk);
     if (motion) code_place(coder, model, segment_count, index, chunk);
     int32_t bits = bit_length(chunk->length), usual = model->bits[index];
-    bits = ath_max(0, ath_min(usual + code_signed(coder, &model->size, 16, bits - usual), SIZE_BITS));
+    bits = ath_max(0, ath_min(usual + code_change(coder, &model->size, 16, bits - usual), SIZE_BITS));
     chunk->length = bits > 0 ? (uint32_t)code_mantissa(coder, model->size.mantissa[bits - 1], bits, chunk->length) : 0;
     model->bits[index] = bits;
     model->before = index;
@@ -132,7 +146,7 @@ static int code_errors(ath_coder *coder, error_model *model, int first_segment, 
 {
     int32_t *mean = model->mean[first_segment], change = 0;
     for (int32_t i = 0; i < ATH_MEASURES; i++) {
-        int32_t further = code_signed(coder, &model->number, (uint32_t)mean[i], errors[i] - before[i] - change);
+        int32_t further = code_change(coder, &model->number, (uint32_t)mean[i], errors[i] - before[i] - change);
         mean[i] += ((int32_t)clipped(further) * 16 - mean[i]) / 2;
         change += further;
         errors[i] = before[i] + change;

@@ -341,7 +341,7 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 def position_errors(
     positions: np.ndarray, source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL
 ) -> tuple[float, float, float]:
-    """Distance of decoded positions from the source by each of MEASURES; the second is rounded up as a file stores it."""
+    """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it."""
     vertices, _, frames = positions.shape
 
     def measured(start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
@@ -365,4 +365,3 @@ def position_errors(
     within = np.cumsum(np.sum(histograms, axis=0, dtype=np.int64))
     p99 = int(np.searchsorted(within, count - count // 100))
     return float(largest.max()), from_short_float(p99), math.sqrt(float(sum(squares)) / count)
-

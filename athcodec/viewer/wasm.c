@@ -17,4 +17,5 @@ _Static_assert(offsetof(ath_fault_info, chunk) == 8 && sizeof(ath_fault_info) ==
 _Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67 && ATH_NO_MEMORY == 68,
                "result codes");
 _Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
+_Static_assert(ATH_LARGEST == 0 && ATH_P99 == 1 && ATH_RMS == 2, "MEASURES");
 _Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2 && ATH_AS_MARKED == 3, "WRAPS");
