@@ -374,7 +374,7 @@ class AthFile:
 
     @property
     def thresholds(self) -> tuple[float, int, float, int]:
-        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted: the lengths to within 2 %,
+        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted: lengths to within 2 %,
         counts above 65,535 as that."""
         info = self.core.info
         return info.epsilon, info.eta, info.xi, info.lam

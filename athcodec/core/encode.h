@@ -99,7 +99,7 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
 
-/* Largest distance and sum of squared distances between positions and source (plus origin). histogram: null, or
+/* Largest distance and sum of squared distances between positions and source (plus origin). histogram:
  * ATH_SHORT_FLOATS counts, to which each distance is added, rounded up as in the error table. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
                                const double *source, const double origin[3], double *max_error, double *sum_squares,
