@@ -18,6 +18,10 @@ PIECE_VERTICES = 64
 SEGMENT_FRAMES = 256
 SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
+SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
+"""Of the error table: floats without sign, of which the top bits of binary32 are stored."""
+MEASURES = "max", "p99", "rms"
+"""ath_measure, in its order."""
 
 BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
 PIECE = np.dtype(
@@ -28,6 +32,21 @@ PIECE = np.dtype(
 NODE = np.dtype(
     [("whitening", "<f8", (9,))] + [(name, "<i4") for name in "branch piece first count level last coded rank".split()]
 )
+
+
+CHUNK = np.dtype(
+    [
+        ("bytes", "<u8"),
+        ("offset", "<u8"),
+        ("length", "<u4"),
+        ("checksum", "<u4"),
+        ("segment", "<u4"),
+        ("kind", "<u2"),
+        ("level", "u1"),
+        ("reserved", "u1"),
+    ]
+)
+"""ath_chunk"""
 
 
 class CorePlan(ctypes.Structure):
@@ -81,6 +100,14 @@ class Integers(ctypes.Structure):
     ]
 
 
+class Header(ctypes.Structure):
+    """ath_header."""
+
+    _fields_ = [("file_length", c_uint64), ("front_length", c_uint64), ("max_error", c_double)]
+    _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
+    _fields_ += [(name, c_int32) for name in "level_count full_level_count clip_count layer_count is_float64".split()]
+
+
 _PLAYING = {  # core/ath.h
     "ath_result_name": (c_char_p, [c_int]),
     "ath_kind_name": (c_char_p, [c_int]),
@@ -105,7 +132,7 @@ _PLAYING = {  # core/ath.h
     "ath_chunks": (c_void_p, [c_void_p]),
     "ath_check_chunk": (c_int, [c_void_p, c_int32, c_void_p]),
     "ath_errors": (c_void_p, [c_void_p]),
-    "ath_level_error": (None, [c_void_p, c_int32, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_level_error": (c_double, [c_void_p, c_int32, c_int32, c_int32, c_int]),
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_work_fault": (None, [c_void_p, c_void_p]),
     "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
@@ -127,7 +154,7 @@ _PLAYING = {  # core/ath.h
     "ath_positions": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_positions_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_int, c_void_p, c_size_t]),
     "ath_matrices_float64": (c_int, [c_void_p, c_void_p, c_int32, c_double, c_void_p, c_size_t]),
-    "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_double, c_double, c_double, c_double]),
+    "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
     "ath_crc32c": (c_uint32, [c_uint32, c_void_p, c_size_t]),
 }
 _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
@@ -162,12 +189,13 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         None,
         [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
     ),
-    "ath_error": (None, [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
+    "ath_error": (None, [c_int32, c_int32, c_int, *[c_void_p] * 6]),
     "ath_find_corrections": (
         c_int64,
         [c_int32, c_int32, c_int, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_void_p, c_int64],
     ),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
+    "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), c_void_p, c_void_p]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_encode_rest": (
         c_int64,

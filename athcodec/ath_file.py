@@ -57,8 +57,9 @@ class Level:
         Parts that the plant is made of: exact stems, and subtrees that move as one.
     bytes : int
         Size of the file cut off after this level.
-    max_error, rms_error : float
-        Largest and root-mean-square distance of the vertices from the source, in scene units.
+    max_error, p99_error, rms_error : float
+        Largest distance of the vertices from the source, the one that at most 1 % of all vertices in all frames exceed,
+        and the root mean square, in scene units; as stored, at most 3.2 % above the measured ones.
     available : bool
         Whether this level and all coarser ones are in the file, undamaged.
     """
@@ -68,6 +69,7 @@ class Level:
     nodes: int
     bytes: int
     max_error: float
+    p99_error: float
     rms_error: float
     available: bool
 
@@ -376,7 +378,8 @@ class AthFile:
 
     @property
     def thresholds(self) -> tuple[float, int, float, int]:
-        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted."""
+        """epsilon (scene units), eta, xi (scene units) and lambda by which nodes were accepted: lengths to within 2 %,
+        counts above 65,535 as that."""
         info = self.core.info
         return info.epsilon, info.eta, info.xi, info.lam
 
@@ -565,8 +568,9 @@ class AthFile:
 
     @cached_property
     def errors(self) -> np.ndarray:
-        """Largest and RMS error of each level in each segment, (levels, segments, 2) float64, scene units."""
-        return self.core.errors().astype(np.float64)
+        """Error of each level in each segment, (levels, segments, 3) float64: the largest, that of the 99th percentile,
+        the root mean square, scene units."""
+        return self.core.errors()
 
     def table1(self) -> dict[str, float]:
         """Table 1 of the paper: depth (levels of nodes), nodes, leaves and the four thresholds of the ATH."""

@@ -1,7 +1,7 @@
 """Writing an .ath file (FORMAT.md, "File"), and its static data, both ways.
 
-A file is a header, a chunk table and an error table, then the chunks in table order without gaps, so that offsets are
-never stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
+A file is its front, which says what it holds, then the chunks in table order without gaps, so that offsets are never
+stored and cannot disagree. Chunks of the prelude come first, those of the motion by (level, segment, kind),
 other attributes last. The streams inside are written by encoding/streams.py. The C core parses files; only static
 arrays and metadata, which it hands over as stored, are parsed here.
 """
@@ -20,12 +20,13 @@ from typing import Any, BinaryIO
 import numpy as np
 import zstandard
 
-from athcodec._native import crc32c
+from athcodec import _native
+from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, address, crc32c, lib
 from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 5
+MAJOR, MINOR = 0, 6
 NO_LEVEL = 255
 ONLY_TIPS = 8  # of Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
@@ -52,9 +53,10 @@ KIND_NAMES = {
     ATTRIBUTE: "ATTRIBUTE",
 }
 
-_HEADER = struct.Struct("<8sHHIQIIIIIBBBBdB7s")
-_CHUNK = struct.Struct("<HBBIII")
-_ERRORS = struct.Struct("<ff")
+_HEADER = struct.Struct("<8sHHIII")
+_CHECKSUM = struct.Struct("<I")
+_FRONT_BYTES, _FRONT_BYTES_OF_EACH = 512, 128
+"""Space for the front stream, of each chunk and each entry of the error table too: more than it ever takes."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Limits:
     hierarchy_depth : int
         Branches on each other.
     table_bytes, metadata_bytes, string_bytes, chunk_bytes, decoded_chunk_bytes : int
-        Largest sizes: of both tables, of metadata, of a name, of a chunk as stored, of a static array.
+        Largest sizes: of the front and of both tables, of metadata, of a name, of a chunk as stored, of a static array.
     memory_bytes : int
         What preparing a segment may take.
     """
@@ -89,8 +91,8 @@ class Limits:
 
 @dataclass
 class Header:
-    """The fixed header. `max_error` is the promise of the deepest stored level, in scene units; frames and segments are
-    those of all clips."""
+    """The counts at the front. `max_error` is the promise of the deepest stored level, in scene units; frames and
+    segments are those of all clips."""
 
     vertex_count: int
     branch_count: int
@@ -140,47 +142,44 @@ class Chunk:
         return f"chunk {name}{place} at byte {self.offset}"
 
 
-def _pack_header(header: Header, checksum: int) -> bytes:
-    return _HEADER.pack(
-        MAGIC,
-        MAJOR,
-        MINOR,
-        checksum,
-        header.file_length,
-        header.chunk_count,
-        header.vertex_count,
-        header.branch_count,
-        header.frame_count,
-        header.segment_count,
-        header.level_count,
-        header.full_level_count,
-        header.clip_count,
-        int(header.is_float64),
-        header.max_error,
-        header.layer_count,
-        b"",
-    )
-
-
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """Header, chunk table and error table.
+    """All in front of the chunks; the header gets their count and File_Length.
 
-    errors: (levels, segments, 2) of max and RMS error in scene units; the maximum is rounded up to float32.
+    errors: (levels, segments, 3) in scene units, of the measures in their order; they are rounded up.
     """
-    table = b"".join(_CHUNK.pack(c.kind, 0, c.level, c.segment, c.length, c.checksum) for c in chunks)
-    table += np.ascontiguousarray(_round_up(errors)).astype("<f4").tobytes()
     header.chunk_count = len(chunks)
-    header.file_length = _file_length(header, chunks)
-    checksum = crc32c(_pack_header(header, 0) + table)
-    return _pack_header(header, checksum) + table
+    stream = _front_stream(header, chunks, short_floats(errors))
+    checksums = b"".join(_CHECKSUM.pack(chunk.checksum) for chunk in chunks)
+    length = _HEADER.size + len(stream) + len(checksums)
+    header.file_length = length + sum(chunk.length for chunk in chunks)
+    blank = _HEADER.pack(MAGIC, MAJOR, MINOR, 0, length, len(chunks))
+    checksum = crc32c(blank + stream + checksums)
+    return _HEADER.pack(MAGIC, MAJOR, MINOR, checksum, length, len(chunks)) + stream + checksums
 
 
-def _tables_size(header: Header, chunk_count: int) -> int:
-    return chunk_count * _CHUNK.size + header.level_count * header.segment_count * _ERRORS.size
+def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
+    """FORMAT.md, "Front stream"."""
+    names = (name for name, _ in _native.Header._fields_ if name != "front_length")
+    counts = _native.Header(**{name: getattr(header, name) for name in names})
+    table = np.zeros(len(chunks), _native.CHUNK)
+    for name in ("length", "segment", "kind", "level"):
+        table[name] = [getattr(chunk, name) for chunk in chunks]
+    data = np.empty(_FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES)), np.uint8)
+    announced = address(errors, np.int32, header.level_count * header.segment_count * len(MEASURES))
+    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced)
+    assert size >= 0, "every front has a stream, and space enough"
+    return data[:size].tobytes()
 
 
-def _file_length(header: Header, chunks: list[Chunk]) -> int:
-    return _HEADER.size + _tables_size(header, len(chunks)) + sum(chunk.length for chunk in chunks)
+def short_floats(lengths: np.ndarray) -> np.ndarray:
+    """What the error table stores of lengths, int32: the top bits of binary32, rounded up."""
+    bits = np.ascontiguousarray(_round_up(lengths), np.float32).view(np.uint32)
+    return np.minimum(bits + (1 << SHORT_SHIFT) - 1 >> SHORT_SHIFT, SHORT_FLOATS - 1).astype(np.int32)
+
+
+def from_short_float(stored: int) -> float:
+    """The length of which the error table stores this, scene units."""
+    return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
 
 
 def _round_up(values: np.ndarray) -> np.ndarray:
@@ -212,9 +211,10 @@ class ChunkStore:
         self.entries = [(chunk, place) for chunk, place in self.entries if chunk.kind != kind]
         self.add(kind, payload)
 
-    def size(self, header: Header) -> int:
+    def size(self, header: Header, errors: np.ndarray) -> int:
         """Bytes of the whole file."""
-        return _file_length(header, [chunk for chunk, _ in self.entries])
+        pack_front(header, sorted((chunk for chunk, _ in self.entries), key=_order), errors)
+        return header.file_length
 
     def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
         """Writes the whole file in its order and returns its chunks."""
@@ -230,17 +230,18 @@ class ChunkStore:
 
 # ---- heads of the chunks ----------------------------------------------------------------------------------------
 
-_HIERARCHY = struct.Struct("<ffII")
-_REST = struct.Struct("<BBH3dd")
+_HIERARCHY = struct.Struct("<HHHH")
+_REST = struct.Struct("<B3ff")
 _TIME = struct.Struct("<B")
 _STEADY = struct.Struct("<dd")
+_RATE = struct.Struct("<H")
 _CLIP = struct.Struct("<IIBB")
 _STEMS = struct.Struct("<fBB")
 _BASIS = struct.Struct("<HBI")
 _CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
-_REFINED_REST = struct.Struct("<d")
+_REFINED_REST = struct.Struct("<f")
 _ARRAY = struct.Struct("<H")
 
 
@@ -251,15 +252,18 @@ def brief(value: object) -> str:
 
 
 def pack_hierarchy(thresholds, stream: bytes) -> bytes:
-    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam)."""
+    """thresholds: ath.Thresholds or (epsilon, eta, xi, lam); lengths are rounded, counts beyond 65535 are that."""
     epsilon, eta, xi, lam = thresholds
-    clip = float(np.finfo(np.float32).max)
-    return _HIERARCHY.pack(min(epsilon, clip), min(xi, clip), int(eta), int(lam)) + stream
+    most = from_short_float(SHORT_FLOATS - 1)
+    lengths = np.minimum([epsilon, xi], most).astype(np.float32).view(np.uint32)
+    nearest = np.minimum(lengths + (1 << SHORT_SHIFT - 1) >> SHORT_SHIFT, SHORT_FLOATS - 1)
+    return _HIERARCHY.pack(*nearest, *(min(int(count), 65535) for count in (eta, lam))) + stream
 
 
 @dataclass
 class Rest:
-    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps."""
+    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps. Origin and
+    step are numbers of float32."""
 
     origin: np.ndarray
     step: float
@@ -270,17 +274,27 @@ class Rest:
 
 def pack_rest(rest: Rest) -> bytes:
     is_float64 = rest.source_dtype == np.float64
-    return _REST.pack(int(rest.exact), int(is_float64), 0, *rest.origin, rest.step) + rest.stream
+    return _REST.pack(int(rest.exact) | int(is_float64) << 1, *rest.origin, rest.step) + rest.stream
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:
     """TIME by the rule that gives the very same times in seconds, (T,) float64 for each clip; None where none does."""
-    for method in (0, 1):
-        steps = [_steady_step(method, time) for time in times]
-        if None not in steps:
-            pairs = (_STEADY.pack(float(time[0]), step) for time, step in zip(times, steps))
-            return _TIME.pack(method) + b"".join(pairs)
+    for method, code in ((3, _RATE), (4, _RATE), (0, _STEADY), (1, _STEADY)):
+        rules = [_steady_rule(method, time) for time in times]
+        if None not in rules:
+            return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
     return None
+
+
+def _steady_rule(method: int, time: np.ndarray) -> tuple[float, ...] | None:
+    """What the method stores of the times, if they are these."""
+    if method < 2:
+        step = _steady_step(method, time)
+        return None if step is None else (float(time[0]), step)
+    rate = round(1 / float(time[1])) if len(time) > 1 and float(time[1]) > 1e-5 else 1
+    index = np.arange(len(time))
+    same = 0 < rate < 65536 and ((index / rate if method == 3 else index * (1 / rate)) == time).all()
+    return (rate,) if same else None
 
 
 def _steady_step(method: int, time: np.ndarray) -> float | None:

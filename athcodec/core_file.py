@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from athcodec import container
-from athcodec._native import BRANCH, as_bytes, lib
+from athcodec._native import BRANCH, CHUNK, MEASURES, as_bytes, lib
 
 ALIGNMENT = 16
 MOST_STEPS = 2**31 - 1
@@ -39,19 +39,6 @@ OK, HELD, MISSING = 0, 65, 66
 FILE_ORDER, SOURCE_ORDER = 0, 1
 
 PART = np.dtype([(name, "<i4") for name in ("first", "count", "branch", "index")])
-CHUNK = np.dtype(
-    [
-        ("bytes", "<u8"),
-        ("offset", "<u8"),
-        ("length", "<u4"),
-        ("checksum", "<u4"),
-        ("segment", "<u4"),
-        ("kind", "<u2"),
-        ("level", "u1"),
-        ("reserved", "u1"),
-    ]
-)
-"""ath_chunk"""
 
 
 class Limits(Structure):
@@ -293,15 +280,17 @@ class File:
             self.drop(offset, len(there))
 
     def errors(self) -> np.ndarray:
-        """(levels, segments, 2) float32: largest and RMS error of each level in each segment, scene units."""
-        shape = self.info.level_count, self.info.segment_count, 2
-        return self._array(lib.ath_errors(self._file), "<f4", math.prod(shape)).reshape(shape)
+        """(levels, segments, 3) float64: the error of each level in each segment by each of MEASURES, scene units."""
+        shape = self.info.level_count, self.info.segment_count, len(MEASURES)
+        return self._array(lib.ath_errors(self._file), "<f8", math.prod(shape)).reshape(shape)
 
-    def level_error(self, level: int, segments: range) -> tuple[float, float]:
-        """Largest and RMS error of a level in these segments, scene units."""
-        largest, rms = c_double(), c_double()
-        lib.ath_level_error(self._file, level, segments[0], segments[-1], byref(largest), byref(rms))
-        return largest.value, rms.value
+    def level_error(self, level: int, segments: range) -> tuple[float, float, float]:
+        """Error of a level in these segments by each of MEASURES, scene units."""
+        largest, p99, rms = (
+            lib.ath_level_error(self._file, level, segments[0], segments[-1], measure)
+            for measure in range(len(MEASURES))
+        )
+        return largest, p99, rms
 
     def level_name(self, level: int) -> str:
         """What a level is, for people."""
@@ -395,6 +384,11 @@ class File:
         )
         return out
 
-    def level_for(self, segments: range, distance: float, fov: float, height: float, pixels: float) -> int:
+    def level_for(
+        self, segments: range, measure: str, distance: float, fov: float, height: float, pixels: float
+    ) -> int:
         """The coarsest level whose error in these segments, seen from afar, is at most `pixels`."""
-        return lib.ath_level_for(self._file, segments[0], segments[-1], distance, fov, height, pixels)
+        if measure not in MEASURES:
+            raise ValueError(f"measure: got {measure!r}; expected one of {', '.join(MEASURES)}")
+        number = MEASURES.index(measure)
+        return lib.ath_level_for(self._file, segments[0], segments[-1], number, distance, fov, height, pixels)

@@ -241,7 +241,7 @@ class Decoder:
         """The stored levels, coarse to fine, with their errors in this clip."""
         return self.file.levels_in(self.clip.segments)
 
-    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0) -> int:
+    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
         """The level to show from afar.
 
         Parameters
@@ -254,13 +254,15 @@ class Decoder:
             Of the screen, pixels.
         pixels : float
             By how much vertices may be off on the screen.
+        measure : {"max", "p99", "rms"}
+            Of the errors of all vertices: with "p99" at most 1 % of them may be off by more.
 
         Returns
         -------
         int
-            The coarsest stored level whose largest error is at most that; the deepest where none is.
+            The coarsest stored level whose error is at most that; the deepest where none is.
         """
-        return self.file.core.level_for(self.clip.segments, distance, fov, height, pixels)
+        return self.file.core.level_for(self.clip.segments, measure, distance, fov, height, pixels)
 
     def level_within(self, max_error: float) -> int:
         """The level to use where vertices may be off by no more than a length.

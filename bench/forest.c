@@ -114,8 +114,7 @@ static void note_levels(clip *clip)
 {
     double pixels_per_unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* from a distance of 1 */
     for (int32_t level = 0; level < clip->info.level_count; level++) {
-        double error;
-        ath_level_error(clip->file, level, 0, clip->info.segment_count - 1, &error, 0);
+        double error = ath_level_error(clip->file, level, 0, clip->info.segment_count - 1, ATH_LARGEST);
         clip->from[level] = error * pixels_per_unit / PIXELS;
         ath_cut_size(clip->file, level, 0, clip->nodes + level, clip->vertices + level);
         int32_t refinements = level < clip->info.depth_levels ? 0 : level + 1 - clip->info.depth_levels;

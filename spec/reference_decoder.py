@@ -89,12 +89,12 @@ def crc32c(data: bytes) -> int:
     return crc ^ 0xFFFFFFFF
 
 
-# ---- the front: header, chunk table, error table -----------------------------------------------------------
+# ---- the front: header and chunks ----------------------------------------------------------------------
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-VERSION = (0, 5)
-HEADER_BYTES, ENTRY_BYTES, ERROR_BYTES = 64, 16, 8
-SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, NO_LEVEL = 256, 32, 8, 255
+VERSION = (0, 6)
+HEADER_BYTES, CHECKSUM_BYTES, TABLE_BYTES_OF_EACH = 24, 4, 16
+SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255, 255
 
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
@@ -121,27 +121,18 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Header:
-    checksum: int
-    file_length: int
+    front_length: int
     chunk_count: int
     vertex_count: int
     branch_count: int
     frame_count: int
     segment_count: int
-    level_count: int
     full_level_count: int
+    level_count: int
     clip_count: int
+    layer_count: int
     is_float64: bool
     max_error: float
-    layer_count: int
-
-    @property
-    def error_table_at(self) -> int:
-        return HEADER_BYTES + ENTRY_BYTES * self.chunk_count
-
-    @property
-    def chunks_at(self) -> int:
-        return self.error_table_at + ERROR_BYTES * self.level_count * self.segment_count
 
 
 @dataclass(frozen=True)
@@ -172,89 +163,6 @@ class Chunk:
     def __str__(self) -> str:
         name = KINDS.get(self.kind, f"kind {self.kind:#06x}")
         return f"{name} of level {self.level}, segment {self.segment}" if self.is_motion else name
-
-
-def read_header(data: bytes, limits: Limits) -> Header:
-    require(
-        len(data) > 0 and data[:8] == MAGIC[: len(data)],
-        "Magic is not that of a file in this format",
-        "NOT_AN_ATH_FILE",
-    )
-    if len(data) >= 12:
-        version = u16(data, 8), u16(data, 10)
-        require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
-    require(len(data) >= HEADER_BYTES, "ends inside its header", "TRUNCATED")
-    header = Header(
-        u32(data, 12),
-        u64(data, 16),
-        u32(data, 24),
-        u32(data, 28),
-        u32(data, 32),
-        u32(data, 36),
-        u32(data, 40),
-        data[44],
-        data[45],
-        data[46],
-        bool(data[47] & 1),
-        f64(data, 48),
-        data[56],
-    )
-    for name, count, most in (
-        ("Vertex_Count", header.vertex_count, limits.vertices),
-        ("Branch_Count", header.branch_count, limits.branches),
-        ("Frame_Count", header.frame_count, limits.frames),
-        ("Segment_Count", header.segment_count, limits.frames),
-        ("Chunk_Count", header.chunk_count, limits.chunks),
-    ):
-        require(count > 0, f"{name} is 0", "BAD_HEADER")
-        require(count <= most, f"{name} is {count}, more than {most}", "LIMIT_EXCEEDED")
-    for name, valid in (
-        ("Branch_Count", header.branch_count <= header.vertex_count),
-        ("Segment_Count", header.segment_count <= header.frame_count),
-        ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
-        ("Full_Level_Count", 2 <= header.full_level_count <= MOST_LEVELS),
-        ("Level_Count", 1 <= header.level_count <= header.full_level_count),
-        ("Clip_Count", header.clip_count > 0),
-        ("Flags", data[47] < 2),
-        ("Max_Error", finite(header.max_error) and header.max_error >= 0.0),
-        ("Layer_Count", 1 <= header.layer_count <= MOST_LAYERS),
-        ("Reserved", u64(data, 56) >> 8 == 0),
-    ):
-        require(valid, f"{name} is out of range", "BAD_HEADER")
-    return header
-
-
-def check_tables(data: bytes, header: Header, limits: Limits) -> None:
-    require(header.chunks_at - HEADER_BYTES <= limits.table_bytes, "tables are too long", "LIMIT_EXCEEDED")
-    require(len(data) >= header.chunks_at, "ends inside its tables", "TRUNCATED")
-    front = data[:12] + bytes(4) + data[16 : header.chunks_at]
-    require(crc32c(front) == header.checksum, "header and tables are damaged", "BAD_CHECKSUM")
-    for at in range(header.error_table_at, header.chunks_at, 4):
-        require(finite(f32(data, at)) and f32(data, at) >= 0.0, "an announced error is no length", "BAD_CHUNK_TABLE")
-
-
-def read_chunk_table(data: bytes, header: Header, limits: Limits) -> list[Chunk]:
-    chunks, offset = [], header.chunks_at
-    for at in range(HEADER_BYTES, header.error_table_at, ENTRY_BYTES):
-        chunk = Chunk(u16(data, at), data[at + 3], u32(data, at + 4), u32(data, at + 8), u32(data, at + 12), offset)
-        check_kind(chunk.kind)
-        require(chunk.length <= limits.chunk_bytes, f"{chunk} is too long", "LIMIT_EXCEEDED")
-        level_fits = chunk.level < header.level_count if chunk.is_motion else chunk.level == NO_LEVEL
-        segment_fits = chunk.segment < (header.segment_count if chunk.is_motion else 1)
-        require(
-            data[at + 2] == 0 and level_fits and segment_fits, f"{chunk}: its place does not exist", "BAD_CHUNK_TABLE"
-        )
-        if chunks:
-            before = chunks[-1]
-            require(
-                before.key < chunk.key or (before.key == chunk.key and chunk.repeatable),
-                f"{chunk} may not follow {before}",
-                "BAD_CHUNK_TABLE",
-            )
-        chunks.append(chunk)
-        offset += chunk.length
-    require(offset == header.file_length, "File_Length is not the end of the last chunk", "BAD_CHUNK_TABLE")
-    return chunks
 
 
 def check_kind(kind: int) -> None:
@@ -387,10 +295,14 @@ class RangeDecoder:
     def raw_bit(self) -> int:
         return self.narrow(self.range >> 1)
 
+    def is_finished(self) -> bool:
+        """Nothing may be left over, nor a byte that could have been left out."""
+        canonical = not self.stream or self.stream[-1] != 0
+        return canonical and self.at >= len(self.stream) and self.code < self.range
+
     def finish(self) -> None:
-        """Everything is decoded: nothing may be left over, nor a byte that could have been left out."""
-        require(not self.stream or self.stream[-1] != 0, "a stream ends in a zero byte")
-        require(self.at >= len(self.stream) and self.code < self.range, "a stream is not used up where it should be")
+        """Everything is decoded."""
+        require(self.is_finished(), "a stream is not used up where it should be, or ends in a zero byte")
 
 
 # ---- numbers -----------------------------------------------------------------------------------------------
@@ -472,6 +384,209 @@ def clipped(value: int) -> int:
 
 def divide_to_zero(a: int, b: int) -> int:
     return a // b if a >= 0 else -(-a // b)
+
+
+# ---- front stream ------------------------------------------------------------------------------------------
+
+OTHER = len(KINDS)  # any kind but those
+SHORT_FLOATS, MEASURES = 8160, 3
+KIND_LIST = list(KINDS)
+
+
+def short_float(stored: int) -> float:
+    return from_bits(stored << 18, 32)
+
+
+def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list]:
+    """Counts, chunk table, and [level][segment] (largest, 99th percentile, root mean square) errors."""
+    check_magic(data)
+    front_length, chunk_count = check_lengths(data, limits)
+    checksums_at = front_length - CHECKSUM_BYTES * chunk_count
+    checksums = [u32(data, checksums_at + CHECKSUM_BYTES * i) for i in range(chunk_count)]
+    return decode_front(data[HEADER_BYTES:checksums_at], front_length, checksums, limits)
+
+
+def decode_front(
+    stream: bytes, front_length: int, checksums: list[int], limits: Limits
+) -> tuple[Header, list[Chunk], list]:
+    coder = RangeDecoder(stream)
+    header = decode_counts(coder, front_length, len(checksums))
+    check_counts(header, limits)
+    chunks = decode_chunk_table(coder, header, checksums, limits)
+    errors = decode_error_table(coder, header)
+    require(coder.is_finished(), "the front stream is not used up where it should be", "BAD_CHUNK_TABLE")
+    return header, chunks, errors
+
+
+def check_magic(data: bytes) -> None:
+    require(
+        len(data) > 0 and data[:8] == MAGIC[: len(data)],
+        "Magic is not that of a file in this format",
+        "NOT_AN_ATH_FILE",
+    )
+    if len(data) >= 12:
+        version = u16(data, 8), u16(data, 10)
+        require(version == VERSION, f"version {version} is not known", "UNSUPPORTED_VERSION")
+
+
+def check_lengths(data: bytes, limits: Limits) -> tuple[int, int]:
+    """Front_Length and Chunk_Count; all of the front is there and undamaged."""
+    require(len(data) >= HEADER_BYTES, "ends inside its header", "TRUNCATED")
+    length, chunks = u32(data, 16), u32(data, 20)
+    require(chunks > 0, "Chunk_Count is 0", "BAD_HEADER")
+    require(chunks <= limits.chunks, f"Chunk_Count is {chunks}, more than {limits.chunks}", "LIMIT_EXCEEDED")
+    require(length <= limits.table_bytes, "Front_Length is too large", "LIMIT_EXCEEDED")
+    require(length >= HEADER_BYTES + CHECKSUM_BYTES * chunks, "Front_Length is too small", "BAD_HEADER")
+    require(len(data) >= length, "ends inside its front", "TRUNCATED")
+    require(crc32c(data[:12] + bytes(4) + data[16:length]) == u32(data, 12), "the front is damaged", "BAD_CHECKSUM")
+    return length, chunks
+
+
+def raw_bits(coder: RangeDecoder, count: int) -> int:
+    value = 0
+    for _ in range(count):
+        value = value << 1 | coder.raw_bit()
+    return value
+
+
+def decode_counts(coder: RangeDecoder, front_length: int, chunk_count: int) -> Header:
+    model = NumberModel()
+    vertices = 1 + code_unsigned(coder, model, 1 << 16)
+    branches = 1 + code_unsigned(coder, model, 2 * clipped(vertices))
+    frames = 1 + code_unsigned(coder, model, 1 << 11)
+    segments = 1 + code_unsigned(coder, model, frames // 4)
+    full_levels = 2 + code_unsigned(coder, model, 64)
+    levels = full_levels - code_unsigned(coder, model, 0)
+    clips = 1 + code_unsigned(coder, model, 0)
+    layers = 1 + code_unsigned(coder, model, 16)
+    is_float64 = bool(coder.raw_bit())
+    max_error = from_bits(raw_bits(coder, 63), 64)
+    return Header(
+        front_length,
+        chunk_count,
+        vertices,
+        branches,
+        frames,
+        segments,
+        full_levels,
+        levels,
+        clips,
+        layers,
+        is_float64,
+        max_error,
+    )
+
+
+def check_counts(header: Header, limits: Limits) -> None:
+    for name, count, most in (
+        ("Vertex_Count", header.vertex_count, limits.vertices),
+        ("Branch_Count", header.branch_count, limits.branches),
+        ("Frame_Count", header.frame_count, limits.frames),
+        ("Segment_Count", header.segment_count, limits.frames),
+    ):
+        require(count <= most, f"{name} is {count}, more than {most}", "LIMIT_EXCEEDED")
+    for name, valid in (
+        ("Branch_Count", header.branch_count <= header.vertex_count),
+        ("Segment_Count", header.segment_count <= header.frame_count),
+        ("Frame_Count", header.frame_count <= SEGMENT_FRAMES * header.segment_count),
+        ("Full_Level_Count", header.full_level_count <= MOST_LEVELS),
+        ("Level_Count", header.level_count >= 1),
+        ("Clip_Count", header.clip_count <= MOST_CLIPS),
+        ("Layer_Count", header.layer_count <= MOST_LAYERS),
+        ("Max_Error", finite(header.max_error)),
+    ):
+        require(valid, f"{name} is out of range", "BAD_HEADER")
+    size = TABLE_BYTES_OF_EACH * (header.chunk_count + header.level_count * header.segment_count)
+    require(size <= limits.table_bytes, "tables are too long", "LIMIT_EXCEEDED")
+
+
+class ChunkModel:
+    """Contexts of the chunk table, and what is remembered of the chunk before."""
+
+    def __init__(self):
+        self.kinds = [[Context(32768) for _ in range(16)] for _ in range(OTHER + 1)]
+        self.usual = [Context(60000) for _ in range(OTHER + 1)]
+        self.places, self.sizes = NumberModel(), NumberModel()
+        self.bits = [8] * (OTHER + 1)
+        self.before, self.was_motion, self.place = OTHER, False, (0, 0)
+
+    def code_kind(self, coder: RangeDecoder) -> tuple[int, int]:
+        """Its number in the list, and the Kind."""
+        node = 1
+        while node < 16:
+            node = node << 1 | coder.bit(self.kinds[self.before][node])
+        index = min(node - 16, OTHER)
+        return index, KIND_LIST[index] if index < OTHER else raw_bits(coder, 16)
+
+    def code_place(self, coder: RangeDecoder, index: int, segment_count: int) -> None:
+        level, segment = self.place
+        if self.was_motion and index <= self.before:
+            usual = (level, segment + 1) if segment + 1 < segment_count else (level + 1, 0)
+        else:
+            usual = self.place
+        if coder.bit(self.usual[self.before]):
+            self.place = usual
+        else:
+            up = code_unsigned(coder, self.places, 16)
+            self.place = level + up, code_unsigned(coder, self.places, 16) + (0 if up else segment)
+
+    def code_length(self, coder: RangeDecoder, index: int) -> int:
+        self.bits[index] = max(0, min(self.bits[index] + code_signed(coder, self.sizes, 16), LONGEST))
+        return code_mantissa(coder, self.sizes.mantissa, self.bits[index]) if self.bits[index] else 0
+
+
+def decode_chunk_table(coder: RangeDecoder, header: Header, checksums: list[int], limits: Limits) -> list[Chunk]:
+    model, chunks, offset = ChunkModel(), [], header.front_length
+    for checksum in checksums:
+        index, kind = model.code_kind(coder)
+        motion = 16 <= kind & ~OPTIONAL < 32
+        if motion:
+            model.code_place(coder, index, header.segment_count)
+        length = model.code_length(coder, index)
+        model.before, model.was_motion = index, motion
+        level, segment = model.place if motion else (NO_LEVEL, 0)
+        chunk = Chunk(kind, level, segment, length, checksum, offset)
+        check_chunk(chunk, chunks[-1] if chunks else None, header, limits)
+        chunks.append(chunk)
+        offset += length
+    return chunks
+
+
+def check_chunk(chunk: Chunk, before: Chunk | None, header: Header, limits: Limits) -> None:
+    check_kind(chunk.kind)
+    require(chunk.length <= limits.chunk_bytes, f"{chunk} is too long", "LIMIT_EXCEEDED")
+    if chunk.is_motion:
+        fits = chunk.level < header.level_count and chunk.segment < header.segment_count
+        require(fits, f"{chunk}: its place does not exist", "BAD_CHUNK_TABLE")
+    if before:
+        in_order = before.key < chunk.key or (before.key == chunk.key and chunk.repeatable)
+        require(in_order, f"{chunk} may not follow {before}", "BAD_CHUNK_TABLE")
+
+
+def decode_error_table(coder: RangeDecoder, header: Header) -> list:
+    with np.errstate(over="ignore"):  # an infinity is more than any short float
+        first = min(to_bits(single(header.max_error), 32) >> 18, SHORT_FLOATS - 1)
+    model, means, above, table = NumberModel(), [[64] * MEASURES, [1024] * MEASURES], [first] * MEASURES, []
+    for _ in range(header.level_count):
+        row: list[list[int]] = []
+        for segment in range(header.segment_count):
+            before, mean = (row[-1], means[0]) if segment else (above, means[1])
+            row.append(decode_errors(coder, model, before, mean))
+        table.append([tuple(map(short_float, entry)) for entry in row])
+        above = row[0]
+    table[-1] = [tuple(min(error, header.max_error) for error in entry) for entry in table[-1]]
+    return table
+
+
+def decode_errors(coder: RangeDecoder, model: NumberModel, before: list[int], mean: list[int]) -> list[int]:
+    entry, change = [], 0
+    for i in range(MEASURES):
+        more = code_signed(coder, model, mean[i])
+        mean[i] += divide_to_zero(clipped(more) * 16 - mean[i], 2)
+        change += more
+        require(0 <= before[i] + change < SHORT_FLOATS, "an announced error is no short float", "BAD_CHUNK_TABLE")
+        entry.append(before[i] + change)
+    return entry
 
 
 # ---- hierarchy stream --------------------------------------------------------------------------------------
@@ -764,7 +879,7 @@ def decode_times(stream: bytes, frame_count: int) -> list[float]:
 
 def frame_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
     """TIME: seconds of every frame of every clip."""
-    require(len(chunk) > 0 and chunk[0] <= 2, "TIME has an unknown Method")
+    require(len(chunk) > 0 and chunk[0] <= 4, "TIME has an unknown Method")
     times = uneven_times(chunk, clips) if chunk[0] == 2 else steady_times(chunk, clips)
     for own in times:
         ascending = all(a < b for a, b in zip(own, own[1:]))
@@ -778,12 +893,19 @@ def uneven_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
 
 
 def steady_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
-    require(len(chunk) == 1 + 16 * len(clips), "TIME has not First and Step of every clip alone")
+    method = chunk[0]
+    require(len(chunk) == 1 + (16 if method < 2 else 2) * len(clips), "TIME has not the steps of every clip alone")
     times = []
     for c, clip in enumerate(clips):
-        first, step = f64(chunk, 1 + 16 * c), f64(chunk, 9 + 16 * c)
-        require(finite(step) and step > 0.0, "Step of TIME is not above 0")
-        times.append([first + (float(i) / step if chunk[0] else float(i) * step) for i in range(clip.frames)])
+        if method < 2:
+            first, step = f64(chunk, 1 + 16 * c), f64(chunk, 9 + 16 * c)
+            require(finite(step) and step > 0.0, "Step of TIME is not above 0")
+        else:
+            first, rate = 0.0, u16(chunk, 1 + 2 * c)
+            require(rate > 0, "Rate of TIME is 0")
+            step = float(rate) if method == 3 else 1.0 / rate
+        divided = method in (1, 3)
+        times.append([first + (float(i) / step if divided else float(i) * step) for i in range(clip.frames)])
     return times
 
 
@@ -2158,9 +2280,8 @@ class AthFile:
 
     def __init__(self, data: bytes, strict: bool = False, limits: Limits | None = None):
         self.data, self.limits = bytes(data), limits or Limits()
-        self.header = read_header(self.data, self.limits)
-        check_tables(self.data, self.header, self.limits)
-        self.chunks = read_chunk_table(self.data, self.header, self.limits)
+        self.header, self.chunks, self.errors = read_front(self.data, self.limits)
+        self.file_length = self.chunks[-1].offset + self.chunks[-1].length
         self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
         self._check_length(strict)
         self._check_memory(-(-self.header.frame_count // self.header.segment_count))
@@ -2175,10 +2296,10 @@ class AthFile:
 
     def _check_length(self, strict: bool) -> None:
         behind = [c.offset for c in self.chunks if c.key[0] > 0]
-        require(len(self.data) >= min(behind, default=self.header.file_length), "ends inside its prelude", "TRUNCATED")
+        require(len(self.data) >= min(behind, default=self.file_length), "ends inside its prelude", "TRUNCATED")
         if strict:
-            require(len(self.data) >= self.header.file_length, "is shorter than File_Length", "TRUNCATED")
-            require(len(self.data) <= self.header.file_length, "is longer than File_Length", "TRAILING_BYTES")
+            require(len(self.data) >= self.file_length, "is shorter than File_Length", "TRUNCATED")
+            require(len(self.data) <= self.file_length, "is longer than File_Length", "TRAILING_BYTES")
 
     def _check_memory(self, segment_frames: int) -> None:
         require(
@@ -2212,11 +2333,11 @@ class AthFile:
         return read_clips(self.content(CLIPS), self.header)
 
     def _read_hierarchy(self, chunk: bytes) -> None:
-        require(len(chunk) >= 16, "HIERARCHY is too short")
-        for name, at in (("Epsilon", 0), ("Xi", 4)):
-            require(finite(f32(chunk, at)) and f32(chunk, at) >= 0.0, f"{name} is not finite and 0 or more")
+        require(len(chunk) >= 8, "HIERARCHY is too short")
+        for name, at in (("Epsilon", 0), ("Xi", 2)):
+            require(u16(chunk, at) < SHORT_FLOATS, f"{name} is no short float")
         self.branches, self.branch_source, self.vertex_source = decode_hierarchy(
-            chunk[16:], self.header.branch_count, self.header.vertex_count
+            chunk[8:], self.header.branch_count, self.header.vertex_count
         )
         deepest = max(branch.depth for branch in self.branches)
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
@@ -2246,22 +2367,21 @@ class AthFile:
         )
 
     def _read_rest(self, chunk: bytes) -> None:
-        require(len(chunk) >= 36, "REST is too short")
-        require(chunk[0] <= 1 and chunk[1] <= 1 and u16(chunk, 2) == 0, "Method, Rest_Type or Reserved is out of range")
-        self.origin = np.array([f64(chunk, 4 + 8 * k) for k in range(3)])
-        step = f64(chunk, 28)
+        require(len(chunk) >= 17, "REST is too short")
+        require(chunk[0] <= 3, "Method has reserved bits")
+        self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
+        step = f32(chunk, 13)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
-        self.rest_type = np.dtype("<f8" if chunk[1] else "<f4")
+        self.rest_type = np.dtype("<f8" if chunk[0] & 2 else "<f4")
         self._rests: list[RestLayer] = []  # of the layers that refine it; none where it is exact
-        if chunk[0] == 0:
-            coded = decode_rest(chunk[36:], self.branches, step)
+        if chunk[0] & 1 == 0:
+            coded = decode_rest(chunk[17:], self.branches, step)
             self._rests = [coded]
             rest = np.array(coded.rest)
             shown = rest + self.origin
         else:
-            shown = np.array(decode_exact_rest(chunk[36:], self.branches, bool(chunk[1])))
+            shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & 2)))
             rest = shown - self.origin
-        require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
         self.plan.rest = rest
         self._plans = [self.plan]
         self._shown_rest = shown.astype(self.rest_type)
@@ -2289,11 +2409,10 @@ class AthFile:
         return self._plans[q]
 
     def _refined_rest(self, chunk: bytes) -> np.ndarray:
-        require(len(chunk) >= 8 and finite(f64(chunk, 0)) and f64(chunk, 0) > 0.0, "Rest_Step is out of range")
+        require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Rest_Step is out of range")
         require(self._rests != [], "a rest pose that is exact is refined")
-        self._rests.append(decode_rest(chunk[8:], self.branches, f64(chunk, 0), self._rests[-1]))
+        self._rests.append(decode_rest(chunk[4:], self.branches, f32(chunk, 0), self._rests[-1]))
         rest = np.array(self._rests[-1].rest)
-        require(bool(np.isfinite(rest).all()), "the rest pose is not finite")
         return rest
 
     def rest(self, level: int = 0) -> np.ndarray:

@@ -80,8 +80,9 @@ class ScriptedCoder(rd.RangeDecoder):
             self.low, self.range, self.length = self.low << 32, self.range << 32, self.length + 4
         return bit
 
-    def finish(self) -> None:
+    def is_finished(self) -> bool:
         assert not self.decisions and not self.script.values, "the script has more values than the stream reads"
+        return True
 
     def stream(self) -> bytes:
         """A number of the interval with as many trailing zeros as possible; these are left out."""
@@ -174,34 +175,89 @@ def write(function: Callable, script: Script | list, *arguments) -> bytes:
 
 # ---- files in pieces ---------------------------------------------------------------------------------------
 
-HEADER = struct.Struct("<8sHHIQIIIIIBBBBdB7s")
-HEADER_FIELDS = (
-    "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-    "segment_count level_count full_level_count clip_count flags max_error layer_count reserved"
-).split()
-ENTRY = struct.Struct("<HBBIII")
+HEADER = struct.Struct("<8sHHIII")
+HEADER_FIELDS = "magic major minor checksum front_length chunk_count".split()
+MOST_ENTRIES = 4096  # of an error table that is written
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A chunk and its entry in the table; None: the true value."""
+    """A chunk and what the front says of it; None: the true value."""
 
     kind: int
     content: bytes
     level: int = rd.NO_LEVEL
     segment: int = 0
-    reserved: int = 0
     length: int | None = None
     checksum: int | None = None
+    spelt: bool = False  # the Kind by all its bits, although it has a number
+
+    @property
+    def chunk(self) -> rd.Chunk:
+        length = len(self.content) if self.length is None else self.length
+        checksum = crc32c(self.content) if self.checksum is None else self.checksum
+        return rd.Chunk(self.kind, self.level, self.segment, length, checksum, 0)
 
     @property
     def key(self) -> tuple:
-        return rd.Chunk(self.kind, self.level, self.segment, 0, 0, 0).key
+        return self.chunk.key
 
-    def packed(self) -> bytes:
-        length = len(self.content) if self.length is None else self.length
-        checksum = crc32c(self.content) if self.checksum is None else self.checksum
-        return ENTRY.pack(self.kind, self.reserved, self.level, self.segment, length, checksum)
+
+class FrontScript:
+    """Values of the front stream. It follows the contexts of the chunk table as far as they decide what is read."""
+
+    def __init__(self, counts: dict):
+        self.counts = counts
+        self.values = [
+            counts["vertex_count"] - 1,
+            counts["branch_count"] - 1,
+            counts["frame_count"] - 1,
+            counts["segment_count"] - 1,
+            counts["full_level_count"] - 2,
+            counts["full_level_count"] - counts["level_count"],
+            counts["clip_count"] - 1,
+            counts["layer_count"] - 1,
+            int(counts["is_float64"]),
+            *_bits(rd.to_bits(counts["max_error"], 64), 63),
+        ]
+        self.bits, self.before, self.was_motion, self.place = [8] * (rd.OTHER + 1), rd.OTHER, False, (0, 0)
+
+    def add_chunk(self, entry: Entry) -> None:
+        known = entry.kind in rd.KINDS and not entry.spelt
+        index = rd.KIND_LIST.index(entry.kind) if known else rd.OTHER
+        self.values += _bits(index, 4) + ([] if known else _bits(entry.kind, 16))
+        if entry.chunk.is_motion:
+            self._add_place(index, (entry.level, entry.segment))
+        length = entry.chunk.length
+        size = length.bit_length()
+        self.values += [size - self.bits[index], *_bits(length, size)[1:]]
+        self.bits[index], self.before, self.was_motion = size, index, entry.chunk.is_motion
+
+    def _add_place(self, index: int, place: tuple[int, int]) -> None:
+        level, segment = usual = self.place
+        if self.was_motion and index <= self.before:
+            usual = (level, segment + 1) if segment + 1 < self.counts["segment_count"] else (level + 1, 0)
+        up = place[0] - level
+        self.values += [1] if place == usual else [0, up, place[1] - (0 if up else segment)]
+        self.place = place
+
+    def add_errors(self, errors: Sequence[int]) -> None:
+        """Stored numbers, three of each level and segment."""
+        with np.errstate(over="ignore"):
+            first = min(rd.to_bits(rd.single(self.counts["max_error"]), 32) >> 18, rd.SHORT_FLOATS - 1)
+        row, above = 3 * self.counts["segment_count"], [first] * 3
+        for start in range(0, len(errors), row):
+            before = above
+            for at in range(start, start + row, 3):
+                changes = [error - last for error, last in zip(errors[at : at + 3], before)]
+                self.values += [change - last for change, last in zip(changes, [0, *changes])]
+                before = errors[at : at + 3]
+            above = errors[start : start + 3]
+
+
+def _bits(value: int, count: int) -> list[int]:
+    """From the top."""
+    return [value >> k & 1 for k in reversed(range(count))]
 
 
 @dataclass(frozen=True)
@@ -210,7 +266,8 @@ class Draft:
 
     header: dict
     entries: tuple[Entry, ...]
-    errors: bytes | None = None  # the error table
+    errors: tuple[int, ...] | None = None  # the error table as stored
+    stream: Callable[[bytes], bytes] | None = None  # what becomes of the front stream
 
     def file(self) -> bytes:
         fields = (
@@ -219,27 +276,34 @@ class Draft:
                 major=rd.VERSION[0],
                 minor=rd.VERSION[1],
                 checksum=None,
-                file_length=None,
+                front_length=None,
                 chunk_count=len(self.entries),
                 clip_count=1,
-                flags=0,
+                is_float64=0,
                 max_error=1.0,
                 layer_count=1,
-                reserved=bytes(7),
             )
             | self.header
         )
-        table = b"".join(entry.packed() for entry in self.entries)
-        errors = self.errors
-        if errors is None:
-            errors = bytes(8 * fields["level_count"] * fields["segment_count"])
-        contents = b"".join(entry.content for entry in self.entries)
-        if fields["file_length"] is None:
-            fields["file_length"] = HEADER.size + len(table) + len(errors) + len(contents)
+        stream = self._stream(fields)
+        checksums = b"".join(struct.pack("<I", entry.chunk.checksum) for entry in self.entries)
+        if fields["front_length"] is None:
+            fields["front_length"] = HEADER.size + len(stream) + len(checksums)
         if fields["checksum"] is None:
             blank = HEADER.pack(*((fields | {"checksum": 0})[name] for name in HEADER_FIELDS))
-            fields["checksum"] = crc32c(blank + table + errors)
-        return HEADER.pack(*(fields[name] for name in HEADER_FIELDS)) + table + errors + contents
+            fields["checksum"] = crc32c(blank + stream + checksums)
+        front = HEADER.pack(*(fields[name] for name in HEADER_FIELDS)) + stream + checksums
+        return front + b"".join(entry.content for entry in self.entries)
+
+    def _stream(self, fields: dict) -> bytes:
+        script = FrontScript(fields)
+        for entry in self.entries:
+            script.add_chunk(entry)
+        entries = fields["level_count"] * fields["segment_count"]
+        if entries <= MOST_ENTRIES:
+            script.add_errors((0,) * (3 * entries) if self.errors is None else self.errors)
+        stream = write(rd.decode_front, script.values, 0, [0] * len(self.entries), rd.Limits())
+        return self.stream(stream) if self.stream else stream
 
     def with_header(self, **fields) -> Draft:
         return replace(self, header=self.header | fields)
@@ -346,18 +410,20 @@ def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
     return points
 
 
-def hierarchy_chunk(stream: bytes, epsilon: float = 0.5, xi: float = 0.25, eta: int = 3, lam: int = 1) -> bytes:
-    return struct.pack("<ffII", epsilon, xi, eta, lam) + stream
+def hierarchy_chunk(stream: bytes, epsilon: int = 126 << 5, xi: int = 125 << 5, eta: int = 3, lam: int = 1) -> bytes:
+    """epsilon, xi: as stored."""
+    return struct.pack("<HHHH", epsilon, xi, eta, lam) + stream
 
 
 def rest_chunk(
     stream: bytes, *, exact: int = 0, rest_type: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25, reserved: int = 0
 ) -> bytes:
-    return struct.pack("<BBH3dd", exact, rest_type, reserved, *origin, step) + stream
+    """reserved: further bits of Method."""
+    return struct.pack("<B3ff", exact | rest_type << 1 | reserved << 2, *origin, step) + stream
 
 
 def refined_rest_chunk(stream: bytes, step: float = 0.0625) -> bytes:
-    return struct.pack("<d", step) + stream
+    return struct.pack("<f", step) + stream
 
 
 def clip_entry(
@@ -383,6 +449,11 @@ def steady_time(first: float = 0.0, step: float = 0.25, method: int = 0) -> byte
 def steady_times(*clips: tuple[float, float], method: int = 0) -> bytes:
     """First and Step of each clip."""
     return bytes([method]) + b"".join(struct.pack("<dd", first, step) for first, step in clips)
+
+
+def whole_rates(*rates: int, method: int = 3) -> bytes:
+    """Rate of each clip."""
+    return bytes([method]) + b"".join(struct.pack("<H", rate) for rate in rates)
 
 
 def uneven_time(*times: float | tuple) -> bytes:
@@ -475,7 +546,7 @@ class Plant:
                 level_count=levels,
                 full_level_count=levels,
                 clip_count=len(clips),
-                flags=int(self.is_float64),
+                is_float64=int(self.is_float64),
                 layer_count=self.layers,
             ),
             tuple(entries),
@@ -499,11 +570,11 @@ class Plant:
     def _set_rest(self, branches: list, chunk: bytes) -> list[rd.RestLayer]:
         """The rest pose of the first layer, for those that refine it; none where it is exact."""
         with np.errstate(all="ignore"):
-            if chunk[0]:
-                points = rd.decode_exact_rest(chunk[36:], branches, bool(chunk[1]))
-                self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3d", chunk, 4))
+            if chunk[0] & 1:
+                points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2))
+                self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3f", chunk, 1), float)
                 return []
-            coded = rd.decode_rest(chunk[36:], branches, rd.f64(chunk, 28))
+            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13))
             self.plan.rest = np.array(coded.rest)
             return [coded]
 

@@ -7,8 +7,10 @@ of frames ask for: a plant that never leaves the origin, in which a test replace
 from __future__ import annotations
 
 import struct
+import sys
 from dataclasses import dataclass, replace
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 
@@ -20,9 +22,13 @@ from athcodec.encoding import streams
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
 from athcodec.segmentation import balanced_segments
 
-HEADER_FIELDS = (
-    "magic major minor checksum file_length chunk_count vertex_count branch_count frame_count "
-    "segment_count level_count full_level_count clip_count flags max_error layer_count reserved"
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
+
+from spec.scripted import Draft, Entry  # noqa: E402
+
+COUNTS = (
+    "vertex_count branch_count frame_count segment_count full_level_count level_count clip_count layer_count "
+    "is_float64 max_error"
 ).split()
 CHECKSUM_AT = 12
 
@@ -71,19 +77,23 @@ class Parts:
         return self.with_chunks([entry for entry in self.chunks if entry[0].kind != kind])
 
 
-def header_fields(data: bytes) -> dict:
-    return dict(zip(HEADER_FIELDS, ct._HEADER.unpack_from(data)))
+def draft_of(data: bytes) -> Draft:
+    """The file with a front that can have any values."""
+    parts = Parts.of(data)
+    entries = tuple(Entry(chunk.kind, payload, chunk.level, chunk.segment) for chunk, payload in parts.chunks)
+    counts = {name: getattr(parts.header, name) for name in COUNTS}
+    return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()))
 
 
 def with_header(data: bytes, **fields) -> bytes:
-    """The file with other values in its header and a checksum that fits."""
-    tables_end = Parts.of(data).chunks[0][0].offset
-    front = ct._HEADER.pack(*(header_fields(data) | fields).values()) + data[ct._HEADER.size : tables_end]
-    return with_checksum(front) + data[tables_end:]
+    """The file with other values in its header or other counts, and a checksum that fits."""
+    draft = draft_of(data).with_header(**fields)
+    same_table = not fields.keys() & {"level_count", "segment_count"}
+    return (draft if same_table else replace(draft, errors=None)).file()
 
 
 def with_checksum(front: bytes) -> bytes:
-    """Header and tables with a checksum that fits."""
+    """The front with a checksum that fits."""
     head, tail = front[:CHECKSUM_AT], front[CHECKSUM_AT + 4 :]
     return head + struct.pack("<I", crc32c(head + bytes(4) + tail)) + tail
 
@@ -125,7 +135,7 @@ def still_file(
         add_still_segment(store, plan, index, stop - start, stems)
     header = ct.Header(plan.vertex_count, len(branches), frames, len(segments), levels, levels, 1.0)
     out = BytesIO()
-    store.write(out, header, np.zeros((levels, len(segments), 2)))
+    store.write(out, header, np.zeros((levels, len(segments), 3)))
     return out.getvalue()
 
 

@@ -79,6 +79,15 @@ def test_the_sample_is_coded_in_a_fiftieth_of_its_size(sample_clip, tmp_path):
     assert athcodec.encode(sample_clip, tmp_path / "s.ath").ratio > 50
 
 
+@pytest.mark.parametrize("ladder, most", [("none", 140), ("decades", 180)])
+def test_what_stands_in_front_of_the_chunks_of_a_small_file_is_small(ladder, most, sample_clip, tmp_path):
+    athcodec.encode(sample_clip, tmp_path / "out.ath", ladder=ladder)
+    with athcodec.open(tmp_path / "out.ath") as decoder:
+        chunks = decoder.file.chunks
+    assert chunks[0].offset < most
+    assert chunks[0].offset < 60 + 9 * len(chunks), "of each chunk and its share of the errors"
+
+
 @pytest.mark.parametrize(
     "dtype, offset, bound", [(np.float32, 1e6, 1e-3), (np.float64, 1e6, 1e-12), (np.float32, 0.0, 1e-9)]
 )

@@ -111,7 +111,7 @@ class Native:
             getattr(self.lib, name).restype = c_size_t
         for name in ("ath_times", "ath_branches", "ath_clips"):
             getattr(self.lib, name).restype = c_void_p
-        for name in ("ath_frame_at", "ath_seam_error"):
+        for name in ("ath_frame_at", "ath_seam_error", "ath_level_error"):
             getattr(self.lib, name).restype = c_double
         self.kept = [create_string_buffer(data, len(data))]
         front, size = c_size_t(), c_size_t()
@@ -175,9 +175,10 @@ class Native:
 
     def level_error(self, level: int, first: int) -> dict:
         last = self.info.segment_count - 1
-        most, rms = c_double(), c_double()
-        self.lib.ath_level_error(self.file, level, first, last, byref(most), byref(rms))
-        return {"max": most.value, "rms": rms.value}
+        return {
+            name: self.lib.ath_level_error(self.file, level, first, last, measure)
+            for measure, name in enumerate(("max", "p99", "rms"))
+        }
 
 
 def digest(*arrays) -> str:
@@ -206,18 +207,13 @@ def key_framed(seed: int = 3):
 
 def first_chunk(data: bytes) -> int:
     """Where the first chunk begins (FORMAT.md, "Header")."""
-    chunks, segments = (int.from_bytes(data[at : at + 4], "little") for at in (24, 40))
-    return 64 + 16 * chunks + 8 * segments * data[44]
+    return int.from_bytes(data[16:20], "little")
 
 
-def learned_chunks(data: bytes) -> int:
+def learned_chunks(path: Path) -> int:
     """How many STEMS chunks bring a time basis of their own (FORMAT.md, "STEMS")."""
-    offset, learned = first_chunk(data), 0
-    for i in range(int.from_bytes(data[24:28], "little")):
-        kind, length = data[64 + 16 * i], int.from_bytes(data[72 + 16 * i : 76 + 16 * i], "little")
-        learned += kind == 16 and data[offset + 5] > 0
-        offset += length
-    return learned
+    with athcodec.open(path) as decoder:
+        return sum(chunk.kind == 16 and decoder.file.payload(chunk)[5] > 0 for chunk in decoder.file.chunks)
 
 
 @pytest.fixture(
@@ -237,7 +233,7 @@ def any_ath(request, tmp_path_factory, sample_ath, bushy_ath, full_ath, medley_a
         athcodec.encode(plant(seed=2, roots=2, offset=50.0), path, exact_rest=True, effort="fast")
     else:
         athcodec.encode(key_framed(), path, rel_error=1e-4, segment_frames=24)
-        assert learned_chunks(path.read_bytes()) > 0
+        assert learned_chunks(path) > 0
     return path
 
 
@@ -313,6 +309,7 @@ answer({
                                       clip.segmentCount, clip.loop, levels.map((level) => file.seamError(i, level))]),
   names: levels.map((level) => file.levelName(level)),
   levelFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.levelFor(d, 0.8, 1080, 1)),
+  levelForMost: [0.1, 1, 10, 100, 1e4].map((d) => file.levelFor(d, 0.8, 1080, 1, 0, info.segmentCount - 1, "p99")),
 });
 """
 
@@ -324,6 +321,11 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
     lib.ath_rest(file, 1, c_void_p(rest.ctypes.data), c_size_t(12))
     lib.ath_rest_float64(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
+
+    def level_for(measure: int, distance: float) -> int:
+        numbers = map(c_double, (distance, 0.8, 1080, 1))
+        return lib.ath_level_for(file, 0, info.segment_count - 1, measure, *numbers)
+
     wanted = {
         "info": [
             info.file_length,
@@ -366,10 +368,8 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
             for i, clip in enumerate(ctypes.cast(lib.ath_clips(file), POINTER(Clip))[: info.clip_count])
         ],
         "names": [native.level_name(level) for level in range(info.level_count)],
-        "levelFor": [
-            lib.ath_level_for(file, 0, info.segment_count - 1, c_double(d), c_double(0.8), c_double(1080), c_double(1))
-            for d in (0, 0.1, 1, 10, 100, 1e4, 1e6)
-        ],
+        "levelFor": [level_for(0, distance) for distance in (0, 0.1, 1, 10, 100, 1e4, 1e6)],
+        "levelForMost": [level_for(1, distance) for distance in (0.1, 1, 10, 100, 1e4)],
     }
     assert run_node(tmp_path, DESCRIBE, any_ath) == wanted
 
@@ -520,8 +520,8 @@ OPEN = "answer(thrown(() => AthFile.open(read(path))));"
     "at, name, in_chunk, sentence",
     [
         (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
-        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.5; expected 0.5"),
-        (70, "BAD_CHECKSUM", False, "header and chunk table: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
+        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.6; expected 0.6"),
+        (70, "BAD_CHECKSUM", False, "front: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
         (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
     ],
 )

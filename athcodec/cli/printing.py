@@ -65,7 +65,7 @@ def _print_facts(facts: dict[str, Any]) -> None:
     )
     print(
         f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} of them leaves; "
-        f"epsilon {ath['epsilon']:g}, eta {ath['eta']}, xi {ath['xi']:g}, lambda {ath['lam']}"
+        f"epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
@@ -96,9 +96,10 @@ def _print_clips(facts: dict[str, Any]) -> None:
 
 
 def _print_levels(facts: dict[str, Any]) -> None:
-    columns = ["bytes so far", _head("max error", facts["unit"]), _head("RMS error", facts["unit"])]
+    measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
+    columns = ["bytes so far", *(_head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [
-        [f"{level['bytes']:,}", f"{level['max_error']:.3g}", f"{level['rms_error']:.3g}"] for level in facts["levels"]
+        [f"{level['bytes']:,}", *(f"{level[field]:.3g}" for field in measures.values())] for level in facts["levels"]
     ]
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
 

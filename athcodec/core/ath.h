@@ -82,7 +82,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 5 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 6 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {
@@ -121,7 +121,8 @@ typedef enum ath_field {
     ATH_FIELD_VERSION,      /* major << 16 | minor */
     ATH_FIELD_FILE_SIZE,    /* bytes that are there: for a caller who knows that no more will come */
     ATH_FIELD_HEADER_SIZE,  /* bytes that are there */
-    ATH_FIELD_TABLE_SIZE,   /* bytes that are there of chunk table and error table, or their size against the limit */
+    ATH_FIELD_FRONT_SIZE,   /* bytes that are there, or Front_Length */
+    ATH_FIELD_TABLE_SIZE,   /* of chunk table and error table, against the limit */
     ATH_FIELD_PRELUDE_SIZE, /* bytes that are there */
     ATH_FIELD_VERTEX_COUNT,
     ATH_FIELD_BRANCH_COUNT,
@@ -132,17 +133,14 @@ typedef enum ath_field {
     ATH_FIELD_LEVEL_COUNT,
     ATH_FIELD_CLIP_COUNT,
     ATH_FIELD_LAYER_COUNT,
-    ATH_FIELD_FLAGS,
-    ATH_FIELD_RESERVED,
     ATH_FIELD_MAX_ERROR,
     ATH_FIELD_FRONT_CHECKSUM,
     ATH_FIELD_ERROR,         /* an entry of the error table, of this level and segment */
-    ATH_FIELD_FILE_LENGTH,   /* where the chunks end */
+    ATH_FIELD_FRONT,         /* the end of its stream */
     ATH_FIELD_MEMORY,        /* bytes that a segment may take */
     ATH_FIELD_MISSING_CHUNK, /* a chunk that the table lacks: kind, level and segment say which */
     ATH_FIELD_CHUNK_KIND,    /* from here on: of the chunk */
     ATH_FIELD_CHUNK_SIZE,    /* bytes that are there, or against the limit */
-    ATH_FIELD_CHUNK_RESERVED,
     ATH_FIELD_CHUNK_LEVEL,
     ATH_FIELD_CHUNK_SEGMENT,
     ATH_FIELD_CHUNK_PLACE, /* its index in the chunk table */
@@ -286,13 +284,18 @@ ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz
  * for no level of the file, and where ath_refine_size has not read it. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
-/* Largest and RMS error of showing `level` in these segments, measured by the encoder, scene units. Either result
- * may be null. Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
-ATH_API void ath_level_error(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment,
-                             double *max_error, double *rms_error);
+/* How errors of all vertices in all frames are made one number: the largest; what at most a hundredth of them exceeds,
+ * which says what is seen where single vertices stray; the root of the mean square. */
+typedef enum ath_measure { ATH_LARGEST = 0, ATH_P99 = 1, ATH_RMS = 2 } ath_measure;
+enum { ATH_MEASURES = 3 };
 
-/* The same as stored: level_count x segment_count pairs of them. */
-ATH_API const float *ath_errors(const ath_file *file);
+/* Error of showing `level` in these segments, measured by the encoder, scene units; rounded up by at most a 32nd.
+ * Segments of one clip: quiet ones are shown well by coarser levels than wild ones. */
+ATH_API double ath_level_error(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment,
+                               ath_measure measure);
+
+/* The same of each segment: level_count x segment_count x ATH_MEASURES of them. */
+ATH_API const double *ath_errors(const ath_file *file);
 
 /* What a level is, for people: "depth 1", the levels of the branch hierarchy; "layer 2 of 3", each of all branches ("all
  * branches" where there is one layer); "lossless". Writes it with a zero behind it into at most `capacity` bytes, and
@@ -452,13 +455,13 @@ ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *
 
 /* ---- level of detail --------------------------------------------------------------------------------------------- */
 
-/* The coarsest stored level whose largest error, seen from `distance` (scene units) under a vertical field of view
+/* The coarsest stored level whose error, seen from `distance` (scene units) under a vertical field of view
  * of `fov` (radians) on a screen of `height` pixels, is at most `pixels` in these segments; the deepest level where
  * none is. So that a level does not flicker at its boundary, go finer when the one for `pixels` is deeper than the
  * one shown, and coarser only when the one for a smaller `pixels` is shallower: examples/play.c does. (Song, Yang
  * and Peng 2011: the view-dependent choice.) */
-ATH_API int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance,
-                              double fov, double height, double pixels);
+ATH_API int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, ath_measure measure,
+                              double distance, double fov, double height, double pixels);
 
 /* CRC-32C (Castagnoli) of `size` bytes, continuing from `crc` (0 to start). */
 ATH_API uint32_t ath_crc32c(uint32_t crc, const uint8_t *bytes, size_t size);

@@ -1,7 +1,7 @@
-/* Header, chunk table, error table, heads of chunks: read with every check that FORMAT.md asks for, in its order. */
-#include "container.h"
+/* Front and heads of chunks: read with every check that FORMAT.md asks for, in its order. */
+#include "front_model.h"
 
-enum { HEADER_SIZE = 64, CHUNK_SIZE = 16, ERRORS_SIZE = 8, CHECKSUM_AT = 12, MOST_SHIFT = 15, ONLY_TIPS = 8 };
+enum { HEADER_SIZE = 24, CHECKSUM_SIZE = 4, CHECKSUM_AT = 12, TABLE_ENTRY = 16, MOST_SHIFT = 15, ONLY_TIPS = 8 };
 
 static const uint32_t MOST_COUNT = 1u << 30; /* of anything, whatever the limits are */
 
@@ -28,8 +28,6 @@ static double f64_at(const uint8_t *at)
     memcpy(&value, &bits, sizeof value);
     return value;
 }
-
-static uint64_t error_count(const ath_header *header) { return (uint64_t)header->level_count * header->segment_count; }
 
 int ath_is_finite(double value) { return value - value == 0.0; }
 
@@ -68,23 +66,6 @@ static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *f
                       (double)expected);
 }
 
-static void parse_header(const uint8_t *bytes, ath_header *header)
-{
-    header->checksum = u32_at(bytes + CHECKSUM_AT);
-    header->file_length = u64_at(bytes + 16);
-    header->chunk_count = u32_at(bytes + 24);
-    header->vertex_count = u32_at(bytes + 28);
-    header->branch_count = u32_at(bytes + 32);
-    header->frame_count = u32_at(bytes + 36);
-    header->segment_count = u32_at(bytes + 40);
-    header->level_count = bytes[44];
-    header->full_level_count = bytes[45];
-    header->clip_count = bytes[46];
-    header->is_float64 = bytes[47] & 1;
-    header->max_error = f64_at(bytes + 48);
-    header->layer_count = bytes[56];
-}
-
 /* Whether the value is none of those allowed: then the fault is filled in. */
 static int is_outside(ath_fault_info *fault, int code, ath_field field, double found, double least, double most)
 {
@@ -98,24 +79,20 @@ static int is_bad_count(ath_fault_info *fault, ath_field field, uint32_t count, 
     return is_outside(fault, ATH_LIMIT_EXCEEDED, field, count, 1, most);
 }
 
-static int is_bad_header(const uint8_t *bytes, const ath_limits *limits, const ath_header *header,
-                         ath_fault_info *fault)
+static int is_bad_header(const ath_limits *limits, const ath_header *header, ath_fault_info *fault)
 {
     uint32_t least_segments = (header->frame_count + ATH_SEGMENT_FRAMES - 1) / ATH_SEGMENT_FRAMES;
     return is_bad_count(fault, ATH_FIELD_VERTEX_COUNT, header->vertex_count, limits->vertices)
            || is_bad_count(fault, ATH_FIELD_BRANCH_COUNT, header->branch_count, limits->branches)
            || is_bad_count(fault, ATH_FIELD_FRAME_COUNT, header->frame_count, limits->frames)
            || is_bad_count(fault, ATH_FIELD_SEGMENT_COUNT, header->segment_count, limits->frames)
-           || is_bad_count(fault, ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_BRANCH_COUNT, header->branch_count, 1, header->vertex_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_SEGMENT_COUNT, header->segment_count, least_segments,
                          header->frame_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 2, ATH_LEVELS)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LEVEL_COUNT, header->level_count, 1, header->full_level_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_CLIP_COUNT, header->clip_count, 1, 255)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FLAGS, bytes[47], 0, 1)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LAYER_COUNT, header->layer_count, 1, ATH_LAYERS)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_RESERVED, (double)(u64_at(bytes + 56) >> 8), 0, 0)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST);
 }
 
@@ -125,38 +102,57 @@ static int check_size(size_t available, uint64_t needed, ath_field field, ath_fa
     return ath_refuse(fault, ATH_MISSING, field, (double)available, (double)needed, (double)needed);
 }
 
+static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
+{
+    static const uint8_t blank[4] = {0, 0, 0, 0};
+    uint32_t crc = ath_crc32c(ath_crc32c(0, bytes, CHECKSUM_AT), blank, sizeof blank);
+    return ath_crc32c(crc, bytes + CHECKSUM_AT + 4, (size_t)size - CHECKSUM_AT - 4);
+}
+
+/* Front_Length and Chunk_Count, and all of the front by its checksum. */
+static int check_front(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
+                       ath_fault_info *fault)
+{
+    double size = (double)header->front_length, most = (double)limits->table_bytes;
+    double least = HEADER_SIZE + (double)CHECKSUM_SIZE * header->chunk_count;
+    if (is_bad_count(fault, ATH_FIELD_CHUNK_COUNT, header->chunk_count, limits->chunks)
+        || is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_FRONT_SIZE, size, 0, most)
+        || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FRONT_SIZE, size, least, most))
+        return fault->code;
+    int result = check_size(available, header->front_length, ATH_FIELD_FRONT_SIZE, fault);
+    if (result != ATH_OK) return result;
+    uint32_t found = front_checksum(bytes, header->front_length), expected = u32_at(bytes + CHECKSUM_AT);
+    if (found == expected) return ATH_OK;
+    return ath_refuse(fault, ATH_BAD_CHECKSUM, ATH_FIELD_FRONT_CHECKSUM, found, expected, expected);
+}
+
+static void start_stream(ath_coder *coder, const uint8_t *bytes, ath_header *header)
+{
+    size_t checksums = (size_t)CHECKSUM_SIZE * header->chunk_count;
+    coder_start(coder, bytes + HEADER_SIZE, (size_t)header->front_length - HEADER_SIZE - checksums);
+    code_counts(coder, header);
+}
+
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
                     uint64_t *needed, ath_fault_info *fault)
 {
-    int result = check_magic(bytes, available, fault);
+    ath_coder coder;
     *needed = HEADER_SIZE;
+    memset(header, 0, sizeof *header);
+    int result = check_magic(bytes, available, fault);
     if (result == ATH_OK) result = check_size(available, HEADER_SIZE, ATH_FIELD_HEADER_SIZE, fault);
     if (result != ATH_OK) return result;
-    parse_header(bytes, header);
-    if (is_bad_header(bytes, limits, header, fault)) return fault->code;
-    uint64_t size = (uint64_t)CHUNK_SIZE * header->chunk_count + ERRORS_SIZE * error_count(header);
-    if (size > limits->table_bytes)
-        return ath_refuse(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, (double)size, 0, limits->table_bytes);
-    header->chunks_at = *needed = HEADER_SIZE + size;
+    header->front_length = *needed = u32_at(bytes + 16);
+    header->chunk_count = u32_at(bytes + 20);
+    if ((result = check_front(bytes, available, limits, header, fault)) != ATH_OK) return result;
+    start_stream(&coder, bytes, header);
+    if (is_bad_header(limits, header, fault)) return fault->code;
+    double size = TABLE_ENTRY * ((double)header->chunk_count + (double)header->level_count * header->segment_count);
+    if (is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, size, 0, limits->table_bytes)) return fault->code;
     return ATH_OK;
 }
 
 /* ---- tables ---- */
-
-static int check_errors(const uint8_t *table, const ath_header *header, float *errors, ath_fault_info *fault)
-{
-    for (uint64_t i = 0; i < 2 * error_count(header); i++) {
-        float error = f32_at(table + 4 * i);
-        if (!ath_is_finite((double)error) || error < 0.0f) {
-            ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_ERROR, (double)error, 0, LARGEST);
-            fault->level = (uint8_t)(i / 2 / header->segment_count);
-            fault->segment = (uint32_t)(i / 2 % header->segment_count);
-            return ATH_BAD_CHUNK_TABLE;
-        }
-        if (errors) errors[i] = error;
-    }
-    return ATH_OK;
-}
 
 static int32_t kind_id(const ath_chunk *chunk) { return chunk->kind & ~ATH_OPTIONAL; }
 
@@ -175,84 +171,97 @@ static uint64_t key_of(const ath_chunk *chunk)
     return (uint64_t)(kind_id(chunk) < 16 ? 0 : 2) << 62 | (uint64_t)kind_id(chunk);
 }
 
-static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int reserved,
+static int is_bad_chunk(const ath_limits *limits, const ath_header *header, const ath_chunk *chunk, int32_t level,
                         ath_fault_info *fault)
 {
     int motion = ath_is_motion(chunk);
-    double least_level = motion ? 0 : ATH_NO_LEVEL, most_level = motion ? header->level_count - 1 : ATH_NO_LEVEL;
-    double most_segment = motion ? (double)header->segment_count - 1 : 0;
     return is_outside(fault, ATH_UNKNOWN_CHUNK, ATH_FIELD_CHUNK_KIND, is_refused(chunk->kind), 0, 0)
            || is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_CHUNK_SIZE, chunk->length, 0, limits->chunk_bytes)
-           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, chunk->level, least_level, most_level)
-           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk->segment, 0, most_segment)
-           || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_RESERVED, reserved, 0, 0);
+           || (motion
+               && (is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_LEVEL, level, 0, header->level_count - 1)
+                   || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_SEGMENT, chunk->segment, 0,
+                                 (double)header->segment_count - 1)));
 }
 
-static ath_chunk chunk_of(const uint8_t *entry, uint64_t offset)
+/* *prelude: where the first chunk behind it begins. */
+static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_limits *limits, ath_header *header,
+                       uint64_t *prelude, ath_chunk *chunks, ath_fault_info *fault)
 {
-    ath_chunk chunk;
-    memset(&chunk, 0, sizeof chunk);
-    chunk.kind = (uint16_t)u16_at(entry);
-    chunk.level = entry[3];
-    chunk.segment = u32_at(entry + 4);
-    chunk.length = u32_at(entry + 8);
-    chunk.checksum = u32_at(entry + 12);
-    chunk.offset = offset;
-    chunk.bytes = chunk.length == 0 ? entry : 0; /* there is nothing to wait for */
-    return chunk;
-}
-
-static int parse_chunks(const uint8_t *table, const ath_limits *limits, const ath_header *header, uint64_t *prelude,
-                        ath_chunk *chunks, ath_fault_info *fault)
-{
-    uint64_t offset = header->chunks_at, key_before = 0;
-    *prelude = header->file_length;
+    chunk_model model;
+    uint64_t offset = header->front_length, key_before = 0;
+    int in_prelude = 1;
+    *prelude = offset;
+    chunk_model_init(&model);
     for (uint32_t i = 0; i < header->chunk_count; i++) {
-        const uint8_t *entry = table + (size_t)CHUNK_SIZE * i;
-        ath_chunk chunk = chunk_of(entry, offset);
+        ath_chunk chunk;
+        memset(&chunk, 0, sizeof chunk);
+        chunk.offset = offset;
+        code_chunk(coder, &model, header->segment_count, &chunk);
+        chunk.checksum = u32_at(checksums + CHECKSUM_SIZE * (size_t)i);
+        chunk.level = (uint8_t)(ath_is_motion(&chunk) ? ath_min(model.level, ATH_NO_LEVEL) : (int32_t)ATH_NO_LEVEL);
+        chunk.bytes = chunk.length == 0 ? checksums : 0; /* there is nothing to wait for */
         uint64_t key = key_of(&chunk);
         int repeatable = chunk.kind & ATH_OPTIONAL && kind_id(&chunk) >= 32;
         int in_order = i == 0 || key > key_before || (key == key_before && repeatable);
-        if (is_bad_chunk(limits, header, &chunk, entry[2], fault)
+        if (is_bad_chunk(limits, header, &chunk, model.level, fault)
             || is_outside(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_PLACE, i, 0, in_order ? i : i - 1.0))
             return ath_fault_at(fault, &chunk, (int32_t)i);
-        if (key >> 62 > 0 && (i == 0 || key_before >> 62 == 0)) *prelude = offset;
         key_before = key;
         offset += chunk.length;
+        in_prelude = in_prelude && key >> 62 == 0;
+        if (in_prelude) *prelude = offset;
         if (chunks) chunks[i] = chunk;
     }
-    if (offset == header->file_length) return ATH_OK;
-    double expected = (double)header->file_length;
-    return ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_FILE_LENGTH, (double)offset, expected, expected);
+    header->file_length = offset;
+    return ATH_OK;
 }
 
-static uint32_t front_checksum(const uint8_t *bytes, uint64_t size)
+static double short_float(int32_t value)
 {
-    static const uint8_t blank[4] = {0, 0, 0, 0};
-    uint32_t crc = ath_crc32c(ath_crc32c(0, bytes, CHECKSUM_AT), blank, sizeof blank);
-    return ath_crc32c(crc, bytes + CHECKSUM_AT + 4, (size_t)size - CHECKSUM_AT - 4);
+    uint32_t bits = (uint32_t)value << ATH_SHORT_SHIFT;
+    float number;
+    memcpy(&number, &bits, sizeof number);
+    return (double)number;
 }
 
-static int check_front(const uint8_t *bytes, const ath_header *header, ath_fault_info *fault)
+/* The table needs no more than the entry before on the way: what an entry is coded about is kept per level. */
+static int read_errors(ath_coder *coder, const ath_header *header, double *errors, ath_fault_info *fault)
 {
-    uint32_t found = front_checksum(bytes, header->chunks_at);
-    if (found == header->checksum) return ATH_OK;
-    return ath_refuse(fault, ATH_BAD_CHECKSUM, ATH_FIELD_FRONT_CHECKSUM, found, header->checksum, header->checksum);
+    error_model model;
+    int32_t first[ATH_MEASURES];
+    error_model_init(&model);
+    for (int32_t i = 0; i < ATH_MEASURES; i++) first[i] = first_error(header->max_error);
+    for (int32_t level = 0; level < header->level_count; level++) {
+        int32_t entry[ATH_MEASURES];
+        double most = level == header->level_count - 1 ? header->max_error : LARGEST;
+        memcpy(entry, first, sizeof entry);
+        for (uint32_t segment = 0; segment < header->segment_count; segment++) {
+            if (!code_errors(coder, &model, segment == 0, entry, entry)) {
+                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_ERROR, 0, 0, 0);
+                fault->level = (uint8_t)level;
+                fault->segment = segment;
+                return ATH_BAD_CHUNK_TABLE;
+            }
+            if (segment == 0) memcpy(first, entry, sizeof first);
+            for (int32_t i = 0; errors && i < ATH_MEASURES; i++) {
+                double error = short_float(entry[i]);
+                *errors++ = error < most ? error : most;
+            }
+        }
+    }
+    if (coder_finish(coder)) return ATH_OK;
+    return ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_FRONT, 0, 0, 0);
 }
 
-int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
-                    uint64_t *needed, ath_chunk *chunks, float *errors, ath_fault_info *fault)
+int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
+                    uint64_t *needed, ath_chunk *chunks, double *errors, ath_fault_info *fault)
 {
-    const uint8_t *table = bytes + HEADER_SIZE;
-    *needed = header->chunks_at;
-    int result = available >= *needed
-                     ? check_front(bytes, header, fault)
-                     : check_size(available - HEADER_SIZE, *needed - HEADER_SIZE, ATH_FIELD_TABLE_SIZE, fault);
-    if (result != ATH_OK) return result;
-    result = check_errors(table + (size_t)CHUNK_SIZE * header->chunk_count, header, errors, fault);
-    if (result != ATH_OK) return result;
-    if ((result = parse_chunks(table, limits, header, needed, chunks, fault)) != ATH_OK) return result;
-    return check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
+    ath_coder coder;
+    const uint8_t *checksums = bytes + (header->front_length - (uint64_t)CHECKSUM_SIZE * header->chunk_count);
+    start_stream(&coder, bytes, header);
+    int result = read_chunks(&coder, checksums, limits, header, needed, chunks, fault);
+    if (result == ATH_OK) result = read_errors(&coder, header, errors, fault);
+    return result != ATH_OK ? result : check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
 }
 
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment)
@@ -294,28 +303,26 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
 
 int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
 {
-    if (chunk.size < 16) return ATH_BAD_CHUNK;
-    head->epsilon = f32_at(chunk.bytes);
-    head->xi = f32_at(chunk.bytes + 4);
-    head->eta = u32_at(chunk.bytes + 8);
-    head->lambda = u32_at(chunk.bytes + 12);
-    *body = rest_of(chunk, 16);
-    int valid = ath_is_finite((double)head->epsilon) && ath_is_finite((double)head->xi) && head->epsilon >= 0.0f
-                && head->xi >= 0.0f;
-    return valid ? ATH_OK : ATH_BAD_CHUNK;
+    if (chunk.size < 8) return ATH_BAD_CHUNK;
+    int32_t epsilon = (int32_t)u16_at(chunk.bytes), xi = (int32_t)u16_at(chunk.bytes + 2);
+    head->epsilon = short_float(epsilon);
+    head->xi = short_float(xi);
+    head->eta = u16_at(chunk.bytes + 4);
+    head->lambda = u16_at(chunk.bytes + 6);
+    *body = rest_of(chunk, 8);
+    return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
 }
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
-    if (chunk.size < 36 || chunk.bytes[0] > 1 || chunk.bytes[1] > 1 || u16_at(chunk.bytes + 2) != 0)
-        return ATH_BAD_CHUNK;
-    head->exact = chunk.bytes[0];
-    head->is_float64 = chunk.bytes[1];
-    head->step = f64_at(chunk.bytes + 28);
-    *body = rest_of(chunk, 36);
+    if (chunk.size < 17 || chunk.bytes[0] > 3) return ATH_BAD_CHUNK;
+    head->exact = chunk.bytes[0] & 1;
+    head->is_float64 = chunk.bytes[0] >> 1;
+    head->step = (double)f32_at(chunk.bytes + 13);
+    *body = rest_of(chunk, 17);
     int valid = is_step(head->step);
     for (int32_t k = 0; k < 3; k++) {
-        head->origin[k] = f64_at(chunk.bytes + 4 + 8 * k);
+        head->origin[k] = (double)f32_at(chunk.bytes + 1 + 4 * k);
         valid = valid && ath_is_finite(head->origin[k]);
     }
     return valid ? ATH_OK : ATH_BAD_CHUNK;
@@ -376,14 +383,21 @@ int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *e
 
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body)
 {
-    if (chunk.size < 1 || chunk.bytes[0] > 2) return ATH_BAD_CHUNK;
+    if (chunk.size < 1 || chunk.bytes[0] > 4) return ATH_BAD_CHUNK;
     *method = chunk.bytes[0];
     *body = rest_of(chunk, 1);
-    return *method == 2 || body->size == 16 * (size_t)clip_count ? ATH_OK : ATH_BAD_CHUNK;
+    size_t of_each = *method > 2 ? 2 : 16;
+    return *method == 2 || body->size == of_each * (size_t)clip_count ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step)
+int ath_parse_steady(ath_bytes body, ath_time_method method, int32_t clip, double *first, double *step)
 {
+    if (method > 2) {
+        double rate = (double)u16_at(body.bytes + 2 * (size_t)clip);
+        *first = 0.0;
+        *step = method == 3 ? rate : 1.0 / rate;
+        return rate > 0.0 ? ATH_OK : ATH_BAD_CHUNK;
+    }
     *first = f64_at(body.bytes + 16 * (size_t)clip);
     *step = f64_at(body.bytes + 16 * (size_t)clip + 8);
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
@@ -391,9 +405,9 @@ int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step)
 
 int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body)
 {
-    if (chunk.size < 8) return ATH_BAD_CHUNK;
-    *step = f64_at(chunk.bytes);
-    *body = rest_of(chunk, 8);
+    if (chunk.size < 4) return ATH_BAD_CHUNK;
+    *step = (double)f32_at(chunk.bytes);
+    *body = rest_of(chunk, 4);
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 

@@ -5,14 +5,15 @@
 
 #include "internal.h"
 
-typedef struct {
-    uint64_t file_length;
-    uint64_t chunks_at; /* where the first chunk begins */
+typedef struct ath_header {
+    uint64_t file_length, front_length;
     double max_error;
-    uint32_t checksum;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
     int32_t level_count, full_level_count, clip_count, layer_count, is_float64;
 } ath_header;
+
+/* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
+enum { ATH_SHORT_SHIFT = 18, ATH_SHORT_FLOATS = 255 << 5 };
 
 /* Fills in a fault, and the chunk that it is about. Both return its code. */
 int ath_refuse(ath_fault_info *fault, int code, ath_field field, double found, double least, double most);
@@ -22,10 +23,10 @@ int ath_fault_at(ath_fault_info *fault, const ath_chunk *chunk, int32_t index);
  * prelude. */
 int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
                     uint64_t *needed, ath_fault_info *fault);
-/* What is between a valid header and the first chunk: fills, unless null, chunk_count chunks and level_count x
- * segment_count pairs of errors. */
-int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, const ath_header *header,
-                    uint64_t *needed, ath_chunk *chunks, float *errors, ath_fault_info *fault);
+/* The rest of a front whose header is valid: fills the header's file_length and, unless null, chunk_count chunks and
+ * the errors that ath_errors gives. */
+int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
+                    uint64_t *needed, ath_chunk *chunks, double *errors, ath_fault_info *fault);
 
 /* Index of the first chunk that does not come before this one in file order. */
 uint32_t ath_first_chunk(const ath_chunk *chunks, uint32_t chunk_count, int32_t kind, int32_t level, uint32_t segment);
@@ -42,7 +43,7 @@ typedef struct {
 } ath_bytes;
 
 typedef struct {
-    float epsilon, xi;
+    double epsilon, xi;
     uint32_t eta, lambda;
 } ath_thresholds;
 
@@ -58,7 +59,7 @@ typedef struct {
     const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
-/* 0: first + i * step; 1: first + i / step, with a pair for each clip; 2: stream */
+/* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
 typedef int32_t ath_time_method;
 
 typedef struct {
@@ -76,7 +77,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);
 float ath_seam(const ath_clip_entry *entry, int32_t level);
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body);
-int ath_parse_steady(ath_bytes body, int32_t clip, double *first, double *step);
+int ath_parse_steady(ath_bytes body, ath_time_method method, int32_t clip, double *first, double *step);
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 /* Of refinements; shift: the layer before's integers are multiplied by 2 ^ shift to predict these. */
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);

@@ -1,11 +1,45 @@
 /* Encodes streams: streams.h compiled for encoding. */
 #define ATH_ENCODING
 #include "encode.h"
+#include "front_model.h"
 #include "motion_streams.h"
 #include "streams.h"
 
 /* The size written; -1: no space, -2: the input is not something that the stream can hold. */
 static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
+
+int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header, const ath_chunk *chunks,
+                         const int32_t *errors)
+{
+    ath_coder coder;
+    chunk_model keys;
+    error_model table;
+    ath_header counts = *header;
+    int32_t first[ATH_MEASURES];
+    const int32_t *last = first;
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    code_counts(&coder, &counts);
+    chunk_model_init(&keys);
+    for (uint32_t i = 0; i < header->chunk_count; i++) {
+        ath_chunk chunk = chunks[i];
+        code_chunk(&coder, &keys, header->segment_count, &chunk);
+    }
+    error_model_init(&table);
+    for (int32_t i = 0; i < ATH_MEASURES; i++) first[i] = first_error(header->max_error);
+    for (int32_t level = 0; level < header->level_count; level++) {
+        const int32_t *before = last;
+        last = errors;
+        for (uint32_t segment = 0; segment < header->segment_count; segment++) {
+            int32_t entry[ATH_MEASURES];
+            memcpy(entry, errors, sizeof entry);
+            valid = valid && code_errors(&coder, &table, segment == 0, before, entry);
+            before = errors;
+            errors += ATH_MEASURES;
+        }
+    }
+    return written(&coder, valid);
+}
 
 int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,

@@ -6,6 +6,7 @@
 #ifndef ATH_ENCODE_H
 #define ATH_ENCODE_H
 
+#include "container.h"
 #include "motion.h"
 
 /* The integers of one segment; with them come ath_motion's streams. */
@@ -98,9 +99,11 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
 
-/* Largest distance and sum of squared distances between positions and source (plus origin). */
+/* Largest distance and sum of squared distances between positions and source (plus origin). histogram:
+ * ATH_SHORT_FLOATS counts, to which each distance is added, rounded up as in the error table. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                               const double *source, const double origin[3], double *max_error, double *sum_squares);
+                               const double *source, const double origin[3], double *max_error, double *sum_squares,
+                               uint32_t *histogram);
 
 /* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of (vertex, frame, x, y,
  * z). Returns how many there are; -1: the step cannot express them. */
@@ -111,6 +114,9 @@ ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void 
                                            const int32_t *corrections, int64_t count);
 
 /* Writers of the streams: the size written, -1 when `capacity` is too small, -2 when the input cannot be expressed. */
+/* errors: of each level and segment ATH_MEASURES stored numbers. */
+ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header,
+                                         const ath_chunk *chunks, const int32_t *errors);
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);

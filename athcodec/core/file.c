@@ -39,7 +39,7 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     uint64_t entries = (uint64_t)header->level_count * header->segment_count, clips = (uint64_t)header->clip_count;
     ath_take(&arena, sizeof *file);
     file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
-    file->errors = (float *)ath_take(&arena, entries * 2 * sizeof(float));
+    file->errors = (double *)ath_take(&arena, entries * ATH_MEASURES * sizeof(double));
     file->clips = (ath_clip *)ath_take(&arena, clips * sizeof(ath_clip));
     file->names = (char *)ath_take(&arena, clips * NAME_BYTES);
     file->seams = (float *)ath_take(&arena, clips * (uint64_t)header->full_level_count * sizeof(float));
@@ -87,16 +87,13 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
     ath_file file;
     uint64_t needed;
     why->code = ATH_OK;
-    int result = ath_read_header(bytes, available, &chosen, &header, &needed, why), has_tables = 0;
-    if (result == ATH_OK) {
-        has_tables = available >= needed;
-        result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, why);
-    }
+    int result = ath_read_header(bytes, available, &chosen, &header, &needed, why), has_front = result == ATH_OK;
+    if (has_front) result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, why);
     *front_bytes = ath_size_or_most(needed);
     *memory_bytes = 0;
     if (needed > SIZE_MAX)
         return ath_refuse(why, ATH_LIMIT_EXCEEDED, ATH_FIELD_PRELUDE_SIZE, (double)needed, 0, (double)SIZE_MAX);
-    if (!has_tables || (result != ATH_OK && result != ATH_MISSING)) return result;
+    if (!has_front || (result != ATH_OK && result != ATH_MISSING)) return result;
     int limit = check_least_memory(&header, &chosen, &beyond_limit);
     if (limit == ATH_OK) *memory_bytes = ath_size_or_most(carve(&file, &header, 0));
     if (limit == ATH_OK || result == ATH_MISSING) return result;
@@ -212,8 +209,8 @@ static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_in
     result = ath_decode_hierarchy(file->scratch, body.bytes, body.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
-    file->info.epsilon = thresholds.epsilon;
-    file->info.xi = thresholds.xi;
+    file->info.epsilon = (float)thresholds.epsilon;
+    file->info.xi = (float)thresholds.xi;
     file->info.eta = thresholds.eta;
     file->info.lambda = thresholds.lambda;
     return check_depth(file, limits, fault);
@@ -313,13 +310,6 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
-static int all_finite(const double *values, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (!ath_is_finite(values[i])) return 0;
-    return 1;
-}
-
 static int read_rest(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
@@ -341,17 +331,17 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
                                  head.step, 0, 0, file->rest_steps, file->rest);
         file->stored_rest = 0;
     }
-    return result != ATH_OK ? result : all_finite(file->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
+    return result;
 }
 
 static int time_clip(const ath_file *file, int32_t index, ath_time_method method, ath_bytes body)
 {
     ath_clip *clip = file->clips + index;
     double *times = file->times + clip->first_frame, first = 0.0, step = 0.0;
-    if (method != 2 && ath_parse_steady(body, index, &first, &step) != ATH_OK) return ATH_BAD_CHUNK;
+    if (method != 2 && ath_parse_steady(body, method, index, &first, &step) != ATH_OK) return ATH_BAD_CHUNK;
     for (int32_t i = 0; i < clip->frame_count; i++) {
-        if (method == 0) times[i] = first + (double)i * step;
-        if (method == 1) times[i] = first + (double)i / step;
+        if (method == 0 || method == 4) times[i] = first + (double)i * step;
+        if (method == 1 || method == 3) times[i] = first + (double)i / step;
         if (!ath_is_finite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) return ATH_BAD_CHUNK;
     }
     clip->duration = times[clip->frame_count - 1] - times[0];
@@ -420,7 +410,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     return ATH_OK;
 }
 
-/* Parses header and tables into the file, once these are known to fit into the memory. */
+/* Parses the front into the file, once these are known to fit into the memory. */
 static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes, size_t available,
                       const ath_limits *limits, ath_fault_info *fault)
 {
@@ -431,8 +421,8 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
     carve(file, &header, (uint8_t *)file);
-    file->header = header;
     result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, fault);
+    file->header = header;
     set_info(file, needed);
     return result != ATH_OK ? result : check_least_memory(&header, limits, fault);
 }
@@ -513,7 +503,6 @@ static const int32_t *layer_rest_steps(const ath_file *file, int32_t layer)
 static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
 {
     ath_layer *layer = &file->layers[q];
-    size_t numbers = 3 * (size_t)file->header.vertex_count;
     ath_bytes body;
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
@@ -521,7 +510,7 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
         result =
             ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
                             layer_rest_steps(file, q - 1), layer_rest(file, q - 1), layer->rest_steps, layer->rest);
-    return result != ATH_OK ? result : all_finite(layer->rest, numbers) ? ATH_OK : ATH_BAD_CHUNK;
+    return result;
 }
 
 /* The layer's rest pose, once that of the layer before is known. */
@@ -616,7 +605,7 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
 
 void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
 
-const float *ath_errors(const ath_file *file) { return file->errors; }
+const double *ath_errors(const ath_file *file) { return file->errors; }
 
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 
@@ -661,20 +650,19 @@ void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t
     }
 }
 
-/* Squares are weighted by the frames of their segments. */
-void ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t last, double *max_error,
-                     double *rms_error)
+/* Of segments together: what at most a hundredth of each exceeds, at most a hundredth of all does; squares are weighted
+ * by the frames of their segments. */
+double ath_level_error(const ath_file *file, int32_t level, int32_t first, int32_t last, ath_measure measure)
 {
-    const float *errors = file->errors + 2 * (size_t)level * (size_t)file->info.segment_count;
+    const double *errors = file->errors + ATH_MEASURES * (size_t)level * (size_t)file->info.segment_count + measure;
     double largest = 0.0, squares = 0.0, frames = 0.0;
     for (int32_t s = first; s <= last; s++) {
-        double max = (double)errors[2 * s], rms = (double)errors[2 * s + 1], count = (double)ath_file_frames(file, s);
-        if (max > largest) largest = max;
-        squares = squares + rms * rms * count;
+        double error = errors[ATH_MEASURES * s], count = (double)ath_file_frames(file, s);
+        if (error > largest) largest = error;
+        squares = squares + error * error * count;
         frames = frames + count;
     }
-    if (max_error) *max_error = largest;
-    if (rms_error) *rms_error = first == last ? (double)errors[2 * first + 1] : ath_sqrt(squares / frames);
+    return measure != ATH_RMS || first == last ? largest : ath_sqrt(squares / frames);
 }
 
 /* The last clip that begins at or before this frame or segment; `first`: the offset of first_frame or first_segment in

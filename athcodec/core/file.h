@@ -21,7 +21,7 @@ struct ath_file {
     ath_info info;
     ath_plan plan;
     ath_chunk *chunks;
-    float *errors; /* level_count x segment_count x (max, rms) */
+    double *errors; /* level_count x segment_count x ATH_MEASURES */
     ath_clip *clips;
     char *names;  /* of the clips, NAME_BYTES each */
     float *seams; /* clip_count x full_level_count */

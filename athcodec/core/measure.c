@@ -124,21 +124,53 @@ static void set_position(int is_float64, void *positions, size_t at, double valu
         ((float *)positions)[at] = (float)value;
 }
 
-void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
-               const double origin[3], double *max_error, double *sum_squares)
+/* A vertex's squared distances, frame by frame. `stride`: from axis to axis. */
+ATH_HOT
+static void square_distances(int32_t count, size_t stride, int is_float64, const void *positions, size_t first,
+                             const double *source, const double origin[3], double *squares)
 {
-    double largest = 0.0, sum = 0.0;
+    for (int32_t t = 0; t < count; t++) squares[t] = 0.0;
+    for (size_t axis = 0; axis < 3; axis++) {
+        size_t at = first + axis * stride;
+        const double *wanted = source + at, *wide = (const double *)positions + at;
+        const float *narrow = (const float *)positions + at;
+        for (int32_t t = 0; t < count; t++) {
+            double e = (is_float64 ? wide[t] : (double)narrow[t]) - (wanted[t] + origin[axis]);
+            squares[t] += e * e;
+        }
+    }
+}
+
+/* Lengths of the error table (ATH_SHORT_FLOATS), not below the distances as far as there are such. */
+ATH_HOT
+static void shorts_above(int32_t count, const double *squares, int32_t *shorts)
+{
+    for (int32_t t = 0; t < count; t++) {
+        double distance = ath_sqrt(squares[t]);
+        float narrow = (float)distance;
+        int32_t bits;
+        memcpy(&bits, &narrow, sizeof bits);
+        bits += (double)narrow < distance;
+        shorts[t] = ath_min((bits + (1 << ATH_SHORT_SHIFT) - 1) >> ATH_SHORT_SHIFT, ATH_SHORT_FLOATS - 1);
+    }
+}
+
+void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions, const double *source,
+               const double origin[3], double *max_error, double *sum_squares, uint32_t *histogram)
+{
+    double largest = 0.0, sum = 0.0, squares[ATH_SEGMENT_FRAMES];
+    int32_t shorts[ATH_SEGMENT_FRAMES];
     size_t T = (size_t)frames;
     for (size_t v = 0; v < (size_t)vertex_count; v++)
-        for (size_t t = 0; t < T; t++) {
-            double square = 0.0;
-            for (size_t axis = 0; axis < 3; axis++) {
-                size_t at = (v * 3 + axis) * T + t;
-                double e = position_at(is_float64, positions, at) - (source[at] + origin[axis]);
-                square += e * e;
+        for (int32_t start = 0; start < frames; start += ATH_SEGMENT_FRAMES) {
+            int32_t count = ath_min(frames - start, ATH_SEGMENT_FRAMES);
+            square_distances(count, T, is_float64, positions, v * 3 * T + (size_t)start, source, origin, squares);
+            for (int32_t t = 0; t < count; t++) {
+                sum += squares[t];
+                if (squares[t] > largest) largest = squares[t];
             }
-            sum += square;
-            if (square > largest) largest = square;
+            shorts_above(count, squares, shorts);
+            for (int32_t t = 0; t < count; t++) histogram[shorts[t]]++;
         }
     *max_error = ath_sqrt(largest);
     *sum_squares = sum;

@@ -371,16 +371,14 @@ int ath_matrices_float64(const ath_file *file, const ath_segment *const *segment
 
 /* ---- level of detail ---- */
 
-int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, double distance, double fov,
-                      double height, double pixels)
+int32_t ath_level_for(const ath_file *file, int32_t first_segment, int32_t last_segment, ath_measure measure,
+                      double distance, double fov, double height, double pixels)
 {
     int32_t deepest = file->info.level_count - 1;
     if (!(distance > 0.0 && fov > 0.0 && fov < 3.141592653589793)) return deepest;
     double pixels_per_unit = height / (2.0 * distance * ath_tan_of_half(fov));
-    for (int32_t level = 0; level < deepest; level++) {
-        double error;
-        ath_level_error(file, level, first_segment, last_segment, &error, 0);
-        if (error * pixels_per_unit <= pixels) return level;
-    }
+    for (int32_t level = 0; level < deepest; level++)
+        if (ath_level_error(file, level, first_segment, last_segment, measure) * pixels_per_unit <= pixels)
+            return level;
     return deepest;
 }

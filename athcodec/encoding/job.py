@@ -21,6 +21,7 @@ from typing import IO, BinaryIO
 import numpy as np
 
 from athcodec import container as ct
+from athcodec._native import MEASURES
 from athcodec.ath import Ath, Survey, Thresholds, survey
 from athcodec.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.decoder import Decoder
@@ -100,7 +101,7 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, and (levels, 2) errors of stopping at each level."""
+    """One segment: chunks {(level, kind): payload}, and (levels, 3) errors of stopping at each level."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]
@@ -292,7 +293,7 @@ class EncodingJob:
                 result = dataclasses.replace(self, report=silent).encode(bound, ct.ChunkStore(spool))
             except BoundError:
                 return math.inf
-        return result.store.size(result.header)
+        return result.store.size(result.header, result.errors)
 
     def write(
         self,
@@ -427,8 +428,8 @@ class EncodingJob:
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
 
     def _add_motion(self, store: ct.ChunkStore, lossy_levels: int, coded: Iterable[CodedSegment]) -> np.ndarray:
-        """Returns (levels, segments, 2) errors. Raises ValueError unless each segment comes once."""
-        errors = np.zeros((lossy_levels + self.options.lossless, self.segment_count, 2))
+        """Returns (levels, segments, 3) errors. Raises ValueError unless each segment comes once."""
+        errors = np.zeros((lossy_levels + self.options.lossless, self.segment_count, len(MEASURES)))
         missing = set(range(self.segment_count))
         for segment in coded:
             if segment.index not in missing:

@@ -18,7 +18,7 @@ from athcodec import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
-from athcodec.encoding.motion import Plan, SegmentMotion, position_error
+from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.search import Choice
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -209,7 +209,7 @@ class _TimeBases:
 
 
 class _SegmentCoder:
-    """Chunks {(level, kind): payload} and errors of stopping at each level, (largest, RMS), of one segment."""
+    """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
     def __init__(self, prelude: CodedPrelude, layers: Sequence[Layer], segment_count: int, positions: np.ndarray):
         self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
@@ -217,7 +217,7 @@ class _SegmentCoder:
         self._shared_bytes = (len(prelude.hierarchy_stream) + len(layers[0].rest.stream)) / segment_count
         self._bases = _TimeBases(layers[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
-        self.errors: list[tuple[float, float]] = []
+        self.errors: list[tuple[float, ...]] = []
         self.decoded = np.empty(0)
 
     def first(self, layer: Layer) -> SegmentMotion:
@@ -274,9 +274,8 @@ class _SegmentCoder:
             best = corrected
         return best
 
-    def _error(self, decoded: np.ndarray) -> tuple[float, float]:
-        largest, squares = position_error(decoded, self._positions, self._origin, self._pool)
-        return largest, math.sqrt(squares / (self._positions.shape[0] * self._positions.shape[2]))
+    def _error(self, decoded: np.ndarray) -> tuple[float, ...]:
+        return position_errors(decoded, self._positions, self._origin, self._pool)
 
 
 def code_segment(
@@ -286,7 +285,7 @@ def code_segment(
     positions: np.ndarray,
     exact: np.ndarray | None = None,
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks {(level, kind): payload} of one of so many segments and (levels, 2) errors of stopping at each level.
+    """Chunks {(level, kind): payload} of one of so many segments and (levels, 3) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.
     """
@@ -300,5 +299,5 @@ def code_segment(
         raise AssertionError(f"decoded error {coder.errors[-1][0]} is beyond the bound {largest_bound}")
     if exact is not None:
         coder.chunks[level, ct.EXACT] = streams.encode_exact(coder.decoded, exact)
-        coder.errors.append((0.0, 0.0))
+        coder.errors.append((0.0, 0.0, 0.0))
     return coder.chunks, np.array(coder.errors)

@@ -7,6 +7,7 @@ decoder will have (`pose`). Arrays over a segment are vertex-major, (vertices, 3
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from ctypes import addressof
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from athcodec._native import (
     PIECE,
     PIECE_VERTICES,
     SEGMENT_FRAMES,
+    SHORT_FLOATS,
     Coarse,
     CorePlan,
     Integers,
@@ -29,6 +31,7 @@ from athcodec._native import (
     address,
     lib,
 )
+from athcodec.container import from_short_float
 from athcodec.threads import SERIAL, ThreadPool, ranges
 
 if TYPE_CHECKING:
@@ -344,14 +347,14 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     return out
 
 
-def position_error(
+def position_errors(
     positions: np.ndarray, source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL
-) -> tuple[float, float]:
-    """Largest distance, and sum of squared distances, of decoded positions from the source."""
+) -> tuple[float, float, float]:
+    """Distance of decoded positions from the source by each of MEASURES, the second rounded up as files store it."""
     vertices, _, frames = positions.shape
 
-    def measured(start: int, stop: int) -> np.ndarray:
-        result, part = np.empty(2), positions[start:stop]
+    def measured(start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        result, histogram, part = np.empty(2), np.zeros(SHORT_FLOATS, np.uint32), positions[start:stop]
         lib.ath_error(
             stop - start,
             frames,
@@ -361,8 +364,13 @@ def position_error(
             address(origin, np.float64, 3),
             result[:1].ctypes.data,
             result[1:].ctypes.data,
+            histogram.ctypes.data,
         )
-        return result
+        return result, histogram
 
-    largest, squares = np.transpose(pool.map(measured, ranges(vertices, 3 * frames)))
-    return float(largest.max()), float(sum(squares))
+    results, histograms = zip(*pool.map(measured, ranges(vertices, 3 * frames)))
+    largest, squares = np.transpose(results)
+    count = vertices * frames
+    within = np.cumsum(np.sum(histograms, axis=0, dtype=np.int64))
+    p99 = int(np.searchsorted(within, count - count // 100))
+    return float(largest.max()), from_short_float(p99), math.sqrt(float(sum(squares)) / count)

@@ -63,6 +63,12 @@ def single(value: float) -> float:
     return float(max(np.float32(value), np.finfo(np.float32).tiny))
 
 
+def nearest_singles(values: np.ndarray) -> np.ndarray:
+    """The same in numbers of float32, as float64."""
+    most = float(np.finfo(np.float32).max)
+    return np.float64(np.float32(np.clip(values, -most, most)))
+
+
 def first_step_ratio(relative_bound: float) -> float:
     """Motion step over error bound to start a search from: 4 at loose bounds, 2 at tight ones."""
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [2.0, 2.6, 4.0]))

@@ -18,7 +18,7 @@ from athcodec.ath import Ath
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
-from athcodec.encoding.motion import Plan, SegmentMotion, position_error
+from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import TRIALS, Progress
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
 from athcodec.encoding.segment import (
@@ -532,4 +532,4 @@ class Search:
     def _errors_of_maps(self, prelude: CodedPrelude, segment: SegmentMotion) -> np.ndarray:
         """RMS errors of the sample at the levels that have maps."""
         poses = (segment.pose(level, prelude.origin, prelude.dtype) for level in self._map_levels(prelude.plan))
-        return np.sqrt([position_error(pose, self.sample, prelude.origin, prelude.plan.pool)[1] for pose in poses])
+        return np.array([position_errors(pose, self.sample, prelude.origin, prelude.plan.pool)[2] for pose in poses])

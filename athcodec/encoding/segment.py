@@ -55,7 +55,7 @@ class Source:
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
 
     def __post_init__(self) -> None:
-        self.origin = np.float64((self.seen.low + self.seen.high) / 2)
+        self.origin = qz.nearest_singles((self.seen.low + self.seen.high) / 2)
         self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.sheet_like = ~_thin_branches(self)
         self.clip_range_segments = [

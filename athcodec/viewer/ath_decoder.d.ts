@@ -45,6 +45,10 @@ export class AthError extends Error {
 }
 
 /** "file" or "source", see above. */
+/** Of the errors of all vertices in all frames: the largest; what at most 1 % of them exceed, which says what is seen
+ * where single vertices stray; the root of their mean square. */
+export type Measure = "max" | "p99" | "rms";
+export type Errors = Record<Measure, number>;
 export type Order = "file" | "source";
 
 /** What comes after a clip's last frame: it stays; the first, blended into; the same way back; "loop" where the
@@ -218,9 +222,8 @@ export class AthFile {
   /** The rest pose, 3 numbers per vertex; order "source" by default. */
   rest(order?: Order): Float32Array;
   rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
-  /** Largest and root-mean-square error of showing a level, measured by the encoder, over the segments `first`
-   * to `last` (default: all). */
-  levelError(level: number, first?: number, last?: number): { max: number; rms: number };
+  /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
+  levelError(level: number, first?: number, last?: number): Errors;
   /** What a level is, for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
   levelName(level: number): string;
   /** How well a level keeps the step of a loop from its last frame to its first: the most that any vertex's is
@@ -249,10 +252,11 @@ export class AthFile {
   readyLevel(segment: number): number;
 
   parts(level: number): Parts;
-  /** The coarsest level whose largest error, seen from `distance` (scene units) under a vertical field of
+  /** The coarsest level whose error by `measure` (default: "max"), seen from `distance` (scene units) under a vertical field of
    * view of `fov` (radians) on a screen `height` pixels high, is at most `pixels` in the segments `first` to
    * `last` (default: all); the deepest where none is. */
-  levelFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number): number;
+  levelFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number,
+           measure?: Measure): number;
 
   /** Decodes a segment at a level. Throws AthError: "MISSING", "BAD_CHECKSUM", "BAD_CHUNK", "NO_MEMORY".
    * keep: so that a level that refines this one can be prepared `from` it, in less time and without the bytes of the

@@ -7,8 +7,9 @@ const WASM = "@WASM@"; // zlib, base64
 
 const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };
+const MEASURES = { max: 0, p99: 1, rms: 2 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
-const HEADER_SIZE = 64, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
+const HEADER_SIZE = 24, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
 const INFO = {
@@ -450,15 +451,11 @@ export class AthFile {
   }
 
   levelError(level, first = 0, last = this.info.segmentCount - 1) {
-    const c = this.#c;
     this.#level(level);
     this.#segment(first);
     this.#segment(last);
-    const [max, rms] = this.#core.with(16, (at) => {
-      c.ath_level_error(this.#at, level, first, last, at, at + 8);
-      return this.#core.copy(Float64Array, at, 2);
-    });
-    return { max, rms };
+    const error = (measure) => this.#c.ath_level_error(this.#at, level, first, last, measure);
+    return { max: error(MEASURES.max), p99: error(MEASURES.p99), rms: error(MEASURES.rms) };
   }
 
   levelName(level) {
@@ -573,9 +570,10 @@ export class AthFile {
     });
   }
 
-  levelFor(distance, fov, height, pixels, first = 0, last = this.info.segmentCount - 1) {
-    return this.#c.ath_level_for(this.#at, this.#segment(first), this.#segment(last), number(distance, "distance"),
-      number(fov, "fov"), number(height, "height"), number(pixels, "pixels"));
+  levelFor(distance, fov, height, pixels, first = 0, last = this.info.segmentCount - 1, measure = "max") {
+    return this.#c.ath_level_for(this.#at, this.#segment(first), this.#segment(last),
+      choice(measure, MEASURES, "measure"), number(distance, "distance"), number(fov, "fov"),
+      number(height, "height"), number(pixels, "pixels"));
   }
 
   // ---- preparing ----

@@ -18,5 +18,6 @@ _Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_
                    && ATH_BAD_ARGUMENT == 69,
                "result codes");
 _Static_assert(ATH_FILE_ORDER == 0 && ATH_SOURCE_ORDER == 1, "ORDERS");
+_Static_assert(ATH_LARGEST == 0 && ATH_P99 == 1 && ATH_RMS == 2, "MEASURES");
 _Static_assert(ATH_CLAMP == 0 && ATH_LOOP == 1 && ATH_PING_PONG == 2 && ATH_AS_MARKED == 3, "WRAPS");
 _Static_assert(ATH_LEVEL_NAME == 32, "LEVEL_NAME");

@@ -146,7 +146,7 @@ static void visit(plant *p, uint32_t *state, int own)
             double frame = ath_segment_start(p->file, shown);
             expect(ath_matrices(p->file, &segment_shown, 1, frame, matrices, 12 * sizeof(float)), "matrices");
             expect(ath_exact(p->file, &segment_shown, 1, frame, positions, 3 * sizeof(float)), "exact");
-            ath_level_for(p->file, 0, 0, 10.0, 1.0, 1000.0, 1.0);
+            ath_level_for(p->file, 0, 0, ATH_P99, 10.0, 1.0, 1000.0, 1.0);
         }
     }
     free(work);

@@ -136,9 +136,10 @@ static void ask(user *u, int32_t argument)
     REQUIRE(ready >= -1 && ready < u->info.level_count, "a ready level is one of the file's");
     if (ready >= 0)
         REQUIRE(ath_ranges(u->file, ready, segment, segment, 0, NULL, 0) == 0, "what is ready lacks nothing");
-    double largest, rms;
-    ath_level_error(u->file, level, argument & 2 ? segment : 0, segment, &largest, &rms);
-    level = ath_level_for(u->file, argument & 4 ? segment : 0, segment, argument, 0.02 * argument, 1080.0, 1.0);
+    ath_measure measure = (ath_measure)(argument % ATH_MEASURES);
+    REQUIRE(ath_level_error(u->file, level, argument & 2 ? segment : 0, segment, measure) >= 0.0, "errors are lengths");
+    level =
+        ath_level_for(u->file, argument & 4 ? segment : 0, segment, measure, argument, 0.02 * argument, 1080.0, 1.0);
     REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
     for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i, NULL);
     int32_t last = u->info.vertex_count - 1;

@@ -11,7 +11,7 @@
 #define FILLS 1
 #endif
 
-enum { FILE_LENGTH_AT = 16, CHECKSUM_AT = 12 };
+enum { CHECKSUM_AT = 12, FRONT_LENGTH_AT = 16 };
 
 void *fuzz_memory(size_t size, int fill)
 {
@@ -53,30 +53,48 @@ void fuzz_put_u32(uint8_t *at, uint32_t value)
 size_t fuzz_chunks_at(const uint8_t *file, size_t size)
 {
     if (size < HEADER) return 0;
-    uint64_t entries = fuzz_u32(file + CHUNK_COUNT_AT), errors = (uint64_t)file[44] * fuzz_u32(file + 40);
-    uint64_t at = HEADER + ENTRY * entries + 8 * errors;
-    return at <= size ? (size_t)at : 0;
+    uint64_t at = fuzz_u32(file + FRONT_LENGTH_AT), least = HEADER + 4 * (uint64_t)fuzz_u32(file + CHUNK_COUNT_AT);
+    return at >= least && at <= size ? (size_t)at : 0;
+}
+
+static void repair_front(uint8_t *file, size_t front)
+{
+    static const uint8_t fixed[12] = {
+        0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
+    memcpy(file, fixed, sizeof fixed);
+    fuzz_put_u32(file + CHECKSUM_AT, 0);
+    fuzz_put_u32(file + CHECKSUM_AT, ath_crc32c(0, file, front));
+}
+
+ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count)
+{
+    ath_limits limits = fuzz_limits((uint64_t)1 << 40);
+    ath_fault_info fault;
+    ath_header header;
+    uint64_t needed;
+    size_t front = fuzz_chunks_at(file, size);
+    if (front == 0) return NULL;
+    repair_front(file, front);
+    if (ath_read_header(file, size, &limits, &header, &needed, &fault) != ATH_OK) return NULL;
+    ath_chunk *chunks = fuzz_memory(header.chunk_count * sizeof *chunks, 0);
+    int result = ath_read_tables(file, size, &limits, &header, &needed, chunks, NULL, &fault);
+    *count = header.chunk_count;
+    if (result == ATH_OK || result == ATH_MISSING) return chunks;
+    free(chunks);
+    return NULL;
 }
 
 void fuzz_repair(uint8_t *file, size_t size)
 {
-    static const uint8_t front[12] = {
-        0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n', ATH_FORMAT_MAJOR, 0, ATH_FORMAT_MINOR, 0};
-    size_t tables_end = fuzz_chunks_at(file, size), at = tables_end;
-    if (tables_end == 0) return;
-    for (uint32_t i = 0; i < fuzz_u32(file + CHUNK_COUNT_AT); i++) {
-        uint8_t *entry = file + HEADER + (size_t)ENTRY * i;
-        size_t length = fuzz_u32(entry + 8);
-        if (length > size - at) length = size - at;
-        fuzz_put_u32(entry + 8, (uint32_t)length);
-        fuzz_put_u32(entry + 12, ath_crc32c(0, file + at, length));
-        at += length;
-    }
-    memcpy(file, front, sizeof front);
-    fuzz_put_u32(file + FILE_LENGTH_AT, (uint32_t)at);
-    fuzz_put_u32(file + FILE_LENGTH_AT + 4, 0);
-    fuzz_put_u32(file + CHECKSUM_AT, 0);
-    fuzz_put_u32(file + CHECKSUM_AT, ath_crc32c(0, file, tables_end));
+    uint32_t count = 0;
+    ath_chunk *chunks = fuzz_chunks(file, size, &count);
+    size_t front = fuzz_chunks_at(file, size);
+    for (uint32_t i = 0; chunks && i < count; i++)
+        if (chunks[i].offset + chunks[i].length <= size)
+            fuzz_put_u32(file + front - 4 * (size_t)(count - i),
+                         ath_crc32c(0, file + chunks[i].offset, chunks[i].length));
+    if (chunks) repair_front(file, front);
+    free(chunks);
 }
 
 /* ---- a file and its segments ---- */

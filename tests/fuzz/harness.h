@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTIONS = 16, HEADER = 64, ENTRY = 16, CHUNK_COUNT_AT = 24 };
+enum { OPTIONS = 16, HEADER = 24, CHUNK_COUNT_AT = 20 };
 
 #define REQUIRE(condition, what)                                                                                       \
     do {                                                                                                               \
@@ -31,11 +31,14 @@ uint8_t *fuzz_copy(const uint8_t *bytes, size_t size);
 uint32_t fuzz_u32(const uint8_t *at);
 void fuzz_put_u32(uint8_t *at, uint32_t value);
 
-/* Where the first chunk begins; 0: the tables do not fit. */
+/* Where the first chunk begins; 0: the front does not fit. */
 size_t fuzz_chunks_at(const uint8_t *file, size_t size);
 
-/* Magic, version, lengths and checksums that fit whatever the rest says. */
+/* Magic, version, length of the front and checksums that fit whatever the rest says. */
 void fuzz_repair(uint8_t *file, size_t size);
+
+/* The chunks of a file whose front is valid but for what fuzz_repair changes, *count of them, to be freed; null: none. */
+ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count);
 
 /* Limits small enough for a fuzzer, and for the memory of all its objects to be bounded by. */
 ath_limits fuzz_limits(uint64_t memory_bytes);

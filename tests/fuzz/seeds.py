@@ -156,15 +156,15 @@ def _prelude_inputs(data: bytes) -> Iterator[bytes]:
         return
     hierarchy, rest, time = (parts.payload(kind) for kind in (ct.HIERARCHY, ct.REST, ct.TIME))
     counts = header.vertex_count, header.branch_count, header.frame_count
-    method = rest[0] | rest[1] << 1
-    yield _prelude_head(*counts, method, rest[28:36], len(hierarchy) - 16) + hierarchy[16:] + rest[36:]
+    step = struct.pack("<d", *struct.unpack_from("<f", rest, 13))
+    yield _prelude_head(*counts, rest[0], step, len(hierarchy) - 8) + hierarchy[8:] + rest[17:]
     if time[0] == 2:
-        yield _prelude_head(*counts, 4, rest[28:36], len(hierarchy) - 16) + hierarchy[16:] + time[1:]
+        yield _prelude_head(*counts, 4, step, len(hierarchy) - 8) + hierarchy[8:] + time[1:]
     for chunk, payload in parts.chunks:
         if chunk.kind == ct.STEMS and payload[5]:
             bits, (length,) = payload[5], struct.unpack_from("<I", payload, 8)
             stream = payload[12 : 12 + length]
-            yield _prelude_head(*counts, 8 | bits - 8 << 4 & 255, rest[28:36], 0) + stream
+            yield _prelude_head(*counts, 8 | bits - 8 << 4 & 255, step, 0) + stream
 
 
 def inputs(target: str) -> Iterator[bytes]:

@@ -136,8 +136,10 @@ static void close_file(player *p)
 
 static void choose_level(player *p, double distance)
 {
-    int32_t at_least = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, PIXELS);
-    int32_t at_most = ath_level_for(p->file, p->first_segment, p->last_segment, distance, FOV, SCREEN, COMFORTABLE);
+    int32_t at_least =
+        ath_level_for(p->file, p->first_segment, p->last_segment, ATH_P99, distance, FOV, SCREEN, PIXELS);
+    int32_t at_most =
+        ath_level_for(p->file, p->first_segment, p->last_segment, ATH_P99, distance, FOV, SCREEN, COMFORTABLE);
     if (p->level < at_least) p->level = at_least;
     if (p->level > at_most) p->level = at_most;
 }
@@ -299,12 +301,12 @@ static int draw(player *p, double place)
 /* From where level 0 will do, to where none but the last will, and back: a third of the time close up. */
 static double camera(const player *p, double progress)
 {
-    double error, unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* pixels of a length of 1 from a distance of 1 */
+    double unit = SCREEN / (2.0 * tan(FOV / 2.0)); /* pixels of a length of 1 from a distance of 1 */
     double nearness = fmin(1.0, 1.5 * (1.0 - fabs(2.0 * progress - 1.0)));
-    ath_level_error(p->file, 0, p->first_segment, p->last_segment, &error, NULL);
+    double error = ath_level_error(p->file, 0, p->first_segment, p->last_segment, ATH_P99);
     double far = fmax(1e-6, 1.5 * error * unit / COMFORTABLE);
     int32_t last_but_one = p->info.level_count > 1 ? p->info.level_count - 2 : 0;
-    ath_level_error(p->file, last_but_one, p->first_segment, p->last_segment, &error, NULL);
+    error = ath_level_error(p->file, last_but_one, p->first_segment, p->last_segment, ATH_P99);
     double near = fmax(1e-6 * far, error * unit / (2.0 * PIXELS));
     return far * pow(near / far, nearness);
 }

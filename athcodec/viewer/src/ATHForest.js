@@ -23,6 +23,7 @@ const breath = () => new Promise((done) => { setTimeout(done); });
 export class ATHForest extends Group {
   levelOfDetail = true;
   pixels = 1;
+  measure = "p99"; // of the errors of levels that `pixels` is about; before the first bake()
   counts = [];     // instances drawn, by level
   vertices = 0;    // drawn, all instances
   culled = 0;
@@ -108,7 +109,8 @@ export class ATHForest extends Group {
   // Geometries of a level: the finest for where its error is a pixel, coarser ones up to where the level before takes over.
   async #draw(level, clip, known, played) {
     const { channel, motion, rest, sphere } = this.#ath, deepest = level === motion.levelCount - 1;
-    const least = clip.errors[level].max, most = level > 0 ? clip.errors[level - 1].max : sphere.radius / 4;
+    const error = (of) => clip.errors[of][this.measure];
+    const least = error(level), most = level > 0 ? error(level - 1) : sphere.radius / 4;
     const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
     node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
     const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), played.uniforms, true);

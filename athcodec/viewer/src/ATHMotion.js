@@ -37,6 +37,7 @@ export class ATHMotion extends EventDispatcher {
   automatic = true;
   target = 0;         // the level that is asked for
   pixels = 1;         // error on the screen that automatic level allows
+  measure = "p99";    // which error
   heat = false;       // whether pictures come with `distances`
   distances = null;   // per vertex, from the deepest position that is here
   mode = "matrices";
@@ -137,7 +138,7 @@ export class ATHMotion extends EventDispatcher {
     return this.clip.duration > 0 ? 8 * this.motionBytes(level) / this.clip.duration : 0;
   }
 
-  /** Largest and root-mean-square error of a level in the clip: {max, rms}. */
+  /** Errors of a level in the clip: {max, p99, rms}. */
   error(level) {
     return this.clip.errors[level];
   }
@@ -225,7 +226,7 @@ export class ATHMotion extends EventDispatcher {
     return this;
   }
 
-  /** The coarsest level whose largest error is at most `pixels` on a screen `height` pixels high. */
+  /** The coarsest level whose error by `measure` is at most `pixels` on a screen `height` pixels high. */
   levelFor(camera, height, matrixWorld = null, pixels = this.pixels) {
     const sphere = this.#channel.sphere;
     centre.copy(sphere.center);
@@ -238,7 +239,7 @@ export class ATHMotion extends EventDispatcher {
     const perUnit = camera.isOrthographicCamera ? height * camera.zoom / (camera.top - camera.bottom)
       : height / (2 * Math.tan(MathUtils.degToRad(camera.fov) / 2) / camera.zoom * distance);
     for (let level = 0; level < this.levelCount; level++)
-      if (this.error(level).max * size * perUnit <= pixels) return level;
+      if (this.error(level)[this.measure] * size * perUnit <= pixels) return level;
     return this.levelCount - 1;
   }
 

@@ -156,10 +156,13 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Whether the clip repeats from its first frame, by that. */
   readonly loops: boolean;
   setTime(seconds: number): this;
-  /** A level, or "auto": the coarsest whose largest error is at most `pixels` on the screen, by update(). What is not
+  /** A level, or "auto": the coarsest whose error by `measure` is at most `pixels` on the screen, by update(). What is not
    * here or not decoded yet is shown at the deepest level that is. */
   setLevel(level: number | "auto"): this;
   pixels: number;
+  /** Of the errors of all vertices the largest, the 99th percentile (default: single vertices that stray do not keep
+   * finer levels on the screen), or the root mean square. */
+  measure: "max" | "p99" | "rms";
   /** Chooses the automatic level: once per frame, before setTime(). height: of the picture in pixels. */
   update(camera: Camera, height: number, object?: Object3D): this;
   levelFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
@@ -198,7 +201,7 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
    * last frame to its first is, at most. */
   motionBytes(level: number): number;
   bitRate(level?: number): number;
-  error(level: number): { max: number; rms: number };
+  error(level: number): { max: number; p99: number; rms: number };
   seamError(level: number): number;
   /** Per vertex in source order, the branch whose node moves it at a level; its own where it moves alone. */
   nodeNumbers(level?: number): Promise<Int32Array>;
@@ -246,6 +249,8 @@ export class ATHForest extends Group {
   levelOfDetail: boolean;
   /** Error on the screen that is allowed, in pixels. */
   pixels: number;
+  /** As of ATHMotion, before the first bake(). */
+  measure: "max" | "p99" | "rms";
   readonly count: number;
   /** Levels of the motion's clip that can be drawn. */
   readonly baked: number[];
