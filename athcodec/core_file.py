@@ -194,7 +194,7 @@ class File:
         lib.ath_get_info(self._file, byref(self.info))
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
-        self._refined = self.info.depth_levels - 1  # levels up to this one have what their layers share
+        self._refined = 0  # levels up to this one have what their segments share
         self._building = threading.Lock()
 
     @staticmethod
@@ -212,7 +212,7 @@ class File:
                 self._build = memory
 
     def refine(self, level: int) -> None:
-        """Computes what the layers of precision up to that of a level share, unless that is done."""
+        """Computes what the segments share at a level, unless that is done."""
         with self._building:
             if level <= self._refined:
                 return
@@ -222,7 +222,7 @@ class File:
             self._refined = level
 
     def refinement_size(self, level: int) -> int:
-        """Bytes that the layers up to that of a level take, and those that are built already."""
+        """Bytes of what the segments share at the levels up to one, and of what is built already."""
         with self._building:
             further = self._refine_size(level) if level > self._refined else 0
             return further + sum(map(len, self._refinements))
@@ -259,7 +259,7 @@ class File:
         return lib.ath_seam_error(self._file, clip, level)
 
     def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
-        """(N, 3) float64: the rest pose of the level's layer, read unless that is done."""
+        """(N, 3) float64: the rest pose that the level moves, read unless that is done."""
         with self._building:
             self._refine_size(level)
         out = np.empty((self.info.vertex_count, 3))

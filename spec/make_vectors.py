@@ -1409,8 +1409,19 @@ def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plan
         (rd.STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
     }
     plant.scripts |= {
-        (rd.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6) for level in range(40)
+        (rd.REFINED_REST, level, 0): lambda level=level: Chance(100 * seed + level + 70, large=6)
+        for level in range(2, 40)
     }
+    return plant
+
+
+LEVEL_1_REST = {(rd.REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
+
+
+def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
+    """The same, with a rest pose of level 0 alone."""
+    plant = refinements(stems, seed, **fields)
+    plant.scripts |= LEVEL_1_REST
     return plant
 
 
@@ -1543,6 +1554,34 @@ for level_ in range(5):
         f"three layers, shortened after level {level_}",
         lambda level=level_: layered().draft().upto(level),
     )
+valid("rest-of-level-1", "level 1 refines the rest pose, and so do the refinements", layered(scripts=LEVEL_1_REST))
+valid(
+    "rest-of-level-1-alone",
+    "level 1 refines the rest pose, which the refinements have, too",
+    layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), scripts=LEVEL_1_REST),
+)
+for level_ in range(4):
+    valid(
+        f"rest-of-level-1-upto-{level_}",
+        f"level 1 refines the rest pose, and the file is shortened after level {level_}",
+        lambda level=level_: layered(scripts=LEVEL_1_REST).draft().upto(level),
+    )
+valid(
+    "rest-of-level-1-of-point",
+    "the rest pose of level 0 is a point: its maps have no directions, those of level 1 have",
+    rest_by_level([Stem(-1, 3), Stem(0, 2, 1), Stem(1, 2, 1)], 41, points=[(0, 0, 0)] * 7),
+)
+valid(
+    "rest-of-level-1-beams",
+    "runs of beams, loose stems, a root of two pieces and two roots",
+    rest_by_level([*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)], 42, frames=5, segments=2, is_float64=True),
+)
+valid(
+    "rest-of-level-1-whole",
+    "all that level 0 moves is shown exactly at level 1",
+    rest_by_level([Stem(-1, 4, 0, WHOLE), Stem(0, 3, 2)], 43),
+)
+valid("rest-of-level-1-still", "the chunk has no bytes in its stream", layered(scripts={(rd.REFINED_REST, 1, 0): []}))
 
 # ---- invalid: the header -----------------------------------------------------------------------------------
 
@@ -2758,7 +2797,7 @@ table(
     "SHAPES of a refinement stands with segment 0",
     lambda: layered().draft().add(Entry(rd.SHAPES, b"\0", 3, 1)),
 )
-for level_, why in ((1, "a level of the hierarchy"), (2, "the first layer"), (5, "the lossless level")):
+for level_, why in ((0, "level 0"), (2, "a level of the hierarchy above 1"), (5, "the lossless level")):
     table(
         f"refined-rest-{level_}",
         "BAD_CHUNK_TABLE",
@@ -2771,6 +2810,21 @@ table(
     "REFINED_REST stands with segment 0",
     lambda: layered(3, (rd.REFINED_REST, 3, 0)).draft().add(Entry(rd.REFINED_REST, b"", 3, 1)),
 )
+for name, why, plant in (
+    ("with-stems", "level 0 has STEMS", rest_by_level([*FORK, Stem(-1, 2)], 44)),
+    (
+        "with-affines",
+        "AFFINES of level 0 serve level 1",
+        rest_by_level([Stem(-1, 2, 0, WHOLE), Stem(0, 2, 1), *[Stem(-1, 2), Stem(2, 2, 1)]], 45),
+    ),
+    ("of-one-layer", "Layer_Count is 1", Plant(FORK, scripts=LEVEL_1_REST)),
+):
+    table(
+        f"refined-rest-1-{name}",
+        "BAD_CHUNK_TABLE",
+        f"REFINED_REST of level 1, though {why}",
+        lambda plant=plant: plant.draft(),
+    )
 
 
 def refinement(name: str, kind: int, reason: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
@@ -2870,6 +2924,28 @@ invalid(
     "the file ends inside REFINED_REST",
     lambda: cut(lambda draft: end_of(draft, rd.REFINED_REST, 3) - 1, layered().draft()),
 )
+for name, why, error, change in (
+    ("exact", "of a rest pose that is exact", "BAD_CHUNK", None),
+    ("step", "whose Rest_Step is 0", "BAD_CHUNK", lambda content: dict(content=bytes(4) + content[4:])),
+    ("behind", "with a zero byte behind its stream", "BAD_CHUNK", lambda content: dict(content=content + b"\0")),
+    ("checksum", "whose Checksum is another", "BAD_CHECKSUM", lambda content: dict(checksum=0)),
+):
+    invalid(
+        f"refined-rest-1-{name}",
+        error,
+        1,
+        f"REFINED_REST of level 1 {why}",
+        lambda change=change: bad_rest_of_1(change),
+    )
+
+
+def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
+    """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
+    if change is None:
+        exact = layered(3, (rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
+        return exact.draft().add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 1))
+    draft = layered(scripts=LEVEL_1_REST).draft()
+    return draft.change(rd.REFINED_REST, 1, **change(draft.content(rd.REFINED_REST, 1)))
 
 
 def refined_run(count: int) -> bytes:

@@ -2358,7 +2358,7 @@ class AthFile:
                 wanted |= {(EXACT, level, s)} if level == self.lossy_levels else set()
                 allowed |= {(CORRECTIONS, level, s)} if plan.height < level < self.lossy_levels else set()
             allowed |= {(SHAPES, level, 0)} if self._has_stems(level) else set()
-            allowed |= {(REFINED_REST, level, 0)} if plan.height + 1 < level < self.lossy_levels else set()
+            allowed |= {(REFINED_REST, level, 0)} if self._may_refine_rest(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
         require(
             wanted <= there <= wanted | allowed,
@@ -2373,7 +2373,7 @@ class AthFile:
         step = f32(chunk, 13)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
         self.rest_type = np.dtype("<f8" if chunk[0] & 2 else "<f4")
-        self._rests: list[RestLayer] = []  # of the layers that refine it; none where it is exact
+        self._rests: list[RestLayer] = []  # and those that refine it; none where it is exact
         if chunk[0] & 1 == 0:
             coded = decode_rest(chunk[17:], self.branches, step)
             self._rests = [coded]
@@ -2383,7 +2383,7 @@ class AthFile:
             shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & 2)))
             rest = shown - self.origin
         self.plan.rest = rest
-        self._plans = [self.plan]
+        self._plans: list[Plan] = []  # of the layers, from level 1 on
         self._shown_rest = shown.astype(self.rest_type)
 
     # Layers: level h + 1 + q is that of layer q, those below are of layer 0 as well.
@@ -2398,13 +2398,22 @@ class AthFile:
     def _has_stems(self, level: int) -> bool:
         return self.plan.has_stems(level) or self.plan.height + 1 < level < self.lossy_levels
 
-    def _plan_of(self, q: int) -> Plan:
-        """That of a layer, on its own rest pose."""
+    def _may_refine_rest(self, level: int) -> bool:
+        """Level 1 may where nothing of level 0 serves other levels."""
+        plan = self.plan
+        alone = self.header.layer_count > 1 and not plan.has_stems(0) and not plan.has_affines(0, 1)
+        return plan.height + 1 < level < self.lossy_levels or (level == 1 and alone)
+
+    def _plan_of(self, level: int, q: int) -> Plan:
+        """That of a layer, on its own rest pose, as it serves to show a level."""
+        if level == 0:
+            return self.plan
         for layer in range(len(self._plans), q + 1):
-            level = self.plan.height + 1 + layer
-            plan = self._plans[-1].refined(self.branches, level)
-            if self.find(REFINED_REST, level):
-                plan.rest = self._refined_rest(self.content(REFINED_REST, level))
+            place = self.plan.height + 1 + layer if layer > 0 else 1
+            plan = self._plans[-1].refined(self.branches, place) if layer > 0 else self.plan
+            if self.find(REFINED_REST, place):
+                plan = plan if layer > 0 else Plan(self.branches)
+                plan.rest = self._refined_rest(self.content(REFINED_REST, place))
             self._plans.append(plan)
         return self._plans[q]
 
@@ -2416,8 +2425,8 @@ class AthFile:
         return rest
 
     def rest(self, level: int = 0) -> np.ndarray:
-        """(vertices, 3) of Rest_Type, source order: that of the level's layer."""
-        plan = self._plan_of(self._layer_of(level))
+        """(vertices, 3) of Rest_Type, source order: that which the level moves."""
+        plan = self._plan_of(level, self._layer_of(level))
         if plan.rest is self.plan.rest:
             return self._in_source_order(self._shown_rest)
         with np.errstate(over="ignore"):
@@ -2479,7 +2488,7 @@ class AthFile:
 
     def _first_layer(self, s: int, frames: int, level: int) -> Pose:
         """All vertices of a segment at a level of the branch hierarchy."""
-        plan, motion = self.plan, Motion(frames, cosine_waves(frames))
+        plan, motion = self._plan_of(level, 0), Motion(frames, cosine_waves(frames))
         for d in range(level + 1):
             if self.find(SHAPES, d):
                 decode_shapes(self.content(SHAPES, d), plan, motion, d)
@@ -2493,7 +2502,8 @@ class AthFile:
 
     def _refinement(self, s: int, frames: int, q: int, before: Pose) -> Refinement:
         """All vertices of a segment in a layer, from those of the layer before."""
-        plan, level = self._plan_of(q), self.plan.height + 1 + q
+        level = self.plan.height + 1 + q
+        plan = self._plan_of(level, q)
         motion = Motion(frames, cosine_waves(frames), dict(before.motion.streams))
         if self.find(SHAPES, level):
             chunk = self.content(SHAPES, level)

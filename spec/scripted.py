@@ -512,7 +512,7 @@ class Plant:
         )
         branches, *_ = rd.decode_hierarchy(stream, len(self.stems), vertices)
         rest = self._rest(branches)
-        self.plan = rd.Plan(branches)
+        self.plan = self.level_0 = rd.Plan(branches)
         rests = self._set_rest(branches, rest)
         clips = self.clips or (rd.Clip(self.frames, self.segments),)
         entries = [
@@ -526,6 +526,10 @@ class Plant:
                     rd.CLIPS, b"".join(clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)
                 )
             )
+        if (rd.REFINED_REST, 1, 0) in self.scripts:
+            entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
+            self.plan = rd.Plan(branches)
+            self.plan.rest = np.array(rests[-1].rest)
         self.plans, self.shapes = [self.plan], [self._no_motion(1)]
         for level in range(self.plan.height + 2):
             if (rd.SHAPES, level, 0) in self.scripts:
@@ -568,7 +572,7 @@ class Plant:
         )
 
     def _set_rest(self, branches: list, chunk: bytes) -> list[rd.RestLayer]:
-        """The rest pose of the first layer, for those that refine it; none where it is exact."""
+        """The rest pose of REST, for those that refine it; none where it is exact."""
         with np.errstate(all="ignore"):
             if chunk[0] & 1:
                 points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2))
@@ -593,10 +597,7 @@ class Plant:
         level, entries = self.plan.height + 1 + q, []
         plan, shapes = self.plans[-1].refined(branches, level), self._no_motion(1)
         if (rd.REFINED_REST, level, 0) in self.scripts:
-            step = self.step / self.ratio**q
-            stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), branches, step, rests[-1])
-            entries.append(Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level))
-            rests.append(rd.decode_rest(stream, branches, step, rests[-1]))
+            entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
             plan.rest = np.array(rests[-1].rest)
         if (rd.SHAPES, level, 0) in self.scripts:
             stream = self._write(
@@ -607,6 +608,12 @@ class Plant:
         self.shapes.append(shapes)
         return entries
 
+    def _refined_rest(self, branches: list, level: int, step: float, rests: list[rd.RestLayer]) -> Entry:
+        """The rest pose of a level, which is added to those before."""
+        stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), branches, step, rests[-1])
+        rests.append(rd.decode_rest(stream, branches, step, rests[-1]))
+        return Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level)
+
     def _segment(self, s: int, frames: int) -> list[Entry]:
         motion = self._no_motion(frames, self.shapes[0])
         entries, last = [], self.plan.height + 1
@@ -616,7 +623,8 @@ class Plant:
                 stream = self._write(rd.decode_stems, (rd.STEMS, level, s), self.plan, motion, level)
                 entries.append(Entry(rd.STEMS, head + stream, level, s))
             if self.plan.has_affines(level, level):
-                stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), self.plan, motion, level)
+                plan = self.level_0 if level == 0 else self.plan
+                stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), plan, motion, level)
                 entries.append(Entry(rd.AFFINES, stream, level, s))
         if self.layers > 1:
             entries += self._refinements(s, motion)

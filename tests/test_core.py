@@ -702,7 +702,7 @@ def refined_rests(player: Player) -> list[Chunk]:
 
 
 def rest_of(player: Player, level: int) -> np.ndarray | None:
-    """The rest pose of a level's layer in file order; None where it has not been read."""
+    """The rest pose that a level moves in file order; None where it has not been read."""
     rest = np.zeros((player.info.vertex_count, 3))
     result = core.ath_level_rest(player.address, level, FILE_ORDER, rest.ctypes.data, 24)
     assert result in (OK, BAD_ARGUMENT)
@@ -727,6 +727,24 @@ def test_a_refined_rest_pose_is_asked_for_until_it_is_read(layered):
     for offset, size in stream.ranges(level, last, last):
         stream.feed(offset, size)
     assert stream.result_of_preparing(last, level) == OK
+
+
+def test_a_rest_pose_of_level_1_is_read_for_it_and_matrices_are_of_that_of_their_level(sample_ath):
+    data = sample_ath.read_bytes()
+    stream = Player(data, whole=False)
+    chunk = refined_rests(stream)[0]
+    assert chunk.level == 1
+    for offset, size in stream.ranges(0, 0, stream.segments[-1]):
+        stream.feed(offset, size)
+    assert stream.result_of_preparing(0, 0) == OK and rest_of(stream, 1) is None
+    before = stream.frame([stream.prepare(0, 0)], 3)
+    assert stream.refine(1) == MISSING and text_of(stream.refusal).startswith("chunk REFINED_REST of level 1")
+    for offset, size in stream.ranges(1, 0, stream.segments[-1]):
+        stream.feed(offset, size)
+    assert stream.result_of_preparing(0, 1) == OK
+    assert np.array_equal(stream.frame([stream.prepare(0, 0)], 3), before)
+    level_0, *others = (rest_of(stream, level) for level in range(stream.info.depth_levels))
+    assert all(np.array_equal(rest, others[0]) for rest in others) and not np.array_equal(level_0, others[0])
 
 
 def test_layers_are_built_in_any_order_and_play_the_same(layered):
@@ -1055,9 +1073,9 @@ def test_between_two_frames_is_their_blend_forwards_and_backwards(player):
 
 def test_matrices_and_exact_vertices_of_a_cut_are_the_positions(player):
     """The vertex shader of examples/play.c."""
-    rest = np.zeros((player.info.vertex_count, 3), np.float32)
-    core.ath_rest(player.address, FILE_ORDER, rest.ctypes.data, 12)
     for level in player.levels:
+        assert player.refine(level) == OK
+        rest = rest_of(player, level).astype(np.float32)
         parts, nodes, exact = cut(player, level)
         assert [v for p in parts for v in range(p.first, p.first + p.count)] == list(range(len(rest)))
         assert (nodes == 0) == (level >= player.info.depth_levels - 1) and (exact == 0) == (level == 0)

@@ -190,9 +190,9 @@ def test_the_map_of_a_part_that_moves_as_one_gives_its_positions(played):
 def test_every_subtree_stays_attached_to_its_parents_stem(played):
     decoder, source = played
     assert not (decoder.file.branches["flags"] & LOOSE).any()
-    pose, hierarchy = base_pose(decoder), decoder.hierarchy
-    attached = 0
+    hierarchy, attached = decoder.hierarchy, 0
     for level in range(decoder.level_count - 1):
+        pose = base_pose(decoder, level)
         for frame in shown_frames(decoder):
             parts = decoder.affines(frame, level)
             shown = decoder.positions(frame, level, np.float64)[hierarchy.vertex_source]
@@ -511,9 +511,10 @@ def test_maps_hang_together_on_degenerate_plants(scratch, clip):
     size = size_of(clip.positions) or 1.0
     athcodec.encode(clip, scratch / "maps.ath", max_error=1e-3 * size, segment_frames=16, effort="fast")
     with athcodec.open(scratch / "maps.ath") as decoder:
-        hierarchy, pose = decoder.hierarchy, base_pose(decoder)
+        hierarchy = decoder.hierarchy
         full = decoder.positions(17)[hierarchy.vertex_source]
         for level in range(decoder.level_count):
+            pose = base_pose(decoder, level)
             parts = decoder.affines(17, level)
             assert len(parts.branch) == decoder.levels[level].nodes
             matrices = np.repeat(parts.matrices, parts.vertex_count, axis=0)

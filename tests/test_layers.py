@@ -150,6 +150,51 @@ def test_the_rest_pose_is_as_precise_as_the_deepest_level_that_is_there(layered_
             assert np.array_equal(cut.rest, rest)
 
 
+@pytest.fixture(scope="module")
+def in_steps(tmp_path_factory):
+    """The sample, whose level 1 refines the rest pose, and its clip."""
+    path, clip = tmp_path_factory.mktemp("steps") / "sample.ath", athcodec.read_hdf5(athcodec.sample_path())
+    athcodec.encode(clip, path, rel_error=1e-4, attributes="none")
+    return path, clip
+
+
+def test_level_0_has_a_rest_pose_of_its_own_where_that_costs_little(in_steps):
+    """Half the bytes before anything moves."""
+    path, clip = in_steps
+    check_levels(clip, path)
+    with athcodec.open(path) as decoder:
+        least, of_layer = (np.abs(decoder.level_rest(level) - clip.rest).max() for level in (0, 1))
+        rests = [decoder.level_rest(level) for level in range(1, decoder.file.core.info.depth_levels)]
+        lengths = [chunk.length for chunk in decoder.file.chunks if chunk.kind in (ct.REST, ct.REFINED_REST)]
+    assert decoder.levels[0].bytes < 700 and 2 * lengths[0] < 1.4 * sum(lengths[:2])
+    assert least > 2 * of_layer and all(np.array_equal(rest, rests[0]) for rest in rests)
+
+
+def test_a_rest_pose_that_is_cut_off_leaves_level_0(in_steps, tmp_path):
+    path, _ = in_steps
+    with athcodec.open(path) as whole:
+        chunk = next(chunk for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST)
+        for level in (0, 1, whole.level_count - 1):
+            athcodec.truncate(path, tmp_path / "cut.ath", level)
+            with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
+                assert (chunk.level in [own.level for own in cut.file.chunks if own.kind == chunk.kind]) == (level > 0)
+                assert np.array_equal(cut.positions(7), whole.positions(7, level))
+                assert np.array_equal(cut.level_rest(level), whole.level_rest(level))
+        with athcodec.open(BytesIO(path.read_bytes()[: chunk.offset + 1])) as part:
+            assert part.deepest == 0 and np.array_equal(part.positions(7), whole.positions(7, 0))
+            assert np.array_equal(part.affines(7).matrices, whole.affines(7, 0).matrices)
+
+
+@pytest.mark.parametrize(
+    ("roots", "options"), [(1, {"exact_rest": True}), (1, {"ladder": "none"}), (8, {})], ids=["exact", "one", "stems"]
+)
+def test_level_1_refines_no_rest_pose_where_it_may_not(roots, options, tmp_path):
+    clip = plant(seed=5, branches=12, frames=20, roots=roots)
+    path = athcodec.encode(clip, tmp_path / "a.ath", **{"ladder": LADDER, "effort": "fast"} | options).path
+    with athcodec.open(path, strict=True) as decoder:
+        assert 1 not in [chunk.level for chunk in decoder.file.chunks if chunk.kind == ct.REFINED_REST]
+
+
 def test_asking_for_the_rest_pose_reads_the_rest_poses_alone_and_once(layered_ath):
     with athcodec.open(layered_ath) as decoder:
         before = decoder.file.bytes_read

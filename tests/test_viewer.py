@@ -30,6 +30,7 @@ from athcodec import container as ct
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
+from bench import throttled_server  # noqa: E402
 from bench.browser import chromium  # noqa: E402
 from bench.throttled_server import WEB, ThrottledServer  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
@@ -364,6 +365,14 @@ def positions_of(page, call: str) -> np.ndarray:
     return np.array(page.evaluate(call), float).reshape(-1, 3)
 
 
+def drawn_at_level_0(decoder, frame: int) -> np.ndarray:
+    """Its matrices on the rest pose of the levels above, which a page draws it with once that is there."""
+    parts, order = decoder.affines(frame, 0), decoder.hierarchy.vertex_source
+    matrices, out = np.repeat(parts.matrices, parts.vertex_count, axis=0), np.empty((decoder.vertex_count, 3))
+    out[order] = np.einsum("nij,nj->ni", matrices[..., :3], decoder.level_rest(1)[order]) + matrices[..., 3]
+    return out
+
+
 @browser_test
 def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath):
     """In the worker, in the texture, and as the vertex shader reads it."""
@@ -377,9 +386,38 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
                 decoded = positions_of(page, f"athcodecViewer.decoded({seconds}, {level})")
                 assert np.array_equal(decoded.astype(np.float32), wanted.astype(np.float32))
                 assert page.evaluate(f"athcodecViewer.shown({seconds}, {level})")["level"] == level
+                drawn = wanted if level > 0 else drawn_at_level_0(decoder, frame)
                 for way in ("uploaded", "onGraphics"):
                     shown = positions_of(page, f"athcodecViewer.{way}()")
-                    assert np.abs(shown - wanted).max() < 1e-6 * size, (level, frame, way)
+                    assert np.abs(shown - drawn).max() < 1e-6 * size, (level, frame, way)
+
+
+@browser_test
+def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, sample_ath, monkeypatch):
+    """Lines and limbs are there before it, with that of level 0."""
+    with athcodec.open(sample_ath) as decoder:
+        rests = [decoder.level_rest(level).astype(np.float32) for level in (0, 1)]
+        assert not np.array_equal(*rests) and decoder.levels[0].bytes + 100 < decoder.levels[1].bytes
+        after = decoder.levels[0].bytes + 100
+    monkeypatch.setattr(throttled_server, "PACKET", 100)
+    with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=after) as line:
+        page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
+        page.evaluate("athcodecViewer.plants[0].ath.lines")
+        drawn = """(() => {
+            const { ath, root } = athcodecViewer.plants[0];
+            const limbs = root.children[0].geometry;
+            const { rest, lines, sphere } = ath, point = (array, i) => String(array.subarray(3 * i, 3 * i + 3));
+            const ends = Array.from(limbs.userData.source);
+            return { rest: [...rest], lines: [...lines.attributes.position.array], radius: sphere.radius,
+              limbs: ends.every((v, i) => point(limbs.attributes.rest.array, i) === point(rest, v)) };
+        })()"""
+        for rest in rests:
+            found = page.evaluate(drawn)
+            assert np.array_equal(np.array(found["rest"], np.float32).reshape(-1, 3), rest)
+            assert found["lines"] == found["rest"] and found["limbs"]
+            assert abs(2 * found["radius"] - np.linalg.norm(np.ptp(rest, axis=0))) < 1e-5 * found["radius"]
+            line.release()
+            page.wait_for_function("() => athcodecViewer.motion.level > 0", timeout=60_000)
 
 
 def play(page, clip) -> None:
@@ -402,7 +440,8 @@ def test_every_clip_shows_the_positions_that_python_decodes_of_it(opened, medley
                     assert np.abs(decoded - wanted).max() < 1e-6 * np.ptp(wanted)  # times are rounded
                     page.evaluate(f"athcodecViewer.shown({seconds}, {level})")
                     shown = positions_of(page, "athcodecViewer.onGraphics()")
-                    assert np.abs(shown - wanted).max() < 2e-6 * np.ptp(wanted), (clip.name, level, frame)
+                    drawn = wanted if level > 0 else drawn_at_level_0(decoder, frame)
+                    assert np.abs(shown - drawn).max() < 2e-6 * np.ptp(wanted), (clip.name, level, frame)
 
 
 @browser_test

@@ -436,7 +436,7 @@ const feed = (ranges) => {
 };
 const shown = (of, level) => digest(of.positions([of.prepare(last, level)], middle));
 const result = { before: thrown(() => file.prepare(last, 1)), none: file.readyLevel(last) };
-const wanted = file.ranges(1, last, last);
+const wanted = file.ranges(1, last, last), least = file.ranges(0, last, last);
 feed([...wanted].reverse());
 Object.assign(result, {
   left: file.ranges(1, last, last), all: same(file.ranges(1, last, last, true), wanted),
@@ -449,7 +449,7 @@ const preparation = file.preparation(0, deepest);
 result.busy = thrown(() => file.drop(0, bytes.length));
 preparation.cancel();
 file.drop(0, bytes.length);
-result.dropped = [file.readyLevel(last), same(file.ranges(1, last, last), wanted)];
+result.dropped = [file.readyLevel(last), same(file.ranges(0, last, last), least)];
 answer(result);
 """
 

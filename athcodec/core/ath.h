@@ -2,7 +2,7 @@
  *
  *     ath_front -> ath_open -> ath_build        once per file: header, hierarchy, rest pose
  *     ath_fault_text                            why a file is refused, in a sentence
- *     ath_refine                                once per level that refines another
+ *     ath_refine                                once per level above 0
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
  *     ath_prepare, or _start and _step          one segment at one level: entropy decoding, inverse transforms
  *     ath_keep, ath_prepare_onward              a deeper level of a segment, from the one that is prepared
@@ -203,13 +203,13 @@ ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
 /* Levels 0 to info.depth_levels - 1 are the branch hierarchy's, at the precision of the first layer; each further level
- * refines all of it by one layer, some of which refine the rest pose too. Before such a level is prepared, what its
- * layers share is built, once ath_build has run, in memory that stays as long as the file's:
- *     ath_refine_size reads the rest poses of the layers up to the level's from their REFINED_REST chunks, which
- * ath_ranges names until they are read, and says how much memory ath_refine needs, which may be none. ATH_MISSING,
- * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
+ * refines all of it by one layer. Level 1 and such levels may refine the rest pose, too. Before any level above 0 is
+ * prepared, what the segments share at it is built, once ath_build has run, in memory that stays as long as the file's:
+ *     ath_refine_size reads the rest poses up to the level's from their REFINED_REST chunks, which ath_ranges names until
+ * they are read, and says how much memory ath_refine needs, which may be none. ATH_MISSING, ATH_BAD_CHECKSUM,
+ * ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
  *     ath_refine builds what is not built yet. The same, ATH_NO_MEMORY.
- * Levels of the first layer, and what is built already, need neither, but allow both. */
+ * Level 0, and what is built already, need neither, but allow both. */
 ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
 ATH_API int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes);
 
@@ -276,12 +276,12 @@ ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
-/* The rest pose: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's numbers
- * were floats: what the file's arithmetic has as doubles is rounded to them. */
+/* The rest pose of level 0: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's
+ * numbers were floats: what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
-/* The rest pose of a level's layer, which the level moves: the one above for levels of the first layer. ATH_BAD_ARGUMENT
- * for no level of the file, and where ath_refine_size has not read it. */
+/* The rest pose that a level moves, and that its matrices apply to: the one above for level 0; the same for all levels
+ * with nodes above it. ATH_BAD_ARGUMENT for no level of the file, and where ath_refine_size has not read it. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* How errors of all vertices in all frames are made one number: the largest; what at most a hundredth of them exceeds,
@@ -439,7 +439,7 @@ ATH_API int ath_positions_float64(const ath_file *file, const ath_segment *const
                                   double frame, ath_order order, double *xyz, size_t stride);
 
 /* For skinning on the GPU: one matrix per node of the cut, 12 floats, `stride` bytes apart, from rest positions
- * (ath_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level of
+ * (ath_level_rest) to positions; and the exact vertices, which no matrix moves. A renderer needs both: at the last level of
  * the hierarchy and at those beyond there are no matrices, at level 0 nothing but. */
 ATH_API int ath_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
                          float *matrices, size_t stride);

@@ -23,8 +23,10 @@ static uint64_t scratch_size(const ath_header *header)
 static void carve_layers(ath_file *file, const ath_header *header, ath_arena *arena)
 {
     uint64_t vertices = header->vertex_count;
-    if (header->layer_count > 1) file->rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
-    for (int32_t q = 1; q < header->layer_count; q++) {
+    if (header->layer_count < 2) return;
+    file->rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
+    file->layers[0].nodes = (ath_node *)ath_take(arena, header->branch_count * sizeof(ath_node));
+    for (int32_t q = 0; q < header->layer_count; q++) {
         file->layers[q].pieces = (ath_piece *)ath_take(arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
         file->layers[q].rest = (double *)ath_take(arena, vertices * 3 * sizeof(double));
         file->layers[q].rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
@@ -232,18 +234,21 @@ static void build_plan(ath_file *file)
 /* A refinement's pieces come all with its level. */
 static void plan_layers(ath_file *file)
 {
-    for (int32_t q = 1; q < file->header.layer_count; q++) {
+    file->first_layer = ath_file_chunk(file, ATH_REFINED_REST, 1, 0) ? 0 : 1;
+    for (int32_t q = file->first_layer; q < file->header.layer_count; q++) {
         ath_layer *layer = &file->layers[q];
         layer->plan = file->plan;
         layer->plan.pieces = layer->pieces;
-        layer->plan.bases = 0;
         memcpy(layer->pieces, file->pieces, (size_t)file->plan.piece_count * sizeof *layer->pieces);
-        for (int32_t p = 0; p < file->plan.piece_count; p++) {
+        for (int32_t p = 0; q > 0 && p < file->plan.piece_count; p++) {
             layer->pieces[p].level = ath_level_of_layer(file, q);
             layer->pieces[p].low_level = -1;
             layer->pieces[p].low_modes = 0;
         }
     }
+    if (file->first_layer > 0) return;
+    memcpy(file->layers[0].nodes, file->nodes, (size_t)file->plan.node_count * sizeof *file->nodes);
+    file->layers[0].plan.nodes = file->layers[0].nodes;
 }
 
 /* Which levels have which chunks. */
@@ -264,6 +269,9 @@ static void plan_levels(ath_file *file)
     }
 }
 
+/* Whether nothing of level 0 serves other levels: then level 1 may refine the rest pose. */
+static int stands_alone(const ath_file *file) { return !((file->stems_levels | file->affine_levels[1]) & 1); }
+
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
 {
     if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
@@ -271,7 +279,8 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
     int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
     if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height;
-    if (kind == ATH_REFINED_REST) return d <= shown && d > file->plan.height + 1;
+    if (kind == ATH_REFINED_REST && d <= shown && file->header.layer_count > 1)
+        return d > file->plan.height + 1 || (d == 1 && stands_alone(file));
     return kind == ATH_EXACT && d == level && d > shown;
 }
 
@@ -398,14 +407,15 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     file->info.node_count = file->plan.node_count;
     file->info.depth_levels = ath_min(file->info.level_count, file->plan.height + 2);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
-    plan_layers(file);
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
+    plan_layers(file);
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
     file->plan.rest = file->rest;
-    file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
-                                                   (int32_t *)file->scratch);
+    if (file->first_layer > 0)
+        file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
+                                                       (int32_t *)file->scratch);
     ath_plan_nodes(&file->plan, file->nodes);
     return ATH_OK;
 }
@@ -477,9 +487,11 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
     ath_file counted = *file;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
-    /* again: the gaps may be a layer's since */
-    ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
-    ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch, file->bases);
+    if (file->bases_count > 0) { /* laid out again: the gaps may be a layer's since */
+        ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps, (int32_t *)file->scratch);
+        ath_basis_fill(file->pieces, file->plan.piece_count, file->rest, file->gaps, (double *)file->scratch,
+                       file->bases);
+    }
     file->plan.bases = file->bases;
     for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
         if (file->cosines[frames]) ath_cosine_basis(frames, file->cosines[frames]);
@@ -493,11 +505,15 @@ static size_t place_of(const ath_file *file, ath_order order, size_t v)
     return order == ATH_SOURCE_ORDER ? (size_t)file->vertex_source[v] : v;
 }
 
-static const double *layer_rest(const ath_file *file, int32_t layer) { return ath_layer_plan(file, layer)->rest; }
-
-static const int32_t *layer_rest_steps(const ath_file *file, int32_t layer)
+/* What a layer refines. */
+static const ath_plan *plan_before(const ath_file *file, int32_t q)
 {
-    return layer > 0 ? file->layers[layer].rest_steps : file->rest_steps;
+    return q > file->first_layer ? &file->layers[q - 1].plan : &file->plan;
+}
+
+static const int32_t *rest_steps_before(const ath_file *file, int32_t q)
+{
+    return q > file->first_layer ? file->layers[q - 1].rest_steps : file->rest_steps;
 }
 
 static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
@@ -509,7 +525,7 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     if (result == ATH_OK)
         result =
             ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                            layer_rest_steps(file, q - 1), layer_rest(file, q - 1), layer->rest_steps, layer->rest);
+                            rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);
     return result;
 }
 
@@ -517,11 +533,10 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
 static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
 {
     ath_layer *layer = &file->layers[q];
-    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, ath_level_of_layer(file, q), 0);
-    layer->plan.rest = layer_rest(file, q - 1);
+    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_level_of_layer(file, q) : 1, 0);
+    layer->plan.rest = plan_before(file, q)->rest;
     if (!chunk) {
-        memcpy(layer->rest_steps, layer_rest_steps(file, q - 1),
-               3 * (size_t)file->header.vertex_count * sizeof(int32_t));
+        memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
         return ATH_OK;
     }
     ath_bytes content = {chunk->bytes, chunk->length};
@@ -535,6 +550,7 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
     layer->plan.rest = layer->rest;
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);
+    if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes);
     return ATH_OK;
 }
 
@@ -545,7 +561,7 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
     *memory_bytes = 0;
     why->code = ATH_OK;
     if (level < 0 || level >= file->info.level_count) return ath_refuse(why, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
-    for (int32_t q = 1; q <= ath_layer_of(file, level); q++) {
+    for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
         if (result != ATH_OK) return result;
@@ -563,7 +579,7 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
     int result = ath_refine_size(file, level, &needed, 0);
     if (result != ATH_OK) return result;
     if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
-    for (int32_t q = 1; q <= ath_layer_of(file, level); q++) {
+    for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         if (layer->plan.bases) continue;
         double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
@@ -573,13 +589,13 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
                            bases);
             layer->plan.bases = bases;
         } else {
-            const ath_piece *before = ath_layer_plan(file, q - 1)->pieces;
+            const ath_piece *before = plan_before(file, q)->pieces;
             for (int32_t p = 0; p < layer->plan.piece_count; p++) {
                 layer->pieces[p].modes = before[p].modes;
                 layer->pieces[p].basis = before[p].basis;
                 layer->pieces[p].rank = before[p].rank;
             }
-            layer->plan.bases = ath_layer_plan(file, q - 1)->bases;
+            layer->plan.bases = plan_before(file, q)->bases;
         }
     }
     return ATH_OK;
@@ -589,14 +605,15 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
 {
     if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
     int32_t layer = ath_layer_of(file, level);
-    if (layer > 0 && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
-    if (layer == 0 || layer_rest(file, layer) == file->rest) {
+    const ath_plan *plan = ath_level_plan(file, level);
+    if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
+    if (plan->rest == file->rest) {
         ath_rest_float64(file, order, xyz, stride);
         return ATH_OK;
     }
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = layer_rest(file, layer)[3 * v + k] + file->info.origin[k];
+        for (size_t k = 0; k < 3; k++) out[k] = plan->rest[3 * v + k] + file->info.origin[k];
     }
     return ATH_OK;
 }

@@ -5,12 +5,13 @@
 #include "container.h"
 #include "plan.h"
 
-/* A refinement: the plant at a finer precision. Its pieces are all of its level's; a layer that refines no rest pose has that of
- * the layer before, and its bases. */
+/* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its level. A
+ * refinement without a rest pose of its own has that of the layer before, and its bases. */
 typedef struct {
     ath_plan plan; /* plan.bases null: not built yet */
     ath_piece *pieces;
-    double *rest; /* null: that of the layer before */
+    ath_node *nodes; /* of the first layer */
+    double *rest;    /* null: that of the layer before */
     int32_t *rest_steps;
     uint64_t bases_count; /* 0: those of the layer before, or not known yet */
     int32_t rest_known;
@@ -36,9 +37,10 @@ struct ath_file {
     void *scratch;                           /* of opening and building */
     double *bases;                           /* null until ath_build */
     int32_t *rest_steps;                     /* null where no layer refines the rest pose */
-    ath_layer layers[ATH_LAYERS];            /* 1 to layer_count - 1 */
+    ath_layer layers[ATH_LAYERS];            /* first_layer to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
+    int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
     int32_t longest;                    /* frames of the longest segment */
     uint32_t stems_levels;              /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
@@ -64,9 +66,15 @@ ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)
 
 ATH_INLINE int32_t ath_level_of_layer(const ath_file *file, int32_t layer) { return file->plan.height + 1 + layer; }
 
-ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer)
+/* Of a layer, as it serves to show `level`. */
+ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer, int32_t level)
 {
-    return layer > 0 ? &file->layers[layer].plan : &file->plan;
+    return level > 0 && layer >= file->first_layer ? &file->layers[layer].plan : &file->plan;
+}
+
+ATH_INLINE const ath_plan *ath_level_plan(const ath_file *file, int32_t level)
+{
+    return ath_layer_plan(file, ath_layer_of(file, level), level);
 }
 /* Whether decoding a segment at `level` takes the chunk of this kind and level d. */
 int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);

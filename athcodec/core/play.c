@@ -130,16 +130,17 @@ static void blend_map(const shown_frames *shown, int32_t index, double map[ATH_M
         for (int32_t k = 0; k < ATH_MAP; k++) map[k] = at[0][k];
 }
 
-static const double *rest_attach_of(const ath_file *file, const ath_part *part)
+static const double *rest_attach_of(const ath_plan *plan, const ath_part *part)
 {
-    const ath_branch *branch = file->branches + part->branch;
-    return file->rest + 3 * (size_t)(branch->attach >= 0 ? branch->attach : branch->first);
+    const ath_branch *branch = plan->branches + part->branch;
+    return plan->rest + 3 * (size_t)(branch->attach >= 0 ? branch->attach : branch->first);
 }
 
 /* The map as a matrix from absolute rest to absolute positions. */
-static void matrix_of(const ath_file *file, const ath_part *part, const double map[ATH_MAP], double matrix[12])
+static void matrix_of(const ath_file *file, const ath_plan *plan, const ath_part *part, const double map[ATH_MAP],
+                      double matrix[12])
 {
-    const double *a = rest_attach_of(file, part), *origin = file->info.origin;
+    const double *a = rest_attach_of(plan, part), *origin = file->info.origin;
     for (int32_t i = 0; i < 3; i++) {
         const double *R = map + 3 * i;
         for (int32_t k = 0; k < 3; k++) matrix[4 * i + k] = R[k];
@@ -201,14 +202,15 @@ ATH_HOT static void narrow_block(const double *ATH_RESTRICT block, size_t count,
 
 static int is_packed(const target *to) { return !to->is_float64 && !to->place && to->stride == 3 * sizeof(float); }
 
-static void put_node(const ath_file *file, const ath_part *part, const double m[ATH_MAP], const target *to)
+static void put_node(const ath_file *file, const ath_plan *plan, const ath_part *part, const double m[ATH_MAP],
+                     const target *to)
 {
-    const double *a = rest_attach_of(file, part);
+    const double *a = rest_attach_of(plan, part);
     double block[3 * BLOCK];
     for (size_t start = 0; start < (size_t)part->count; start += BLOCK) {
         size_t count = (size_t)part->count - start, first = (size_t)part->first + start;
         if (count > (size_t)BLOCK) count = BLOCK;
-        move_block(file->rest + 3 * first, count, m, a, file->info.origin, block);
+        move_block(plan->rest + 3 * first, count, m, a, file->info.origin, block);
         if (is_packed(to)) {
             narrow_block(block, 3 * count, (float *)(void *)to->out + 3 * first);
             continue;
@@ -275,6 +277,7 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, &shown);
     if (result == ATH_NOT_PREPARED) return result;
+    const ath_plan *plan = ath_level_plan(file, shown.segment[0]->level);
     for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
         const ath_part *part = shown.segment[0]->parts + i;
         double map[ATH_MAP];
@@ -283,7 +286,7 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
             continue;
         }
         blend_map(&shown, part->index, map);
-        put_node(file, part, map, &to);
+        put_node(file, plan, part, map, &to);
     }
     return result;
 }
@@ -342,13 +345,14 @@ static int matrices(const ath_file *file, const ath_segment *const *segments, in
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, &shown);
     if (result == ATH_NOT_PREPARED) return result;
+    const ath_plan *plan = ath_level_plan(file, shown.segment[0]->level);
     for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
         const ath_part *part = shown.segment[0]->parts + i;
         double map[ATH_MAP], matrix[12];
         if (part->branch < 0) continue;
         char *at = (char *)out + (size_t)part->index * stride;
         blend_map(&shown, part->index, map);
-        matrix_of(file, part, map, matrix);
+        matrix_of(file, plan, part, map, matrix);
         if (is_float64)
             memcpy(at, matrix, sizeof matrix);
         else

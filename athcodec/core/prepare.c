@@ -358,7 +358,7 @@ static void ready_layer(ath_work *work, int32_t q)
 {
     layer_work *layer = work->layers + q;
     size_t row = 3 * (size_t)work->segment->frames * sizeof(int32_t);
-    layer->plan = ath_layer_plan(work->file, q);
+    layer->plan = ath_layer_plan(work->file, q, work->level);
     layer->motion.frames = work->segment->frames;
     layer->motion.streams = work->streams;
     layer->motion.cosines = work->file->cosines[work->segment->frames];
@@ -393,8 +393,7 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     ath_segment *segment = (ath_segment *)segment_memory;
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
-    if (!file->bases || !ath_layer_plan(file, ath_layer_of(file, level))->bases
-        || !ath_fits(memory, work_bytes, ath_work_size(file))
+    if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
     int32_t frames = ath_file_frames(file, index);
@@ -827,7 +826,7 @@ static int read_node(ath_work *work, int32_t n)
     affines_reader *reader = work->affines + node->level;
     if (!node->coded || node->level > work->level || !reader->chunk) return ATH_OK;
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
-    int valid = code_node(&reader->coder, reader->model, &work->file->plan, work->segment->frames, n, &work->node);
+    int valid = code_node(&reader->coder, reader->model, work->layers->plan, work->segment->frames, n, &work->node);
     return blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
 }
 

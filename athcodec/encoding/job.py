@@ -31,7 +31,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.layers import (
     DEFAULT_LADDER,
-    Layer,
+    Layers,
     code_segment,
     ladder_of,
     layer_chunks,
@@ -163,7 +163,7 @@ class _Decided:
     ath: Ath
     choice: Choice
     prelude: CodedPrelude
-    layers: list[Layer]
+    layers: Layers
 
     @property
     def fingerprint(self) -> str:
@@ -322,7 +322,7 @@ class EncodingJob:
         self._add_prelude(store, decided)
         for (level, kind), content in layer_chunks(layers).items():
             store.add(kind, content, level)
-        errors = self._add_motion(store, layers[0].plan.level_count + len(layers) - 1, coded)
+        errors = self._add_motion(store, layers.level_count, coded)
         self._add_static(store)
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
@@ -336,7 +336,7 @@ class EncodingJob:
             0.0 if self.options.lossless else self.source.largest_bound(decided.choice.settings.bound),
             self.clip.dtype == np.float64,
             len(self.clip.clip_range_frames),
-            len(layers),
+            len(layers.each),
         )
         return _Result(store, header, errors)
 
@@ -382,7 +382,7 @@ class EncodingJob:
             ct.HIERARCHY,
             ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam), decided.prelude.hierarchy_stream),
         )
-        store.add(ct.REST, ct.pack_rest(decided.layers[0].rest))
+        store.add(ct.REST, ct.pack_rest(decided.layers.rest))
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
         metadata = (
             self.clip.metadata

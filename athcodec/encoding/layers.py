@@ -40,6 +40,8 @@ CORRECTIONS_SHARE = 0.01  # of the bytes up to a layer, that its corrections may
 CORRECTED_LIMITS = tuple(2.0 ** (i / 3) for i in range(5, -6, -1))  # over the layer's own, to choose from
 LEAST_RATIO = 4  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
+LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
+LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
 
 
 @dataclass
@@ -55,15 +57,35 @@ class Layer:
     modes : LearnedModes or None
     ratio : int
         Of its step to that of the last layer.
-    rest : ct.Rest or streams.CodedRest or None
-        The content of REST for the first layer, of REFINED_REST for others; None: the rest pose of the layer before.
+    rest : streams.CodedRest or None
+        The content of REFINED_REST; None: the rest pose of the layer before or, for the first layer, of level 0.
     """
 
     plan: Plan
     settings: Settings
     modes: LearnedModes | None
     ratio: int = 1
-    rest: ct.Rest | streams.CodedRest | None = None
+    rest: streams.CodedRest | None = None
+
+
+@dataclass
+class Layers:
+    """The layers of a file, the content of REST, and the plan on it, which level 0 is shown with."""
+
+    rest: ct.Rest
+    level_0: Plan
+    each: list[Layer]
+
+    @property
+    def level_count(self) -> int:
+        """Without that of the source's own numbers."""
+        return self.level_0.level_count + len(self.each) - 1
+
+    @property
+    def first_rest_bytes(self) -> int:
+        """Of the streams up to the rest pose of the first layer."""
+        refined = self.each[0].rest
+        return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
 
 
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
@@ -97,26 +119,26 @@ def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list
     return [ratio for i, ratio in enumerate(ratios) if i == 0 or ratios[i - 1] <= MOST_RATIO * ratio]
 
 
-def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> list[Layer]:
+def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
     """The layers for what was chosen; prelude: of the last of them."""
     settings = choice.settings
-    rests = _rests(source, prelude, ratios)
+    rest, level_0, rests = _rests(source, prelude, ratios)
     layers: list[Layer] = []
-    for i, ratio in enumerate(ratios):
-        plan = (
-            prelude.plan
-            if len(ratios) == 1
-            else Plan(prelude.plan.branches.copy(), source.hierarchy.vertex_count, source.pool, refined=i > 0)
-        )
-        if plan is not prelude.plan:
-            plan.set_rest(rests[i][1])
+    for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
+        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, refined=i > 0)
         own = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
         )
-        layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, rests[i][0]))
-    return layers
+        layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
+    return Layers(rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
+
+
+def _plan_on(pose: np.ndarray, prelude: CodedPrelude, refined: bool = False) -> Plan:
+    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, refined)
+    plan.set_rest(pose)
+    return plan
 
 
 def _modes(plan: Plan, choice: Choice, settings: Settings, ratio: int) -> LearnedModes | None:
@@ -145,23 +167,38 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
     )
 
 
-def _rests(source: Source, prelude: CodedPrelude, ratios: Sequence[int]) -> list[tuple]:
-    """(rest, decoded pose) of each layer, as Layer.rest has it."""
-    final = prelude.rest_chunk
-    if final.exact or len(ratios) == 1:
-        return [(final if i == 0 else None, prelude.plan.rest) for i in range(len(ratios))]
-    found: list[tuple] = []
-    coded = None
-    for ratio in ratios:
-        step = final.step * max(1.0, ratio / 2)
-        coded = streams.encode_rest(prelude.plan.branches, step, source.rest, coded)
-        found.append((coded if found else replace(final, step=step, stream=coded.stream), coded.decoded))
-    return found
+def _rests(
+    source: Source, prelude: CodedPrelude, ratios: Sequence[int]
+) -> tuple[ct.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
+    """The content of REST; what it decodes to, where the first layer refines that; of each layer the decoded pose and
+    what refines one."""
+    rest = prelude.rest_chunk
+    if rest.exact or len(ratios) == 1:
+        return rest, None, [(prelude.plan.rest, None)] * len(ratios)
+    first_step, *steps = (rest.step * max(1.0, ratio / 2) for ratio in ratios)
+    coded = _first_rests(prelude.plan, first_step, source.rest)
+    for step in steps:
+        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1]))
+    stored, of_layers = coded[0], coded[-len(ratios) :]
+    rest = replace(rest, step=stored.step, stream=stored.stream)
+    level_0 = None if of_layers[0] is stored else stored.decoded
+    return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
 
 
-def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
+def _first_rests(plan: Plan, step: float, rest: np.ndarray) -> list[streams.CodedRest]:
+    """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
+    at_once = streams.encode_rest(plan.branches, step, rest)
+    if not plan.level_0_stands_alone:
+        return [at_once]
+    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest)
+    refined = streams.encode_rest(plan.branches, step, rest, level_0)
+    both = len(level_0.stream) + len(refined.stream)
+    return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
+
+
+def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
     """What all segments share of the layers: {(level, kind): payload}."""
-    first, *finer = layers
+    first, *finer = layers.each
     chunks = {
         (level, ct.SHAPES): stream for level, stream in streams.encode_learned_modes(first.plan, first.modes).items()
     }
@@ -171,9 +208,10 @@ def layer_chunks(layers: Sequence[Layer]) -> dict[tuple[int, int], bytes]:
         modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
         if modes is not None:
             chunks[level, ct.SHAPES] = ct.pack_refined_shapes(digits, modes)
-        if isinstance(layer.rest, streams.CodedRest):
-            chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest.stream)
         before = layer
+    for level, layer in [(1, first), *enumerate(finer, first.plan.level_count)]:
+        if layer.rest is not None:
+            chunks[level, ct.REFINED_REST] = ct.pack_refined_rest(layer.rest.step, layer.rest.stream)
     return chunks
 
 
@@ -211,11 +249,12 @@ class _TimeBases:
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
-    def __init__(self, prelude: CodedPrelude, layers: Sequence[Layer], segment_count: int, positions: np.ndarray):
+    def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
         self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
-        self._pool, self._layered = prelude.plan.pool, len(layers) > 1
-        self._shared_bytes = (len(prelude.hierarchy_stream) + len(layers[0].rest.stream)) / segment_count
-        self._bases = _TimeBases(layers[-1], positions) if self._layered else None
+        self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
+        self._level_0 = layers.level_0
+        self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
+        self._bases = _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
         self.decoded = np.empty(0)
@@ -229,12 +268,21 @@ class _SegmentCoder:
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(segment, layer, plan.level_count - 1)
         segment.analyse_nodes(self._positions, settings.node_steps, qz.DEAD_ZONE)
-        for level in range(plan.level_count):
+        shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
+        for level, nodes in enumerate(shown):
             if plan.has_affines(level):
-                self.chunks[level, ct.AFFINES] = streams.encode_affines(segment, level)
-        below = [self._error(segment.pose(level, self._origin, self._dtype)) for level in range(plan.level_count - 1)]
+                self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
+        below = [self._error(nodes.pose(level, self._origin, self._dtype)) for level, nodes in enumerate(shown)]
         self.errors = [*below, *self.errors]
         return segment
+
+    def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
+        """The segment as level 0 shows it, which may have a rest pose of its own."""
+        if self._level_0 is segment.plan:
+            return segment
+        shown = SegmentMotion(self._level_0, segment.frames, segment.streams)
+        shown.analyse_nodes(self._positions, settings.node_steps, qz.DEAD_ZONE, level=0)
+        return shown
 
     def refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
         """One further level; ratio: the step of the layer before over that of this one."""
@@ -279,22 +327,18 @@ class _SegmentCoder:
 
 
 def code_segment(
-    prelude: CodedPrelude,
-    layers: Sequence[Layer],
-    segment_count: int,
-    positions: np.ndarray,
-    exact: np.ndarray | None = None,
+    prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, exact: np.ndarray | None = None
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
     """Chunks {(level, kind): payload} of one of so many segments and (levels, 3) errors of stopping at each level.
 
     exact: the source's own numbers (see Source.exact), which one more level is to give.
     """
-    coder, level = _SegmentCoder(prelude, layers, segment_count, positions), layers[0].plan.level_count
-    segment = coder.first(layers[0])
-    for before, layer in pairwise(layers):
+    coder, level = _SegmentCoder(prelude, layers, segment_count, positions), layers.level_0.level_count
+    segment = coder.first(layers.each[0])
+    for before, layer in pairwise(layers.each):
         segment = coder.refine(layer, segment, round(before.ratio / layer.ratio), level)
         level += 1
-    largest_bound = layers[-1].settings.largest_bound
+    largest_bound = layers.each[-1].settings.largest_bound
     if coder.errors[-1][0] > largest_bound:
         raise AssertionError(f"decoded error {coder.errors[-1][0]} is beyond the bound {largest_bound}")
     if exact is not None:

@@ -158,6 +158,11 @@ class Plan:
         """Whether nodes of the level have maps of their own."""
         return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
 
+    @property
+    def level_0_stands_alone(self) -> bool:
+        """Whether nothing of level 0 serves other levels, so that level 1 may refine the rest pose."""
+        return not self.has_stems(0) and not (self.nodes["last"][self.nodes["level"] == 0] > 0).any()
+
     def exact_branches(self, level: int) -> np.ndarray:
         """Branches whose stems are exact at `level`."""
         return np.unique(self.pieces["branch"][self.pieces["level"] <= level])
@@ -270,8 +275,10 @@ class SegmentMotion:
             )
         )
 
-    def analyse_nodes(self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float) -> None:
-        """Fills the maps of the nodes, after `analyse` or `pose`.
+    def analyse_nodes(
+        self, source: np.ndarray, level_steps: np.ndarray, dead_zone: float, level: int | None = None
+    ) -> None:
+        """Fills the maps of the nodes, or those of one level; after `analyse` or `pose`, but for level 0.
 
         A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
         """
@@ -279,7 +286,8 @@ class SegmentMotion:
         self._nodewise(
             lambda motion, first, stop: lib.ath_analyse_nodes(
                 self.plan.core, motion, self.integers, first, stop, at, steps, dead_zone
-            )
+            ),
+            level,
         )
 
     def clear_nodes(self) -> None:
@@ -294,8 +302,10 @@ class SegmentMotion:
             self._with_scratch(call)(first, stop)
         self.plan.pool.map(self._with_scratch(call), carried)
 
-    def _nodewise(self, call: Callable[[Motion, int, int], None]) -> None:
-        self.plan.pool.map(self._with_scratch(call), self.plan.node_ranges)
+    def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
+        plan = self.plan
+        own = [(n, n + 1) for n in np.flatnonzero(plan.nodes["level"] == level).tolist()]
+        plan.pool.map(self._with_scratch(call), plan.node_ranges if level is None else own)
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
         """The call with scratch memory of its own."""

@@ -219,9 +219,10 @@ export class AthFile {
   branchSource(): Int32Array;
   /** Seconds, one per frame, increasing within a clip. */
   times(): Float64Array;
-  /** The rest pose, 3 numbers per vertex; order "source" by default. */
-  rest(order?: Order): Float32Array;
-  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
+  /** The rest pose that a level (0 by default) moves, 3 numbers per vertex; order "source" by default. It is the same for
+   * all levels with nodes above 0. Throws MISSING where bytes of it are still to come. */
+  rest(order?: Order, options?: { level?: number }): Float32Array;
+  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T; level?: number }): T;
   /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): Errors;
   /** What a level is, for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
@@ -283,7 +284,8 @@ export class AthFile {
   positions(segments: Segments, frame: number, options?: { order?: Order }): Float32Array | null;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
                                                    options: { out: T; order?: Order }): T | null;
-  /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from rest("file") to positions.
+  /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from the level's rest("file") to
+   * positions.
    * Vertices of exact runs have none, exact() has them. */
   matrices(segments: Segments, frame: number): Float32Array | null;
   matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,

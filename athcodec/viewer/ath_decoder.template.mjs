@@ -440,14 +440,13 @@ export class AthFile {
     return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
   }
 
-  rest(order = "source", { out } = {}) {
-    const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+  rest(order = "source", { out, level = 0 } = {}) {
+    const length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
     const result = asOut(out, length, [Float32Array, Float64Array]);
-    return this.#fill(result, length, (at) => {
-      if (result instanceof Float64Array) c.ath_rest_float64(this.#at, which, at, 24);
-      else c.ath_rest(this.#at, which, at, 12);
-      return OK;
-    });
+    this.#refineSize(this.#level(level));
+    result.set(this.#fill(new Float64Array(length), length,
+      (at) => this.#c.ath_level_rest(this.#at, level, which, at, 24)));
+    return result;
   }
 
   levelError(level, first = 0, last = this.info.segmentCount - 1) {
@@ -633,16 +632,19 @@ export class AthFile {
     return new Preparation(segment, level, step, fail);
   }
 
-  // Builds what the layers of precision up to a level's share, in memory that stays as long as the file.
+  // Builds what the segments share at a level, in memory that stays as long as the file.
   #refine(level) {
-    const c = this.#c, core = this.#core;
-    if (level < this.info.depthLevels) return;
-    const size = core.with(4, (at) => {
-      this.#checkFault((fault) => c.ath_refine_size(this.#at, level, at, fault));
-      return core.copy(Uint32Array, at, 1)[0];
-    });
-    const code = c.ath_refine(this.#at, level, size > 0 ? core.take(size) : 0, size);
+    const size = this.#refineSize(level);
+    const code = this.#c.ath_refine(this.#at, level, size > 0 ? this.#core.take(size) : 0, size);
     this.#check(code, `the layers of level ${level}, ${size} bytes`);
+  }
+
+  // The bytes for that, once the rest poses up to the level's are read.
+  #refineSize(level) {
+    return this.#core.with(4, (at) => {
+      this.#checkFault((fault) => this.#c.ath_refine_size(this.#at, level, at, fault));
+      return this.#core.copy(Uint32Array, at, 1)[0];
+    });
   }
 
   #prepared(index, level, at, kept) {

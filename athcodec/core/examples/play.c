@@ -156,7 +156,7 @@ static int32_t level_for(const player *p, int32_t segment)
 static int32_t index_of(const ath_segment *segment) { return segment ? ath_segment_index(segment) : -1; }
 static int32_t level_of(const ath_segment *segment) { return segment ? ath_segment_level(segment) : -1; }
 
-/* What the segments of a level share that refines another, as soon as the first of them can be prepared. */
+/* What the segments of a level above 0 share, as soon as the first of them can be prepared. */
 static void refine(player *p, int32_t level)
 {
     size_t size;

@@ -38,6 +38,12 @@ class Channel {
       Object.assign(this, message, { type: undefined }, restBounds(message.rest));
       this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
       this.settle.resolve(this);
+    } else if (type === "rest") {
+      this.rest.set(message.rest);
+      const { box, sphere } = restBounds(this.rest);
+      this.box.copy(box);
+      this.sphere.copy(sphere);
+      for (const view of this.views.values()) view.setRest();
     } else if (type === "failed") {
       this.settle.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
     } else if (type === "attributes") {
@@ -202,6 +208,7 @@ export class ATH extends EventDispatcher {
     return this.#channel.statics.skeleton;
   }
 
+  /** Finer once levels above 0 are here, in the same array. */
   get rest() {
     return this.#channel.rest;
   }

@@ -5,6 +5,7 @@ import { Box3, BufferAttribute, DataTexture, EventDispatcher, FloatType, Instanc
   MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
+import { setRest } from "./geometry.js";
 import { injectMotion, motionUniforms } from "./shader.js";
 
 const WIDTH = 1024; // as in session.js
@@ -395,6 +396,14 @@ export class ATHMotion extends EventDispatcher {
     this.#geometries.add(geometry);
     this.#setParts(geometry);
     return geometry;
+  }
+
+  /** Puts the rest pose into the geometries again. */
+  setRest() {
+    for (const geometry of this.#geometries) {
+      geometry.boundingSphere.copy(this.#channel.sphere);
+      if (this.mode !== "positions") setRest(geometry, this.#channel.rest);
+    }
   }
 
   detach(geometry) {

@@ -20,7 +20,7 @@ export function meshGeometry(ath, faces) {
   const source = corners ? faces.array : Uint32Array.from({ length: rest.length / 3 }, (_, i) => i);
   const geometry = withPositions(rest, source);
   geometry.setIndex(new BufferAttribute(triangles(rest, faces, corners), 1));
-  geometry.userData.corners = corners;
+  Object.assign(geometry.userData, { corners, faces });
   setNormals(geometry, normals(rest, faces));
   return geometry;
 }
@@ -30,6 +30,18 @@ export function lineGeometry(ath, edges) {
   const { rest } = ath, geometry = withPositions(rest, Uint32Array.from({ length: rest.length / 3 }, (_, i) => i));
   geometry.setIndex(new BufferAttribute(edges, 1));
   return geometry;
+}
+
+/** Another rest pose in place of the one that a geometry was made of: in "rest" and "restOther" where it has them. */
+export function setRest(geometry, rest) {
+  const { source, other, faces } = geometry.userData;
+  const places = other ? [["rest", source, rest], ["restOther", other, rest]] : [["position", source, rest]];
+  if (faces) places.push(["normal", source, normals(rest, faces)]);
+  for (const [name, vertices, values] of places) {
+    const attribute = geometry.getAttribute(name);
+    gather(attribute.array, values, vertices, 3);
+    attribute.needsUpdate = true;
+  }
 }
 
 function withPositions(rest, source) {
@@ -65,6 +77,7 @@ export function addAttributes(geometry, ath, attributes) {
     const order = perCorner ? Uint32Array.from({ length: rows }, (_, i) => i) : source;
     const values = gather(new Float32Array(size * source.length), found.array, order, size).map((value) => value * scale);
     geometry.setAttribute(attribute, new BufferAttribute(values, size));
+    if (name === "normals") geometry.userData.faces = null; // those of `setRest` are computed
   }
 }
 

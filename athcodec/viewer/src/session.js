@@ -15,6 +15,7 @@ const STEPS = 8, SLICE_MS = 6;    // of decoding between two looks at the messag
 const MOST_PREPARED = 256 << 20;  // bytes of decoded segments that are kept
 const STATE_MS = 50;
 const WIDTH = 1024;               // of the texture, in texels of four numbers
+const REFINED_REST = 0x15;
 
 const channel = new MessageChannel(), waiting = [];
 channel.port1.onmessage = () => waiting.shift()();
@@ -40,7 +41,8 @@ export class Session {
   #opened = false;
   #hasFront = null;
   #order = null;
-  #rest = null;
+  #rest = null;           // that matrices are applied to
+  #finerRest = false;     // whether that is level 0's, and levels above have another
   #restNormals = null;
   #faces = null;
   #first = 0;             // the clip to begin with
@@ -97,8 +99,11 @@ export class Session {
       throw Object.assign(new Error(`clip: got ${this.clip}, expected one of ${names}`), { codeName: "CLIP" });
     }
     this.#order = file.vertexSource();
+    this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
+    if (file.readyLevel(0) > 0) this.#readFinerRest();
+    this.#rest ??= file.rest();
     this.post({
-      type: "opened", info: { ...info, levelNames }, statics, rest: file.rest(), times: file.times(), branches: file.branches(),
+      type: "opened", info: { ...info, levelNames }, statics, rest: this.#rest, times: file.times(), branches: file.branches(),
       vertexSource: this.#order, branchSource: file.branchSource(), clips, first: this.#first,
       chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
       segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),
@@ -114,6 +119,19 @@ export class Session {
       ...clip, index, seams: levels.map((level) => file.seamError(index, level)),
       errors: levels.map((level) => file.levelError(level, clip.firstSegment, clip.firstSegment + clip.segmentCount - 1)),
     }));
+  }
+
+  // The rest pose of the levels above 0: matrices of level 0 are at home on it, too.
+  #readFinerRest() {
+    if (!this.#finerRest) return;
+    try {
+      this.#rest = this.#file.rest("source", { level: 1 });
+      this.#finerRest = false;
+      this.#restNormals = null;
+      if (this.#opened) this.post({ type: "rest", rest: this.#rest });
+    } catch {
+      // damaged: levels that need it will say so
+    }
   }
 
   #clipAt(frame) {
@@ -365,6 +383,7 @@ export class Session {
   }
 
   #keep(segment) {
+    if (segment.level > 0) this.#readFinerRest();
     const key = `${segment.index}/${segment.level}`;
     this.#prepared.get(key)?.free();
     this.#prepared.delete(key);
@@ -523,7 +542,6 @@ export class Session {
   // How the normal of every exact vertex has turned since the rest pose.
   #fillTurns(data, at, level, segments, frame) {
     const file = this.#file;
-    this.#rest ??= file.rest();
     this.#restNormals ??= normals(this.#rest, this.#faces);
     const { branch, first, count, index } = this.parts(level), source = this.#order;
     const now = normals(file.positions(segments, frame), this.#faces);
