@@ -81,7 +81,8 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly lines: BufferGeometry | null;
   /** Edges (u, v) in source order, stored or following from the branches. */
   readonly skeleton: Uint32Array;
-  /** Rest pose in source order, 3 numbers per vertex. */
+  /** Rest pose in source order, 3 numbers per vertex. In files whose level 1 refines it, the numbers change when that
+   * level is here, and attributes, `box` and `sphere` with them. */
   readonly rest: Float32Array;
   readonly box: Box3;
   readonly sphere: Sphere;
