@@ -39,7 +39,7 @@ def test_errors_of_a_clip_are_its_own_at_every_level(medley_clips, medley_ath):
             played, reference = decoder.play(name), source.block(0, source.frame_count)
             for level in played.levels:
                 measured = distance(played.positions(level=level.level), reference)
-                assert level.max_error == pytest.approx(measured, rel=1e-5)
+                assert measured <= level.max_error * (1 + 1e-6) and level.max_error <= measured * (1 + 1 / 31)
         assert [level["max_error"] for level in decoder.file.info()["levels"]] == [
             max(decoder.play(name).levels[level].max_error for name in medley_clips)
             for level in range(decoder.level_count)

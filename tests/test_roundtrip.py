@@ -210,7 +210,8 @@ def test_times_come_back_exactly(times):
 @pytest.mark.parametrize("origin", [0.0, 3.5])
 @pytest.mark.parametrize("rate", [24, 25, 30, 60, 23.976, 29.97])
 def test_steady_times_cost_a_rule_and_no_table(rate, origin):
-    assert len(time_chunk(origin + np.arange(500) / rate)) == 17
+    whole = rate == round(rate) and origin == 0
+    assert len(time_chunk(origin + np.arange(500) / rate)) == (3 if whole else 17)
 
 
 def test_uneven_times_survive_a_file(full_ath, full_clip):
