@@ -208,7 +208,7 @@ class _Recoding:
         self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
         self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
         self._search = Search.of(self._source, self._ath, bound, "default", lambda stage, done: None)
-        self.settings = self._search.found()
+        _, (self.settings,) = self._search.found()
 
     def of_one_level(self) -> list[Settings]:
         """Settings for a single stream: those of each level in turn, applied to all levels."""

@@ -64,7 +64,9 @@ def sizes(tmp_path_factory):
 
 def test_sizes_come_with_a_bound_that_was_measured_and_kept(sizes):
     text, result = sizes
-    [size], [chunks], [choices] = tables_of(result)
+    sizes, (chunks, _), (choices, _) = tables_of(result)
+    size = sizes[0]
+    assert [row["ladder"] for row in sizes] == ["none", "decades"]
     assert 0 < size["max/bound"] <= 1 and size["kept"] and result["broken"] == []
     assert cells_of(text, "Sizes")["kept"] == "yes"
     assert cells_of(text, "Sizes")["bytes"] == f"{size['bytes']:,}"
