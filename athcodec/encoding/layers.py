@@ -36,9 +36,10 @@ from athcodec.encoding.segment import (
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
-CORRECTIONS_SHARE = 0.01  # of the bytes up to a layer, that its corrections may take if it is not the last
-CORRECTED_LIMITS = tuple(2.0 ** (i / 3) for i in range(5, -6, -1))  # over the layer's own, to choose from
-LEAST_RATIO = 4  # of the steps of neighbouring layers
+CORRECTIONS_SHARE = 0.015  # of the bytes up to a layer, that its corrections may take if it is not the last
+CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))  # over the layer's own, to choose from
+COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
+LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
 
 
@@ -83,14 +84,14 @@ def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
 
 
 def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
-    """Of the step of each layer to that of the last, powers of two, descending to 1.
+    """Of the step of each layer to that of the last, descending to 1.
 
     ladder: largest errors over the diagonal, descending; those close to the bound, or to each other, make no layer of
     their own.
     """
     ratios: list[int] = []
     for error in ladder:
-        ratio = 1 << math.ceil(math.log2(min(max(error * diagonal / bound, 1.0), MOST_RATIO**2)))
+        ratio = round(COARSER * min(error * diagonal / bound, MOST_RATIO**2))
         if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
             ratios.append(ratio)
     ratios.append(1)
@@ -153,7 +154,7 @@ def _rests(source: Source, prelude: CodedPrelude, ratios: Sequence[int]) -> list
     found: list[tuple] = []
     coded = None
     for ratio in ratios:
-        step = final.step * max(1.0, ratio / 2)
+        step = qz.single(final.step * max(1.0, ratio / 2))
         coded = streams.encode_rest(prelude.plan.branches, step, source.rest, coded)
         found.append((coded if found else replace(final, step=step, stream=coded.stream), coded.decoded))
     return found
@@ -266,12 +267,15 @@ class _SegmentCoder:
     def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
         allowed = CORRECTIONS_SHARE * (self._shared_bytes + sum(map(len, self.chunks.values())))
-        best = decoded, b""
-        for factor in CORRECTED_LIMITS:
-            corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
-            if len(corrected[1]) > allowed:
-                break
-            best = corrected
+        best, loosest, tightest = (decoded, b""), 0, len(CORRECTED_LIMITS)
+        while loosest < tightest:
+            middle = (loosest + tightest) // 2
+            limit = settings.limit * CORRECTED_LIMITS[middle]
+            corrected = self._corrected(decoded, replace(settings, limit=limit))
+            if len(corrected[1]) <= allowed:
+                best, loosest = corrected, middle + 1
+            else:
+                tightest = middle
         return best
 
     def _error(self, decoded: np.ndarray) -> tuple[float, ...]:
