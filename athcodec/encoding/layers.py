@@ -36,9 +36,11 @@ from athcodec.encoding.segment import (
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
-CORRECTIONS_SHARE = 0.015  # of the bytes up to a layer, that its corrections may take if it is not the last
-CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))  # over the layer's own, to choose from
 COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
+# Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names, and
+# else to keep the tightest of these limits, over its own.
+NAMED_SHARE, CORRECTIONS_SHARE = 0.06, 0.015
+CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))
 LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
 
@@ -266,13 +268,18 @@ class _SegmentCoder:
 
     def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
-        allowed = CORRECTIONS_SHARE * (self._shared_bytes + sum(map(len, self.chunks.values())))
-        best, loosest, tightest = (decoded, b""), 0, len(CORRECTED_LIMITS)
+
+        def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
+            corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
+            return corrected if len(corrected[1]) <= share * bytes_ else None
+
+        bytes_ = self._shared_bytes + sum(map(len, self.chunks.values()))
+        best, loosest, tightest = within(1 / COARSER, NAMED_SHARE) or (decoded, b""), 0, len(CORRECTED_LIMITS)
+        if best[1]:
+            loosest = CORRECTED_LIMITS.index(1 / COARSER) + 1
         while loosest < tightest:
             middle = (loosest + tightest) // 2
-            limit = settings.limit * CORRECTED_LIMITS[middle]
-            corrected = self._corrected(decoded, replace(settings, limit=limit))
-            if len(corrected[1]) <= allowed:
+            if corrected := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):
                 best, loosest = corrected, middle + 1
             else:
                 tightest = middle
