@@ -37,8 +37,8 @@ from athcodec.encoding.segment import (
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
 COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
-# Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names, and
-# else to keep the tightest of these limits, over its own.
+# Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names,
+# and else to keep the tightest of these limits, over its own.
 NAMED_SHARE, CORRECTIONS_SHARE = 0.06, 0.015
 CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))
 LEAST_RATIO = 8  # of the steps of neighbouring layers
