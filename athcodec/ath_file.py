@@ -171,9 +171,10 @@ class AthFile:
     # ---- bytes ----
 
     def close(self) -> None:
-        """Closes the file where it was opened here."""
+        """Closes the file where it was opened here, once nobody reads from it."""
         if self._owned:
-            self._source.close()
+            with self._lock:
+                self._source.close()
 
     def __enter__(self) -> AthFile:
         return self

@@ -28,7 +28,7 @@ from athcodec.metrics import ErrorMeter
 from athcodec.segmentation import DEFAULT_SEGMENT
 from bench.clips import Encoded, encoded, measure
 
-TABLE_ENTRY, ERROR_ENTRY = 16, 8  # bytes per chunk, and per level and segment
+TABLE_ENTRY, ERROR_ENTRY = 6, 2.5  # bytes of the front, about: of a chunk, and of the errors of a level in a segment
 ROUNDING = 1e-6  # the error table holds float32
 
 CURVE_NOTE = """
@@ -132,7 +132,7 @@ def _together(decoded: dict[int, ErrorMeter], decoder: athcodec.Decoder, diagona
 def _from_table(level_of: dict[int, int], decoder: athcodec.Decoder, diagonal: float) -> dict[str, float]:
     errors = decoder.file.errors
     parts = [
-        (*map(float, errors[level_of[segment], segment]), stop - start)
+        (*map(float, errors[level_of[segment], segment, [0, 2]]), stop - start)
         for segment, (start, stop) in enumerate(decoder.segments)
     ]
     return dict(zip(("table max", "table rms"), _pooled(parts, diagonal), strict=True))
@@ -208,7 +208,7 @@ class _Recoding:
         self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
         self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
         self._search = Search.of(self._source, self._ath, bound, "default", lambda stage, done: None)
-        self.settings = self._search.found()
+        _, (self.settings,) = self._search.found()
 
     def of_one_level(self) -> list[Settings]:
         """Settings for a single stream: those of each level in turn, applied to all levels."""

@@ -7,10 +7,12 @@ is decoded completely and compared with the source; its size counts only if the 
 from __future__ import annotations
 
 import argparse
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from athcodec.encoding import EFFORTS
+from athcodec.encoding.layers import LADDERS
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from bench.clips import Encoded, add_clips, encoded, measure
 from bench.tables import table
@@ -50,9 +52,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     sizes, chunks, choices, broken = [], [], [], []
     for path in args.clips:
         for rel_error in args.rel_error:
-            for effort in args.effort:
-                case = {"clip": path.stem, "bound": f"{rel_error:g}", "effort": effort}
-                with encoded(path, rel_error, effort) as result:
+            for effort, ladder in product(args.effort, LADDERS):
+                case = {"clip": path.stem, "bound": f"{rel_error:g}", "effort": effort, "ladder": ladder}
+                with encoded(path, rel_error, effort, LADDERS[ladder]) as result:
                     meter = measure(result.clip, result.decoder)
                 sizes.append(case | _size_row(result, meter, rel_error))
                 chunks.append(case | _chunk_row(result.summary.chunk_bytes))

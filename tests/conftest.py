@@ -68,7 +68,7 @@ def sample_ath(tmp_path_factory):
     """The sample at the default bound in three segments, coded once for all tests."""
     path = tmp_path_factory.mktemp("sample") / "sample.ath"
     with read_hdf5(sample_path()) as clip:
-        athcodec.encode(clip, path, segment_frames=40)
+        athcodec.encode(clip, path, segment_frames=40, ladder="none")
     return path
 
 
@@ -82,7 +82,7 @@ def bushy_clip():
 def bushy_ath(bushy_clip, tmp_path_factory):
     """The bushy clip in four segments."""
     path = tmp_path_factory.mktemp("bushy") / "bushy.ath"
-    athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16)
+    athcodec.encode(bushy_clip, path, rel_error=1e-3, segment_frames=16, ladder="none")
     return path
 
 
@@ -143,7 +143,7 @@ def medley_clips():
 def medley_ath(medley_clips, tmp_path_factory):
     """All of them in one file, in segments of up to 16 frames."""
     path = tmp_path_factory.mktemp("medley") / "medley.ath"
-    athcodec.encode(athcodec.join(medley_clips), path, rel_error=1e-4, segment_frames=16)
+    athcodec.encode(athcodec.join(medley_clips), path, rel_error=1e-4, segment_frames=16, ladder="none")
     return path
 
 
@@ -151,7 +151,7 @@ def medley_ath(medley_clips, tmp_path_factory):
 def full_ath(full_clip, tmp_path_factory):
     """The full clip in two segments."""
     path = tmp_path_factory.mktemp("full") / "full.ath"
-    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16)
+    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, ladder="none")
     return path
 
 

@@ -64,7 +64,9 @@ def sizes(tmp_path_factory):
 
 def test_sizes_come_with_a_bound_that_was_measured_and_kept(sizes):
     text, result = sizes
-    [size], [chunks], [choices] = tables_of(result)
+    sizes, (chunks, _), (choices, _) = tables_of(result)
+    size = sizes[0]
+    assert [row["ladder"] for row in sizes] == ["none", "decades"]
     assert 0 < size["max/bound"] <= 1 and size["kept"] and result["broken"] == []
     assert cells_of(text, "Sizes")["kept"] == "yes"
     assert cells_of(text, "Sizes")["bytes"] == f"{size['bytes']:,}"
@@ -314,8 +316,8 @@ def test_errors_of_a_growing_prefix_are_those_in_the_table_of_the_file(tmp_path,
     assert [row["bytes"] for row in steps] == sorted(row["bytes"] for row in steps)
     assert steps[-1]["bytes"] == whole["bytes"] == cost["bytes"]
     assert steps[-1]["max"] == pytest.approx(whole["max"]) and steps[0]["max"] > 1e-3
-    assert all(row["max"] == pytest.approx(row["table max"], rel=1e-5) for row in steps)
-    assert all(row["rms"] == pytest.approx(row["table rms"], rel=1e-5) for row in steps)
+    assert all(row["max"] == pytest.approx(row["table max"], rel=1 / 31) for row in steps)
+    assert all(row["rms"] == pytest.approx(row["table rms"], rel=1 / 31) for row in steps)
     assert cost["bytes"] - cost["AFFINES"] - cost["table"] >= cost["without"] > 0
 
 

@@ -81,7 +81,12 @@ def test_info_says_as_json_what_programs_need(facts, encoded):
     assert facts["fps"] == pytest.approx(30) and facts["nodes"] == 99
     assert facts["bytes"] == encoded.stat().st_size and facts["complete"] is True
     assert facts["max_error_bound"] == 0.001
-    assert [level["level"] for level in facts["levels"]] == [0, 1, 2, 3]
+    assert [level["name"] for level in facts["levels"]] == [
+        "depth 0",
+        "depth 1",
+        "depth 2",
+        *(f"layer {q} of 3" for q in (1, 2, 3)),
+    ]
     for level in facts["levels"]:
         assert {"level", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
     assert facts["levels"][-1]["max_error"] <= 0.001
@@ -188,10 +193,10 @@ def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_
     out, err = capsys.readouterr()
     assert err == ""
     rows = [line.split() for line in out.splitlines() if re.match(r"\d ", line)]
-    assert [row[0] for row in rows] == ["0", "1", "2", "3"]
+    assert [row[0] for row in rows] == ["0", "1", "2", "3", "4", "5"]
     assert float(rows[-1][-3]) <= 1e-4 < float(rows[0][-3])
     names = sorted(path.name for path in (tmp_path / "new").iterdir())
-    levels = [f"tree_1k_120f_level_{level}.h5" for level in range(4)]
+    levels = [f"tree_1k_120f_level_{level}.h5" for level in range(6)]
     assert names == ["athcodec_demo.html", "tree_1k_120f.ath", *levels]
 
 
@@ -199,12 +204,12 @@ def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_
 
 
 def test_a_cut_off_file_decodes_to_its_deepest_level_with_one_warning(encoded, facts, tmp_path, capsys):
-    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][1]["bytes"] + 3000)
+    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][4]["bytes"] + 3000)
     assert run("decode", part, tmp_path / "a.h5") == 0
-    warning = r"athcodec: warning: .*cut\.ath: decoded to level 1; cut off .* missing .*level 3.*\n"
+    warning = r"athcodec: warning: .*cut\.ath: decoded to level 4; cut off .* missing .*level 5.*\n"
     assert re.fullmatch(warning, capsys.readouterr().err)
     with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as clip:
-        assert np.array_equal(clip.block(0, 120), decoder.positions(level=1))
+        assert np.array_equal(clip.block(0, 120), decoder.positions(level=4))
 
 
 def test_every_cut_behind_level_0_decodes(encoded, facts, tmp_path, capsys):
@@ -219,8 +224,8 @@ def test_info_of_a_cut_off_file_says_what_is_missing(encoded, facts, tmp_path, c
     part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
     assert run("info", part, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["complete"] is False and "level 3" in found["missing"]
-    assert [level["available"] for level in found["levels"]] == [True, True, True, False]
+    assert found["complete"] is False and "level 5" in found["missing"]
+    assert [level["available"] for level in found["levels"]] == [True, True, True, False, False, False]
 
 
 def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
@@ -312,8 +317,8 @@ FAILURES = {
     "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
     "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
     "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
-    "beyond the levels": ("decode FILE OUT --level 4", "FILE: .*got 4.*0 to 3"),
-    "truncate beyond the levels": ("truncate FILE OUT --level 4", "FILE: .*got 4.*0 to 3"),
+    "beyond the levels": ("decode FILE OUT --level 6", "FILE: .*got 6.*0 to 5"),
+    "truncate beyond the levels": ("truncate FILE OUT --level 6", "FILE: .*got 6.*0 to 5"),
     "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
     "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),
 }

@@ -56,9 +56,9 @@ def check_levels(clip, path, name: str | None = None) -> None:
 
 
 def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
-    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [128, 16, 1]
-    assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [32, 1]
-    assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [128, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 1e-4, 1.0) == [200, 20, 1]
+    assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [40, 1]
+    assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [200, 1]
     assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
 
 
@@ -218,7 +218,7 @@ def test_maps_are_from_the_rest_pose_of_their_level(layered_ath):
             moved = np.einsum("nij,nj->ni", matrices[..., :3], pose) + matrices[..., 3]
             return float(np.square(moved - shown).sum())
 
-        assert parts.is_stem.all() and error(deepest) < error(deepest - 1) < error(0)
+        assert parts.is_stem.all() and error(deepest) < error(0)
 
 
 def test_a_damaged_rest_pose_hides_the_levels_of_its_layer(layered_ath):
@@ -303,7 +303,7 @@ def test_levels_are_called_by_depth_then_by_layer_in_prefixes_too(layered, bushy
     for last in (1, len(depths), len(depths) + 1):
         athcodec.truncate(layered, tmp_path / "cut.ath", last)
         assert names_of(tmp_path / "cut.ath") == names[: last + 1]
-    athcodec.encode(bushy_clip, tmp_path / "single.ath", rel_error=1e-3, lossless=True)
+    athcodec.encode(bushy_clip, tmp_path / "single.ath", rel_error=1e-3, lossless=True, ladder="none")
     assert names_of(tmp_path / "single.ath") == [*depths, "all branches", "lossless"]
 
 

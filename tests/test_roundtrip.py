@@ -155,12 +155,12 @@ def test_the_bound_does_not_depend_on_what_tam_accepts(tam, scratch):
 
 
 def test_one_accepted_plant_is_one_node_and_two_levels(scratch):
-    decoder = reopened(plant(seed=4, branches=15, frames=20), scratch, tam=Thresholds(1e9, 0, 1e9, 0))
+    decoder = reopened(plant(seed=4, branches=15, frames=20), scratch, tam=Thresholds(1e9, 0, 1e9, 0), ladder="none")
     assert decoder.file.table1()["nodes"] == 1 and decoder.level_count == 2
 
 
 def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
-    decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0))
+    decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0), ladder="none")
     assert decoder.file.table1()["depth"] == 30 and decoder.full_level_count == 31
 
 
@@ -210,7 +210,8 @@ def test_times_come_back_exactly(times):
 @pytest.mark.parametrize("origin", [0.0, 3.5])
 @pytest.mark.parametrize("rate", [24, 25, 30, 60, 23.976, 29.97])
 def test_steady_times_cost_a_rule_and_no_table(rate, origin):
-    assert len(time_chunk(origin + np.arange(500) / rate)) == 17
+    whole = rate == round(rate) and origin == 0
+    assert len(time_chunk(origin + np.arange(500) / rate)) == (3 if whole else 17)
 
 
 def test_uneven_times_survive_a_file(full_ath, full_clip):

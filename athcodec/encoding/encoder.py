@@ -18,10 +18,10 @@ from athcodec import container as ct
 from athcodec.ath import Thresholds
 from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
-from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.bounds import DEFAULT_REL_ERROR, BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
-from athcodec.encoding.layers import DEFAULT_LADDER
+from athcodec.encoding.layers import DEFAULT_LADDER, layer_ratios
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
@@ -251,5 +251,6 @@ def _weighted_progress(
             branches=not clip.has_branches,
             sizes=option.target_size is not None,
             motion=not draft,
+            layers=len(layer_ratios(options.ladder, option.rel_error or DEFAULT_REL_ERROR, 1.0)),
         ),
     )

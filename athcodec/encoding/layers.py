@@ -36,9 +36,12 @@ from athcodec.encoding.segment import (
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
-CORRECTIONS_SHARE = 0.01  # of the bytes up to a layer, that its corrections may take if it is not the last
-CORRECTED_LIMITS = tuple(2.0 ** (i / 3) for i in range(5, -6, -1))  # over the layer's own, to choose from
-LEAST_RATIO = 4  # of the steps of neighbouring layers
+COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
+# Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names,
+# and else to keep the tightest of these limits, over its own.
+NAMED_SHARE, CORRECTIONS_SHARE = 0.06, 0.015
+CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))
+LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
 LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
 LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
@@ -105,14 +108,14 @@ def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
 
 
 def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
-    """Of the step of each layer to that of the last, powers of two, descending to 1.
+    """Of the step of each layer to that of the last, descending to 1.
 
     ladder: largest errors over the diagonal, descending; those close to the bound, or to each other, make no layer of
     their own.
     """
     ratios: list[int] = []
     for error in ladder:
-        ratio = 1 << math.ceil(math.log2(min(max(error * diagonal / bound, 1.0), MOST_RATIO**2)))
+        ratio = round(COARSER * min(error * diagonal / bound, MOST_RATIO**2))
         if ratio >= LEAST_RATIO and (not ratios or ratios[-1] >= LEAST_RATIO * ratio):
             ratios.append(ratio)
     ratios.append(1)
@@ -175,7 +178,7 @@ def _rests(
     rest = prelude.rest_chunk
     if rest.exact or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
-    first_step, *steps = (rest.step * max(1.0, ratio / 2) for ratio in ratios)
+    first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     coded = _first_rests(prelude.plan, first_step, source.rest)
     for step in steps:
         coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1]))
@@ -313,13 +316,21 @@ class _SegmentCoder:
 
     def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
-        allowed = CORRECTIONS_SHARE * (self._shared_bytes + sum(map(len, self.chunks.values())))
-        best = decoded, b""
-        for factor in CORRECTED_LIMITS:
+
+        def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
             corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
-            if len(corrected[1]) > allowed:
-                break
-            best = corrected
+            return corrected if len(corrected[1]) <= share * bytes_ else None
+
+        bytes_ = self._shared_bytes + sum(map(len, self.chunks.values()))
+        best, loosest, tightest = within(1 / COARSER, NAMED_SHARE) or (decoded, b""), 0, len(CORRECTED_LIMITS)
+        if best[1]:
+            loosest = CORRECTED_LIMITS.index(1 / COARSER) + 1
+        while loosest < tightest:
+            middle = (loosest + tightest) // 2
+            if corrected := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):
+                best, loosest = corrected, middle + 1
+            else:
+                tightest = middle
         return best
 
     def _error(self, decoded: np.ndarray) -> tuple[float, ...]:

@@ -14,12 +14,18 @@ Progress = Callable[[str, float], None]
 # Microseconds of one thread for a vertex in a frame, as `python -m bench large` has them; only their ratios matter.
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
 TRIALS = {"fast": 7, "default": 31, "best": 46}  # that a search is worth, for the effort
+LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # beyond these where there are layers of precision
 BRANCHES = 0.5  # of all the rest, to find branches for a clip without
 SIZES = 6  # files that are made to meet a target size
 
 
 def silent(stage: str, fraction: float) -> None:
     """Reports to nobody."""
+
+
+def trials(effort: str, layered: bool) -> int:
+    """That a search is worth."""
+    return TRIALS[effort] + LAYER_TRIALS[effort] * layered
 
 
 class WeightedProgress:
@@ -49,15 +55,16 @@ def stage_weights(
     branches: bool,
     sizes: bool,
     motion: bool,
+    layers: int,
 ) -> dict[str, float]:
     """The estimated work of each stage. samples: segments that each trial codes; branches: they have to be found first;
-    sizes: a target is to be met; motion: it is coded too, after the search."""
+    sizes: a target is to be met; motion: it is coded too, after the search; layers: of precision, about."""
     longest = max(stop - start for start, stop in segments)
     some = vertices if (part := sample_vertices(vertices, len(segments), effort)) is None else part
     work = {
         "survey": SURVEY * vertices * segments[-1][1],
-        "search": TRIAL * TRIALS[effort] * samples * some * longest,
-        "motion": MOTION * vertices * segments[-1][1],
+        "search": TRIAL * trials(effort, layers > 1) * samples * some * longest,
+        "motion": MOTION * (1 + layers) / 2 * vertices * segments[-1][1],
     }
     before = {"branches": BRANCHES * sum(work.values())} if branches else {}
     tries = {"size": SIZES * (work["search"] + work["motion"])} if sizes else {}

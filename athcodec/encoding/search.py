@@ -19,7 +19,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
-from athcodec.encoding.progress import TRIALS, Progress
+from athcodec.encoding.progress import TRIALS, Progress, trials
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -97,7 +97,7 @@ def decide(
 ) -> tuple[list[Choice], CodedPrelude]:
     """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the
     last one's, 1 if that is the same layer."""
-    search = Search.of(source, ath, bound, effort, report, jobs)
+    search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1)
     first_layer, candidates = search.found(ratio)
     prelude = search.prelude(first_layer if ratio == 1 else candidates[0])
     return [
@@ -150,7 +150,7 @@ class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
 
     samples: from calm to wild; the one in the middle decides the steps of the nodes' maps. extrapolation: for a clip
-    that is a sample of a larger plant.
+    that is a sample of a larger plant. layered: whether settings of layers are to be found, too.
     """
 
     def __init__(
@@ -163,6 +163,7 @@ class Search:
         report: Progress,
         jobs: int | None = None,
         extrapolation: ExtrapolationFactors | None = None,
+        layered: bool = False,
     ):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         self.start, self.samples, self.levels = start, samples, ath.height + 2
@@ -172,15 +173,23 @@ class Search:
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
-        self._extra_trials = 0
+        self._extra_trials, self._trials = 0, trials(effort, layered)
 
     @classmethod
     def of(
-        cls, source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None
+        cls,
+        source: Source,
+        ath: Ath,
+        bound: float,
+        effort: str,
+        report: Progress,
+        jobs: int | None = None,
+        layered: bool = False,
     ) -> Search:
         """For a whole plant."""
         samples = samples_of(source)
-        return cls(source, ath, first_settings(source, ath, bound, samples[-1]), samples, effort, report, jobs)
+        start = first_settings(source, ath, bound, samples[-1])
+        return cls(source, ath, start, samples, effort, report, jobs, layered=layered)
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -260,7 +269,7 @@ class Search:
     def _report(self, worth: int = 0) -> None:
         """Reports progress after work that counts as `worth` trials in addition to those made."""
         self._extra_trials += worth
-        self.report("search", min((len(self._known) + self._extra_trials) / TRIALS[self.effort], 0.99))
+        self.report("search", min((len(self._known) + self._extra_trials) / self._trials, 0.99))
 
     def best_of_sample(self, sample: PlantSample, ratio: int) -> tuple[Settings, list[Settings]]:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
@@ -274,7 +283,10 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in self.samples]
-        search = Search(sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation)
+        layered = ratio > 1
+        search = Search(
+            sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, layered
+        )
         found = search.best()
         refinements = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
         return self._from_sample(search, search.first_layer(found, ratio), _coarser(start, ratio)), refinements

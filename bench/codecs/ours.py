@@ -44,6 +44,7 @@ class Athcodec:
                 attributes="none",
                 effort=self.effort,
                 segment_frames=self.segment_frames,
+                ladder="none",
                 tam=Thresholds(far, 0, far, 0) if self.single_depth else None,
             )
             self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
