@@ -73,6 +73,15 @@ def sample_ath(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def stepwise_ath(tmp_path_factory):
+    """The sample in layers: its level 1 refines the rest pose."""
+    path = tmp_path_factory.mktemp("stepwise") / "sample.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, path, rel_error=1e-4, effort="fast")
+    return path
+
+
+@pytest.fixture(scope="session")
 def bushy_clip():
     """A random plant of 25 branches on two roots, numbered at random, that sways for 50 frames."""
     return awkward(seed=5, branches=25, longest=9, frames=50, roots=2, shape="stem", motion="sway", shuffled=True)

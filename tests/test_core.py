@@ -729,8 +729,8 @@ def test_a_refined_rest_pose_is_asked_for_until_it_is_read(layered):
     assert stream.result_of_preparing(last, level) == OK
 
 
-def test_a_rest_pose_of_level_1_is_read_for_it_and_matrices_are_of_that_of_their_level(sample_ath):
-    data = sample_ath.read_bytes()
+def test_a_rest_pose_of_level_1_is_read_for_it_and_matrices_are_of_that_of_their_level(stepwise_ath):
+    data = stepwise_ath.read_bytes()
     stream = Player(data, whole=False)
     chunk = refined_rests(stream)[0]
     assert chunk.level == 1

@@ -393,14 +393,14 @@ def test_every_level_shows_the_positions_that_python_decodes(opened, sample_ath)
 
 
 @browser_test
-def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, sample_ath, monkeypatch):
+def test_what_is_drawn_has_the_rest_pose_of_level_1_once_that_is_here(opened, stepwise_ath, monkeypatch):
     """Lines and limbs are there before it, with that of level 0."""
-    with athcodec.open(sample_ath) as decoder:
+    with athcodec.open(stepwise_ath) as decoder:
         rests = [decoder.level_rest(level).astype(np.float32) for level in (0, 1)]
         assert not np.array_equal(*rests) and decoder.levels[0].bytes + 100 < decoder.levels[1].bytes
         after = decoder.levels[0].bytes + 100
     monkeypatch.setattr(throttled_server, "PACKET", 100)
-    with HeldServer({"tree.ath": sample_ath.read_bytes()}, after=after) as line:
+    with HeldServer({"tree.ath": stepwise_ath.read_bytes()}, after=after) as line:
         page = opened(line.page("tree.ath"), "athcodecViewer.motion?.level === 0")
         page.evaluate("athcodecViewer.plants[0].ath.lines")
         drawn = """(() => {
