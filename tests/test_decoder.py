@@ -35,7 +35,7 @@ def plants(sample_ath, sample_positions, bushy_ath, bushy_clip, layered_ath, tmp
         ("half accepted", plant(seed=12, branches=40, frames=40, rough=0.0), {"tam": Thresholds(0.25, 0, 0.8, 0)}),
     ):
         path = folder / f"{name}.ath"
-        athcodec.encode(clip, path, rel_error=1e-4, segment_frames=16, effort="fast", **more)
+        athcodec.encode(clip, path, rel_error=1e-4, segment_frames=16, effort="fast", ladder="none", **more)
         made[name] = path, clip.positions
     return made
 
@@ -124,7 +124,7 @@ def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name,
     assert len(levels) >= 3
     for coarse, fine in zip(levels, levels[1:]):
         assert fine.bytes > coarse.bytes and fine.nodes >= coarse.nodes
-        assert fine.rms_error <= 1.01 * coarse.rms_error
+        assert fine.rms_error <= coarse.rms_error
     assert levels[0].rms_error > 10 * levels[-1].rms_error
 
 
