@@ -40,6 +40,26 @@ def test_no_attack_of_thousands_breaks_a_promise(scratch, attack):
     assert broken_promises(attack, scratch) == []
 
 
+def test_a_stem_with_all_modes_at_its_base_level_knows_them_from_the_layer_before(scratch):
+    """Its base level has a learned time basis, the level that would complete it has cosines and none of its rows."""
+    attack = Attack(
+        seed=1000000,
+        branches=2,
+        longest=3,
+        hierarchy="one",
+        rest="plane",
+        actions=("flatten", "spike", "flatten"),
+        frames=33,
+        scale=1e6,
+        squeeze=1e3,
+        place=1.0,
+        is_float64=True,
+        segment_frames=53,
+        effort="default",
+    )
+    assert broken_promises(attack, scratch) == []
+
+
 @pytest.mark.parametrize("action", ACTIONS)
 def test_every_action_alone_keeps_the_bound(action, scratch):
     assert broken_promises(Attack(seed=3, branches=6, actions=(action,), frames=33, segment_frames=16), scratch) == []

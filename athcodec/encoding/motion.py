@@ -227,7 +227,9 @@ class SegmentMotion:
     def _known(self, before: SegmentMotion) -> np.ndarray:
         """(P,) uint8: pieces whose integers in the layer before stand for the same functions of time as here."""
         same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
-        return (same[before.plan.pieces["level"]] & same[before.plan.base_level]).astype(np.uint8)
+        pieces = before.plan.pieces
+        all_at_base = pieces["rank"] <= pieces["low_modes"]
+        return (same[before.plan.base_level] & (same[pieces["level"]] | all_at_base)).astype(np.uint8)
 
     def _bind(self) -> None:
         self._c_streams = (Stream * len(self.streams))()
