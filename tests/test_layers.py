@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import STEADY, awkward_plants, bound_for, plant
+from plants import STEADY, awkward_plants, bound_for, chain_plant, plant
 
 import athcodec
+from athcodec import Thresholds
 from athcodec import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_ratios
@@ -292,6 +293,21 @@ def test_each_layer_shows_the_plant_much_better_than_the_one_before(layered):
     with athcodec.open(layered) as decoder:
         errors = [level.rms_error for level in decoder.levels if level.name.startswith("layer")]
     assert len(errors) == 4 and all(fine < coarse / 4 for coarse, fine in zip(errors, errors[1:]))
+
+
+@pytest.mark.parametrize("lossless", [False, True])
+def test_deep_hierarchies_and_long_ladders_have_as_many_layers_as_a_file_may(lossless, tmp_path):
+    deep, ladder = chain_plant(45, 2), [0.5 / 10**i for i in range(9)]
+    athcodec.encode(
+        deep, tmp_path / "a.ath", rel_error=1e-4, tam=Thresholds(0, 0, 0, 0), lossless=lossless, effort="fast"
+    )
+    wide = plant(seed=4, branches=9, frames=20, dtype=np.float64)
+    athcodec.encode(wide, tmp_path / "b.ath", rel_error=1e-8, ladder=ladder, lossless=lossless, effort="fast")
+    for name, clip, layers in (("a", deep, 2 - lossless), ("b", wide, 8)):
+        check_levels(clip, tmp_path / f"{name}.ath")
+        with athcodec.open(tmp_path / f"{name}.ath") as decoder:
+            assert decoder.level_count <= 32
+            assert sum(level.name.startswith("layer") for level in decoder.levels) == (layers if layers > 1 else 0)
 
 
 # ---- what levels are called ----

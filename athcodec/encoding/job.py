@@ -31,6 +31,8 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.layers import (
     DEFAULT_LADDER,
+    MOST_LAYERS,
+    MOST_LEVELS,
     Layers,
     code_segment,
     ladder_of,
@@ -248,7 +250,7 @@ class EncodingJob:
             self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
         )
         ath = self.seen.ath(self.thresholds(bound))
-        ratio = self._layer_ratios(bound)[0]
+        ratio = self._layer_ratios(ath, bound)[0]
         choices, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
         return layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
@@ -260,11 +262,13 @@ class EncodingJob:
         shared = sum(map(len, layer_chunks(decided.layers).values()))
         return self.segment_count * sum(map(len, chunks.values())) + shared
 
-    def _layer_ratios(self, bound: float) -> list[int]:
-        return layer_ratios(self.options.ladder, bound, self.seen.diagonal)
+    def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
+        """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy."""
+        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal)
+        return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
 
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
-        layers = layers_of(self.source, prelude, choice, self._layer_ratios(choice.settings.bound))
+        layers = layers_of(self.source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
         return _Decided(ath, choice, prelude, layers)
 
     def draft(self, decided: _Decided) -> Draft:

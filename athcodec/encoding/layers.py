@@ -43,6 +43,7 @@ NAMED_SHARE, CORRECTIONS_SHARE = 0.06, 0.015
 CORRECTED_LIMITS = tuple(2.0 ** (i / 8) for i in range(16, -16, -1))
 LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
+MOST_LAYERS, MOST_LEVELS = 8, 32  # of a file
 LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
 LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
 
