@@ -11,6 +11,7 @@ import pytest
 
 from athcodec import _native, container, core_file, errors
 from athcodec._native import lib
+from athcodec.encoding import layers
 from athcodec.segmentation import decoding_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,7 +33,7 @@ def c_constants(*headers: str) -> dict[str, int]:
     return found
 
 
-C = c_constants("ath.h", "internal.h", "motion.h")
+C = c_constants("ath.h", "internal.h", "motion.h", "container.h")
 
 
 def js_constants(path: str) -> dict[str, int]:
@@ -64,6 +65,15 @@ def test_chunks_have_the_same_kinds_and_names_everywhere():
     for module in ("src/statics.js", "src/ATHMotion.js", "ath_decoder.template.mjs"):
         kinds = {name: value for name, value in js_constants(module).items() if name in (*in_format, "NO_LEVEL")}
         assert kinds and kinds.items() <= C.items()
+
+
+def test_levels_layers_and_errors_are_the_same_everywhere():
+    assert (C["LEVELS"], C["LAYERS"]) == (layers.MOST_LEVELS, layers.MOST_LAYERS)
+    most = {name: int(most) for name, most in re.findall(r"^\| (\w+) \| \d+ to (\d+)\b", FORMAT, flags=re.M)}
+    assert (most["Full_Level_Count"], most["Layer_Count"]) == (layers.MOST_LEVELS, layers.MOST_LAYERS)
+    assert (C["SHORT_SHIFT"], C["SHORT_FLOATS"]) == (_native.SHORT_SHIFT, _native.SHORT_FLOATS)
+    assert (C["MEASURES"], C["LEVEL_NAME"]) == (len(_native.MEASURES), core_file.LEVEL_NAME)
+    assert [C["LARGEST"], C["P99"], C["RMS"]] == [_native.MEASURES.index(name) for name in ("max", "p99", "rms")]
 
 
 def test_limits_are_the_same_everywhere():

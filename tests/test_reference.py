@@ -158,6 +158,15 @@ def test_shapes_of_layers_and_several_clips_have_the_same_bits(full_clip, medley
     assert_same_bits(encoded(athcodec.join(medley_clips), tmp_path, rel_error=1e-4, ladder=(1e-2, 1e-3)))
 
 
+def with_a_bit_changed(parts, chosen, random):
+    """A file with one bit of one of the chosen chunks changed, and a checksum that fits; that chunk."""
+    i, chunks = int(random.choice(chosen)), list(parts.chunks)
+    content = bytearray(chunks[i][1])
+    content[random.integers(len(content))] ^= 1 << random.integers(8)
+    chunks[i] = chunks[i][0], bytes(content)
+    return parts.with_chunks(chunks), chunks[i][0]
+
+
 @pytest.mark.parametrize("name", ["layers-mixed", "layers-three"])
 def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
     """One byte of a chunk of a refinement is another, and its checksum fits."""
@@ -168,11 +177,8 @@ def test_corrupted_refinements_are_refused_alike_or_mean_the_same(name):
     ]
     refused = 0
     for _ in range(40):
-        i, chunks = int(random.choice(chosen)), list(parts.chunks)
-        content = bytearray(chunks[i][1])
-        content[random.integers(len(content))] ^= 1 << random.integers(8)
-        chunks[i] = chunks[i][0], bytes(content)
-        data, level = parts.with_chunks(chunks), chunks[i][0].level
+        data, chunk = with_a_bit_changed(parts, chosen, random)
+        level = chunk.level
         got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
         expected = outcome(lambda data=data, level=level: opened(data).positions(level=level))
         refused += isinstance(expected, str)
@@ -252,12 +258,8 @@ def test_corrupted_chunks_are_refused_alike_or_mean_the_same(full_ath):
     motion_or_prelude = [i for i, (c, _) in enumerate(parts.chunks) if c.is_motion or c.kind < 4]
     refused = 0
     for _ in range(40):
-        i, chunks = int(rng.choice(motion_or_prelude)), list(parts.chunks)
-        content = bytearray(chunks[i][1])
-        content[rng.integers(len(content))] ^= 1 << rng.integers(8)
-        chunks[i] = chunks[i][0], bytes(content)
-        data = parts.with_chunks(chunks)
-        level = chunks[i][0].level if chunks[i][0].is_motion else parts.header.level_count - 1
+        data, chunk = with_a_bit_changed(parts, motion_or_prelude, rng)
+        level = chunk.level if chunk.is_motion else parts.header.level_count - 1
         got = outcome(lambda data=data, level=level: reference.AthFile(data).positions(level))
         expected = outcome(lambda data=data, level=level: opened(data).positions(level=level))
         if isinstance(expected, str) or isinstance(got, str):

@@ -323,9 +323,9 @@ class _SegmentCoder:
             return corrected if len(corrected[1]) <= share * bytes_ else None
 
         bytes_ = self._shared_bytes + sum(map(len, self.chunks.values()))
-        best, loosest, tightest = within(1 / COARSER, NAMED_SHARE) or (decoded, b""), 0, len(CORRECTED_LIMITS)
-        if best[1]:
-            loosest = CORRECTED_LIMITS.index(1 / COARSER) + 1
+        best, loosest, tightest = (decoded, b""), 0, len(CORRECTED_LIMITS)
+        if named := within(1 / COARSER, NAMED_SHARE):
+            best, loosest = named, sum(factor >= 1 / COARSER for factor in CORRECTED_LIMITS)
         while loosest < tightest:
             middle = (loosest + tightest) // 2
             if corrected := within(CORRECTED_LIMITS[middle], CORRECTIONS_SHARE):

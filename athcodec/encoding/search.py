@@ -99,7 +99,7 @@ def decide(
     last one's, 1 if that is the same layer."""
     search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1)
     first_layer, candidates = search.found(ratio)
-    prelude = search.prelude(first_layer if ratio == 1 else candidates[0])
+    prelude = search.prelude(candidates[0])
     return [
         Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)) for settings in candidates
     ], prelude
@@ -134,8 +134,6 @@ def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: Lear
 
 def _coarser(settings: Settings, ratio: int) -> Settings:
     """The same, so many times as coarse; the rest pose half of that."""
-    if ratio == 1:
-        return settings
     return replace(
         settings,
         bound=ratio * settings.bound,
@@ -218,12 +216,13 @@ class Search:
         it. Where the ratio is 1, the best of the only layer."""
         sample = sample_plant(self.source, self.ath, self.effort)
         if sample:
-            found = self.best_of_sample(sample, ratio)
+            first, candidates = self.best_of_sample(sample, ratio)
         else:
             best = self.best()
-            found = self.first_layer(best, ratio), list(self.refinements(best, ratio))
+            candidates = list(self.refinements(best, ratio))  # first: components are of the step that asks first
+            first = best if ratio == 1 else self.first_layer(best, ratio)
         self.report("search", 1.0)
-        return found
+        return first, candidates
 
     def best(self) -> Settings:
         steps = [
@@ -248,8 +247,6 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        if ratio == 1:
-            return settings
         first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels)
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
@@ -262,7 +259,7 @@ class Search:
             yield settings
             return
         factor = settings.rotation_step_factors[self.prelude(settings).plan.main_level]
-        for own, only_tips in {(factor, settings.only_tips): 0, (factor, True): 0, (0, False): 0}:
+        for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, True), (0, False)]):
             candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
             yield candidate if self.effort == "fast" else self._with_learned_modes(candidate)
 
@@ -288,8 +285,10 @@ class Search:
             sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, layered
         )
         found = search.best()
-        refinements = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
-        return self._from_sample(search, search.first_layer(found, ratio), _coarser(start, ratio)), refinements
+        candidates = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
+        if ratio == 1:
+            return candidates[0], candidates
+        return self._from_sample(search, search.first_layer(found, ratio), _coarser(start, ratio)), candidates
 
     def _from_sample(self, search: Search, found: Settings, start: Settings) -> Settings:
         """What was found last for a sample of the plant, for all of it; start: what does not depend on that."""
