@@ -82,7 +82,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 6 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 7 };
 
 /* Kinds of chunks. An unknown kind with the bit ATH_OPTIONAL is skipped. */
 enum {
