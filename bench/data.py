@@ -1,8 +1,8 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes with leaves; and any HDF5 clip by its path. All are seeded and differ between machines
-by rounding only. The attribute "recipe" of a file describes how it was made; when the recipe changes, the file is
+vertices; render meshes with leaves; small clips of many kinds (bench/odd); and any HDF5 clip by its path. All are seeded
+and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when the recipe changes, the file is
 made again.
 """
 
@@ -22,6 +22,7 @@ import numpy as np
 
 import athcodec
 from athcodec.hierarchy import branch_orders
+from bench import odd
 from bench.tables import table
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
@@ -110,7 +111,7 @@ class Dressed:
         return f"{self.source} as a mesh: bark tubes and {self.leaves:,} leaf cards"
 
 
-Recipe = Simulated | Refined | Dressed
+Recipe = Simulated | Refined | Dressed | odd.Odd
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
@@ -126,11 +127,16 @@ RECIPES: dict[str, Recipe] = {
     "leaves_67k_200f": Dressed("mj_4k_200f", 200, 10000, seed=10),
 }
 
-SUITES = {"quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"), "full": (SAMPLE, *RECIPES)}
+SUITES = {
+    "quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"),
+    "full": (SAMPLE, *RECIPES),
+    "odd": tuple(odd.CLIPS),
+}
+RECIPES |= odd.CLIPS
 
 
 def clips(suite: str, folder: Path | None = None) -> list[tuple[str, Path, str]]:
-    """(name, path, description) of every clip of "quick" or "full"; missing files are made."""
+    """(name, path, description) of every clip of a suite; missing files are made."""
     return [(name, path_of(name, folder), describe(name)) for name in SUITES[suite]]
 
 
@@ -255,8 +261,8 @@ def _row(clip: athcodec.MotionClip) -> dict[str, Any]:
         "vertices": clip.vertex_count,
         "frames": clip.frame_count,
         "branches": clip.branch_count,
-        "orders": f"0-{int(branch_orders(clip.branch_parent).max())}",
+        "orders": f"0-{int(branch_orders(clip.branch_parent).max())}" if clip.has_branches else None,
         "faces": None if clip.faces is None else len(clip.faces),
         "float32 MB": 12e-6 * clip.vertex_count * clip.frame_count,
-        "tips %": 100 * tip_motion(clip),
+        "tips %": 100 * tip_motion(clip) if clip.has_branches else None,
     }

@@ -45,7 +45,7 @@ def digest(path: Path) -> str:
     total = hashlib.sha256()
     with athcodec.read_hdf5(path) as clip:
         for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
-            total.update(array.tobytes())
+            total.update(b"" if array is None else array.tobytes())
         for _, frames in clip.blocks():
             total.update(frames.tobytes())
     return total.hexdigest()[:12]

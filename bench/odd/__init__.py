@@ -1,0 +1,90 @@
+"""Small clips of many kinds, made by formulas in seconds: plants that grow or unfold, grass, captures, meshes that stand
+still, and things that are no plants at all.
+
+A codec that is good at swaying trees has to be no worse than a simple one here. Every maker is given a seed and nothing
+from outside; `CLIPS` are the ones that are measured, by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from athcodec import MotionClip
+from bench.odd import bending, growing, others
+from bench.odd.grass import grass
+
+
+@dataclass(frozen=True)
+class Odd:
+    """A clip by the name of its maker, its seed and whatever else that is given; whether it shows a plant."""
+
+    maker: str
+    text: str
+    seed: int
+    options: Mapping[str, Any] = field(default_factory=dict)
+    plant: bool = True
+    version: int = 1  # goes up when the code of this folder gives other motion
+    source: ClassVar[None] = None
+
+    def make(self, source: None = None) -> MotionClip:
+        return MAKERS[self.maker](seed=self.seed, **self.options)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+MAKERS: dict[str, Callable[..., MotionClip]] = {
+    maker.__name__: maker
+    for maker in (
+        bending.swaying_tree,
+        bending.moved_tree,
+        bending.held_tree,
+        bending.far_tree,
+        bending.scanned_tree,
+        growing.growth,
+        growing.growth_in_wind,
+        growing.unfolding_leaves,
+        grass,
+        others.captured_stem,
+        others.white_noise,
+        others.still_mesh,
+        others.morph_targets,
+        others.one_vertex,
+        others.tumbling_cube,
+    )
+}
+
+
+def _odd(maker: str, text: str, plant: bool = True, seed: int = 1, **options: Any) -> Odd:
+    return Odd(maker, text, seed, options, plant)
+
+
+CLIPS: dict[str, Odd] = {
+    "growth": _odd("growth", "branches grow one after the other", frames=120, vertices=1001),
+    "growth_eased": _odd("growth", "as growth, eased", seed=2, frames=120, vertices=1001, eased=True),
+    "growth_in_wind": _odd("growth_in_wind", "grows while it sways", seed=3, frames=120, vertices=1001),
+    "unfolding": _odd("unfolding_leaves", "leaves unfold on a twig", frames=120, leaves=60),
+    "grass": _odd("grass", "800 blades in one wind"),
+    "grass_unnamed": _odd("grass", "the same points, in order, no branches named", named=False),
+    "grass_interleaved": _odd("grass", "the same, first points first", named=False, order="interleaved"),
+    "grass_shuffled": _odd("grass", "the same, at random", named=False, order="shuffled"),
+    "capture": _odd("captured_stem", "31 markers, noise of 1e-4", frames=2000, points=31, noise=1e-4),
+    "capture_long": _odd("captured_stem", "the same for longer", seed=2, frames=6000, points=31, noise=1e-4),
+    "calm": _odd("swaying_tree", "tree with little motion", frames=100, vertices=4000, amount=0.008),
+    "scanned": _odd("scanned_tree", "stems of 1 to 5 vertices, blown far", frames=120, stems=120, longest=5, lean=0.6),
+    "few_7": _odd("swaying_tree", "7 frames of a tree", seed=7, frames=7, vertices=11666, orders=3, fps=4.0),
+    "few_9": _odd("swaying_tree", "9 frames of a tree", seed=9, frames=9, vertices=7207, orders=3, fps=4.0),
+    "teleport": _odd("moved_tree", "a tree moved every 20 frames", frames=120, vertices=300, every=20),
+    "held": _odd("held_tree", "each pose three times", seed=2, frames=120, vertices=300, repeats=3),
+    "far": _odd("far_tree", "1e5 m from the origin", seed=3, frames=60, vertices=300, distance=1e5),
+    "still": _odd("still_mesh", "60 frames alike of a mesh", frames=60, nodes=1000, leaves=420),
+    "one_frame": _odd("still_mesh", "the mesh alone", frames=1, nodes=1000, leaves=420),
+    "morph": _odd(
+        "morph_targets", "20 shapes, 3 at a time", plant=False, frames=225, points=1528, targets=20, active=3, key=15
+    ),
+    "noise": _odd("white_noise", "another place in every frame", plant=False, frames=100, points=100),
+    "vertex": _odd("one_vertex", "one vertex", plant=False, frames=100),
+    "cube": _odd("tumbling_cube", "thrown cube, rigid", plant=False, frames=127),
+}

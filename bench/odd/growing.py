@@ -1,0 +1,107 @@
+"""Plants that grow: branches that come out one after the other, with and without wind, and leaves that unfold."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec import MotionClip
+from bench.odd.bending import FPS, Bones, clip_of, gusty
+from bench.trees.plant import grow
+from bench.trees.ride import rotations, sideways
+
+PARTS = 4  # of the clip: trunk, orders 1 and 2 on each other, and rest
+
+
+def growth(seed: int, frames: int, vertices: int, eased: bool = False) -> MotionClip:
+    """A tree whose branches wait where they will be attached, grow out of there when their parent has grown, and stop."""
+    bones = Bones.of(grow(vertices, 2, 8.0, seed))
+    grown = growing(bones, frames, np.random.default_rng(seed), eased)[:, bones.branch, None]
+    rest = bones.rest
+    base = rest[attach_node(bones)[bones.branch]]
+    return clip_of(bones, base + grown * (rest - base), rest=rest)
+
+
+def growth_in_wind(seed: int, frames: int, vertices: int, amount: float = 0.15) -> MotionClip:
+    """A tree whose branches grow out of their parents, on which they are carried, while all that is there sways."""
+    bones = Bones.of(grow(vertices, 2, 8.0, seed))
+    rng = np.random.default_rng(seed)
+    grown = growing(bones, frames, rng, eased=True)
+    turns = gusty(np.arange(frames) / FPS, len(bones.branch_parent), amount, 0.0, rng)
+    return clip_of(bones, bones.bent(turns, grown))
+
+
+def attach_node(bones: Bones) -> np.ndarray:
+    """(B,) the node that each branch grows out of; the root for the trunk."""
+    first = np.unique(bones.branch, return_index=True)[1]
+    return np.maximum(bones.parent[first], 0)
+
+
+def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
+    """(B, 2) the frames at which branches begin and stop to grow: after their parent has stopped, one by one along it."""
+    part = frames / PARTS
+    times = np.zeros((len(bones.branch_parent), 2))
+    times[0] = part * np.array([0.1, 0.8])
+    node = attach_node(bones)
+    for branch, below in enumerate(bones.branch_parent[1:].tolist(), start=1):
+        along = bones.branch == below
+        height = (node[branch] - np.flatnonzero(along)[0]) / along.sum()
+        begin = times[below, 1] + part * rng.uniform(0.0, 0.1) + 0.5 * part * height
+        times[branch] = begin, begin + part * rng.uniform(0.3, 0.5)
+    return times
+
+
+def growing(bones: Bones, frames: int, rng: np.random.Generator, eased: bool) -> np.ndarray:
+    """(T, B) lengths of the branches, from 0 to 1, in a straight line or `eased` at both ends."""
+    begin, end = begin_and_end(bones, frames, rng).T
+    share = np.clip((np.arange(frames)[:, None] - begin) / (end - begin), 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share) if eased else share
+
+
+ROWS, WIDE = 6, 3  # vertices of a leaf along and across
+
+
+def unfolding_leaves(seed: int, frames: int, leaves: int) -> MotionClip:
+    """A twig whose leaves, folded at the midrib and rolled up, open and stretch out one after the other."""
+    rng = np.random.default_rng(seed)
+    twig = np.linspace(0.0, 1.0, leaves + 1)[:, None] * [0.1, 1.0, 0.0]
+    open_share = np.clip((np.arange(frames)[:, None] / frames - np.linspace(0.05, 0.7, leaves)) / 0.2, 0.0, 1.0)
+    open_share = open_share * open_share * (3.0 - 2.0 * open_share)
+    blades = _leaves(twig[1:], open_share, rng)
+    still = np.broadcast_to(twig, (frames, *twig.shape))
+    positions = np.concatenate([still, blades.reshape(frames, -1, 3)], axis=1).astype(np.float32)
+    size = ROWS * WIDE
+    corner = np.arange(size).reshape(ROWS, WIDE)
+    quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
+    return MotionClip(
+        positions,
+        np.arange(frames) / FPS,
+        np.repeat(np.arange(leaves + 1), [leaves + 1] + [size] * leaves),
+        np.concatenate([[-1], np.zeros(leaves, int)]),
+        rest=positions[-1],
+        faces=(len(twig) + size * np.arange(leaves)[:, None, None] + quads).reshape(-1, 4).astype(np.int32),
+        metadata={"unit": "m", "up_axis": "y", "fps": FPS},
+    )
+
+
+def _leaves(feet: np.ndarray, open_share: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(T, leaves, ROWS, WIDE, 3) vertices; a leaf's own axes: along, across, upwards."""
+    count = len(feet)
+    closed = 1.0 - open_share[..., None]
+    curl = (1.2 * closed + 0.05) * np.arange(ROWS)  # the angle of each row, rolled up by up to 6 rad
+    steps = np.stack([np.cos(curl), 0 * curl, np.sin(curl)], axis=-1)
+    midrib = np.cumsum(steps, axis=2) / ROWS
+    upwards = np.stack([-np.sin(curl), 0 * curl, np.cos(curl)], axis=-1)
+    fold = 1.4 * closed + 0.1
+    width = 0.35 * np.sin(np.pi * (np.arange(ROWS) + 0.5) / ROWS)
+    side = np.arange(WIDE) - WIDE // 2
+    across = (width * np.cos(fold))[..., None] * [0.0, 1.0, 0.0]
+    lift = (width * np.sin(fold))[..., None] * upwards
+    own = midrib[..., None, :] + side[:, None] * across[..., None, :] + np.abs(side)[:, None] * lift[..., None, :]
+    own *= 0.15 * rng.uniform(0.8, 1.2, count)[:, None, None, None] * (0.3 + 0.7 * open_share[..., None, None, None])
+    azimuth = 2.4 * np.arange(count)
+    along = sideways(np.tile([0.0, 1.0, 0.0], (count, 1)), azimuth, np.radians(60.0))
+    beside = np.cross([0.0, 1.0, 0.0], along)
+    beside /= np.linalg.norm(beside, axis=1, keepdims=True)
+    axes = np.stack([along, beside, np.cross(along, beside)], axis=1)
+    droop = rotations((0.6 * closed) * beside)  # a closed leaf stands upright
+    return feet[:, None, None] + np.einsum("tlrwa,lak,tljk->tlrwj", own, axes, droop)

@@ -1,0 +1,97 @@
+"""Clips that a codec for swaying plants is not made for: noise, single things, shapes that are mixed, still meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec import MotionClip
+from bench.odd.bending import FPS, Bones, clip_of, swaying
+from bench.trees.mesh import dress
+from bench.trees.plant import grow
+from bench.trees.ride import rotations
+from bench.trees.wind import Wind
+
+
+def captured_stem(seed: int, frames: int, points: int, noise: float, fps: float = 120.0) -> MotionClip:
+    """A stem with markers that sways, as a capture gives it: the same noise on every coordinate; noise: RMS over the
+    diagonal.
+    """
+    rng = np.random.default_rng(seed)
+    stem = np.linspace(0.0, 2.0, points)[:, None] * [0.0, 1.0, 0.0]
+    element = np.diff(stem, axis=0, prepend=0.0)
+    bones = Bones(np.arange(-1, points - 1), np.zeros(points, np.int32), np.array([-1]), element)
+    positions = swaying(bones, frames, rng, 0.4, fps=fps)
+    diagonal = np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0))
+    positions += noise * diagonal * rng.normal(size=positions.shape)
+    return clip_of(bones, positions, fps, positions.mean(axis=0))
+
+
+def white_noise(seed: int, frames: int, points: int) -> MotionClip:
+    """Points that are somewhere else in every frame."""
+    positions = np.random.default_rng(seed).normal(size=(frames, points, 3))
+    return _unnamed(positions)
+
+
+def still_mesh(seed: int, frames: int, nodes: int, leaves: int) -> MotionClip:
+    """The mesh of a tree, tubes and leaf cards, all frames alike."""
+    plant = grow(nodes, 2, 8.0, seed)
+    tree = clip_of(Bones.of(plant), plant.position[None])
+    tree.attributes["radius"] = plant.radius
+    mesh = dress(tree, Wind(1e-3, 8.0, seed=seed), 1, leaves, seed)
+    return _unnamed(np.repeat(mesh.rest[None], frames, axis=0), faces=mesh.faces)
+
+
+def morph_targets(seed: int, frames: int, points: int, targets: int, active: int, key: int) -> MotionClip:
+    """A surface mixed of shapes, few at a time, by weights that are straight between keys `key` frames apart."""
+    rng = np.random.default_rng(seed)
+    base = _ball(points)
+    centre = base[rng.integers(0, points, targets)]
+    distance = np.linalg.norm(base - centre[:, None], axis=-1)
+    bump = np.exp(-((distance / rng.uniform(0.3, 0.8, (targets, 1))) ** 2))
+    shapes = bump[..., None] * rng.normal(0, 0.2, (targets, 1, 3))
+    keys = -(-frames // key) + 1
+    weights = np.zeros((keys, targets))
+    for row in weights[1:]:  # the first pose is the base
+        row[rng.choice(targets, active, replace=False)] = rng.uniform(0.2, 1.0, active)
+    at = np.arange(frames) / key
+    mixed = np.stack([np.interp(at, np.arange(keys), column) for column in weights.T], axis=-1)
+    return _unnamed(base + np.tensordot(mixed, shapes, axes=1))
+
+
+def _ball(points: int) -> np.ndarray:
+    """(points, 3) evenly over the unit sphere, along a spiral."""
+    height = 1.0 - 2.0 * (np.arange(points) + 0.5) / points
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(points)
+    radius = np.sqrt(1.0 - height**2)
+    return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
+
+
+def one_vertex(seed: int, frames: int) -> MotionClip:
+    """A single vertex on a smooth way."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(frames)[:, None, None] / FPS
+    waves = np.sin(2 * np.pi * rng.uniform(0.2, 1.0, (4, 1)) * time + rng.uniform(0, 6.28, (4, 3)))
+    return _unnamed(waves.mean(axis=1, keepdims=True))
+
+
+def tumbling_cube(seed: int, frames: int) -> MotionClip:
+    """A cube of 24 vertices, four to a side, thrown and turning."""
+    rng = np.random.default_rng(seed)
+    square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]) / 2.0
+    sides = [[0, 0, 0], [0, 0.5, 0], [0, 1, 0], [0, 1.5, 0], [0.5, 0, 0], [1.5, 0, 0]]
+    cube = np.concatenate([square @ rotations(np.pi * np.array(side)).T for side in sides])
+    time = np.arange(frames)[:, None] / FPS
+    way = time * [2.0, 6.0, 0.5] - [0.0, 4.9, 0.0] * time**2
+    turns = rotations(time * rng.normal(0, 3.0, 3))
+    positions = np.einsum("tij,nj->tni", turns, cube) + way[:, None]
+    return _unnamed(positions, faces=np.arange(24, dtype=np.int32).reshape(6, 4))
+
+
+def _unnamed(positions: np.ndarray, **more: np.ndarray) -> MotionClip:
+    """A clip without branches; its rest pose is the first frame."""
+    return MotionClip(
+        positions.astype(np.float32),
+        np.arange(len(positions)) / FPS,
+        metadata={"unit": "m", "up_axis": "y", "fps": FPS},
+        **more,
+    )
