@@ -1,9 +1,9 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes with leaves; small clips of many kinds (bench/odd); and any HDF5 clip by its path. All are seeded
-and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when the recipe changes, the file is
-made again.
+vertices; render meshes with leaves; small clips of many kinds (see bench/odd); and any HDF5 clip by its path. All are
+seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when the
+recipe changes, the file is made again.
 """
 
 from __future__ import annotations
@@ -127,11 +127,7 @@ RECIPES: dict[str, Recipe] = {
     "leaves_67k_200f": Dressed("mj_4k_200f", 200, 10000, seed=10),
 }
 
-SUITES = {
-    "quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"),
-    "full": (SAMPLE, *RECIPES),
-    "odd": tuple(odd.CLIPS),
-}
+SUITES = {"quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"), "full": (SAMPLE, *RECIPES), "odd": tuple(odd.CLIPS)}
 RECIPES |= odd.CLIPS
 
 

@@ -1,5 +1,5 @@
-"""Small clips of many kinds, made by formulas in seconds: plants that grow or unfold, grass, captures, meshes that stand
-still, and things that are no plants at all.
+"""Small clips of many kinds, made by formulas in seconds: plants that grow or unfold, grass, captures, meshes that
+stand still, and things that are no plants at all.
 
 A codec that is good at swaying trees has to be no worse than a simple one here. Every maker is given a seed and nothing
 from outside; `CLIPS` are the ones that are measured, by name.

@@ -102,12 +102,7 @@ def clip_of(bones: Bones, positions: np.ndarray, fps: float = FPS, rest: np.ndar
 
 
 def swaying_tree(
-    seed: int,
-    frames: int,
-    vertices: int,
-    orders: int = 2,
-    amount: float = 0.15,
-    fps: float = FPS,
+    seed: int, frames: int, vertices: int, orders: int = 2, amount: float = 0.15, fps: float = FPS
 ) -> MotionClip:
     """A tree of 8 m that sways."""
     bones = Bones.of(grow(vertices, orders, 8.0, seed))

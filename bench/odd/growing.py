@@ -13,7 +13,9 @@ PARTS = 4  # of the clip: trunk, orders 1 and 2 on each other, and rest
 
 
 def growth(seed: int, frames: int, vertices: int, eased: bool = False) -> MotionClip:
-    """A tree whose branches wait where they will be attached, grow out of there when their parent has grown, and stop."""
+    """A tree whose branches wait where they will be attached, grow out of there when their parent has stopped, and stop
+    too.
+    """
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
     grown = growing(bones, frames, np.random.default_rng(seed), eased)[:, bones.branch, None]
     rest = bones.rest
@@ -37,7 +39,7 @@ def attach_node(bones: Bones) -> np.ndarray:
 
 
 def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """(B, 2) the frames at which branches begin and stop to grow: after their parent has stopped, one by one along it."""
+    """(B, 2) frames at which branches begin and stop growing: after their parent has stopped, one by one along it."""
     part = frames / PARTS
     times = np.zeros((len(bones.branch_parent), 2))
     times[0] = part * np.array([0.1, 0.8])
