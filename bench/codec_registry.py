@@ -24,7 +24,12 @@ from athcodec._library import library_path
 from bench.codecs import Codec
 from bench.codecs.programs import lossless
 
-SOURCES = (("bench.codecs.ours", None), ("bench.codecs.programs", "PROGRAMS"), ("bench.codecs.baselines", "BASELINES"))
+SOURCES = (
+    ("bench.codecs.ours", None),
+    ("bench.codecs.programs", "PROGRAMS"),
+    ("bench.codecs.baselines", "BASELINES"),
+    ("bench.codecs.simple", "SIMPLE"),
+)
 OURS = "athcodec"
 DISTRIBUTIONS = ("athcodec", "numpy", "zstandard")
 

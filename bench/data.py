@@ -2,8 +2,8 @@
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
 vertices; render meshes with leaves; small clips of many kinds (see bench/odd); and any HDF5 clip by its path. All are
-seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when the
-recipe changes, the file is made again.
+seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when
+the recipe changes, the file is made again.
 """
 
 from __future__ import annotations

@@ -47,7 +47,8 @@ def morph_targets(seed: int, frames: int, points: int, targets: int, active: int
     base = _ball(points)
     centre = base[rng.integers(0, points, targets)]
     distance = np.linalg.norm(base - centre[:, None], axis=-1)
-    bump = np.exp(-((distance / rng.uniform(0.3, 0.8, (targets, 1))) ** 2))
+    reach = rng.uniform(0.2, 0.5, (targets, 1))
+    bump = np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
     shapes = bump[..., None] * rng.normal(0, 0.2, (targets, 1, 3))
     keys = -(-frames // key) + 1
     weights = np.zeros((keys, targets))
