@@ -2,16 +2,17 @@
 
 The points come from rd.py. The ratio at a bound is that of the smallest files that each codec makes within this bound.
 For ratios at equal RMS, the points of a codec, which were tuned for the bound, form a curve on which the size is
-interpolated (curves.py).
+interpolated (curves.py). On odd clips the target is another: to be no larger than a simple codec anywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from math import exp, log
 from typing import Any
 
 from bench.codec_registry import OURS
+from bench.codecs import simple
 from bench.curves import Curve, mean_saving
 
 Point = dict[str, Any]
@@ -19,6 +20,7 @@ Point = dict[str, Any]
 BOUND_TARGETS = {"program": {1e-3: 6.5, 1e-4: 5.0, 1e-5: 2.8}, "baseline": {1e-3: 2.0, 1e-4: 1.6, 1e-5: 1.3}}
 KG_TARGETS = {0.1: 2.5, 0.01: 1.9}  # against PCA; Karni-Gotsman error in per cent
 PCA_NAMES = ("pca", "coddyac")
+SIMPLE_SHARE, SIMPLE_BYTES = 1.02, 160  # of the simple codec's size, and bytes, that ours may take
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
@@ -117,3 +119,48 @@ def over_clips(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
             }
         )
     return result
+
+
+# ---- odd clips ----
+
+
+def against_simple(points: Iterable[Point], ours: str) -> list[dict[str, Any]]:
+    """A row for each clip and bound at which `ours` has a file: its bytes, those of the simple codec and of the best of
+    all others, and whether ours is within what the simple codec allows; None where that has no file.
+    """
+    sizes: dict[tuple[str, float], dict[str, int]] = {}
+    for point in measured(points):
+        sizes.setdefault((point["clip"], point["bound"]), {})[point["codec"]] = point["bytes"]
+    return [_simple_row(clip, bound, codecs, ours) for (clip, bound), codecs in sizes.items() if ours in codecs]
+
+
+def _simple_row(clip: str, bound: float, codecs: dict[str, int], ours: str) -> dict[str, Any]:
+    size, plain = codecs[ours], codecs.get(simple.NAME)
+    others = {codec: bytes_ for codec, bytes_ in codecs.items() if codec != ours}
+    best = min(others, key=others.get, default=None)
+    return {
+        "clip": clip,
+        "bound": f"{bound:g}",
+        "ours": size,
+        "simple": plain,
+        "ours/simple": None if plain is None else size / plain,
+        "within": None if plain is None else size <= plain * SIMPLE_SHARE + SIMPLE_BYTES,
+        "best other": None if best is None else others[best],
+        "its name": best,
+    }
+
+
+def beaten(rows: Iterable[dict[str, Any]], plants: Collection[str]) -> list[dict[str, Any]]:
+    """How many rows of against_simple fail in either way, and how many of them show plants."""
+    rows = list(rows)
+    kinds = {
+        "all": rows,
+        "ours larger than simple allows": [row for row in rows if row["within"] is False],
+        "another codec smaller": [
+            row for row in rows if row["best other"] is not None and row["best other"] < row["ours"]
+        ],
+    }
+    return [
+        {"rows": name, "of all": len(some), "of plants": sum(row["clip"] in plants for row in some)}
+        for name, some in kinds.items()
+    ]

@@ -127,7 +127,12 @@ RECIPES: dict[str, Recipe] = {
     "leaves_67k_200f": Dressed("mj_4k_200f", 200, 10000, seed=10),
 }
 
-SUITES = {"quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"), "full": (SAMPLE, *RECIPES), "odd": tuple(odd.CLIPS)}
+SUITES = {
+    "quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"),
+    "full": (SAMPLE, *RECIPES),
+    "odd": tuple(odd.CLIPS),
+    "odd-quick": odd.FEW,
+}
 RECIPES |= odd.CLIPS
 
 

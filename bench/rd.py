@@ -22,20 +22,34 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import compare, data, progressive
+from bench import compare, data, odd, progressive
 from bench.clips import REL_ERROR
 from bench.codec_registry import OURS, all_codecs, chosen, fingerprint, fingerprint_of_athcodec, is_lossless
-from bench.codecs import Codec
+from bench.codecs import Codec, simple
 from bench.curves import Curve
 from bench.store import Store
 from bench.suite import SUITES, Case, cases, digest
 from bench.tables import cpu_model, environment, table
 
 ROOT = Path(__file__).resolve().parent.parent
-BOUNDS = {"quick": (1e-3, 1e-4, 1e-5), "full": (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)}
+BOUNDS = {
+    "quick": (1e-3, 1e-4, 1e-5),
+    "full": (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6),
+    "odd": (1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
+    "odd-quick": (1e-3, 1e-5),
+}
+ODD_CODECS = (
+    "athcodec",
+    simple.NAME,
+    "SZ3",
+    "global PCA, range coder",
+    "clustered PCA (Sattler), range coder",
+    "moving frames + PCA (Lengyel), range coder",
+)
+CODECS = {"odd": ODD_CODECS, "odd-quick": ODD_CODECS[:2]}  # of other suites all
 LOOSER = {"quick": (0.3, 0.03, 3e-3), "full": (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)}
 COST_BOUNDS = {"quick": (1e-4,), "full": (1e-3, 1e-4, 1e-5)}
-TIMEOUT = 3600
+TIMEOUTS = {"quick": 3600, "full": 3600, "odd": 300, "odd-quick": 300}
 KEYS = {
     "clips": ("clip",),
     "points": ("clip", "codec", "bound"),
@@ -67,6 +81,12 @@ Karni-Gotsman error, that is at equal RMS: sizes interpolated (log-log) between 
 codecs tuned for the bound. PCA: every codec that stores a basis learned from the clip.
 """
 
+ODD_NOTE = f"""
+Bytes within the bound, over the diagonal of the bounding box. Within: ours takes at most
+{compare.SIMPLE_SHARE:g} times the bytes of the simple codec and {compare.SIMPLE_BYTES} more. Best other: of all
+codecs but ours.
+"""
+
 OVER_CLIPS_NOTE = "Ratios as above, over the clips that have them."
 
 
@@ -92,7 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="NAME",
         default=[],
-        help="codecs to measure (default: all), or MODULE:NAME for one of your own",
+        help="codecs to measure (default: all, of odd clips some), or MODULE:NAME for one of your own",
     )
     parser.add_argument(
         "--lossless", action="store_true", help="measure lossless modes of the programs too, once per clip"
@@ -100,9 +120,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timeout",
         type=float,
-        default=TIMEOUT,
         metavar="SECONDS",
-        help="for one encoding or decoding (default %(default)s)",
+        help="for one encoding or decoding (default: an hour, of odd clips five minutes)",
     )
     parser.add_argument("--again", action="store_true", help="repeat what failed or was too slow")
     parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
@@ -114,6 +133,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         return _listing(args)
     store = Store(file, environment(args.argv), KEYS)
     codecs, bounds = _codecs(args), tuple(args.bounds or BOUNDS[args.suite])
+    timeout = args.timeout or TIMEOUTS[args.suite]
     clips = cases(args.clips, args.suite)
     for case in clips:
         about = _about(store, case)
@@ -121,14 +141,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             continue
         for name, codec in codecs.items():
             for bound in (0.0,) if is_lossless(codec) else bounds:
-                _point(_Job(case, name, codec, bound, about["digest"], args.timeout), store, args.again)
-        if any(codec.kind == OURS for codec in codecs.values()):
+                _point(_Job(case, name, codec, bound, about["digest"], timeout), store, args.again)
+        if args.suite in LOOSER and any(codec.kind == OURS for codec in codecs.values()):
             _levels(case, about["digest"], bounds, args.suite, store)
-    return summary(store.contents(), [case.name for case in clips], bounds)
+    return summary(store.contents(), [case.name for case in clips], bounds, args.suite not in LOOSER)
 
 
 def _codecs(args: argparse.Namespace) -> dict[str, Codec]:
-    codecs = chosen(args.codecs)
+    codecs = chosen(args.codecs or CODECS.get(args.suite, ()))
     return codecs | ({codec.name: codec for codec in all_codecs() if is_lossless(codec)} if args.lossless else {})
 
 
@@ -262,15 +282,19 @@ def _levels(case: Case, clip_digest: str, bounds: tuple[float, ...], suite: str,
 
 
 def summary(
-    contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None
+    contents: dict[str, list[dict[str, Any]]], clips: list[str], bounds: tuple[float, ...] | None, as_odd: bool = False
 ) -> dict[str, Any]:
-    """Tables of the results of these clips and bounds (None: all bounds)."""
+    """Tables of the results of these clips and bounds (None: all bounds); `as_odd`: one for all, beside the simple
+    codec.
+    """
     tables = [_clips_table([row for row in contents["clips"] if row["clip"] in clips])]
     points = [
         point
         for point in contents["points"]
         if point["clip"] in clips and (bounds is None or point["bound"] in (0, *bounds))
     ]
+    if as_odd:
+        return {"tables": [*tables, *_odd_tables(points)], "broken": list(_broken(points, []))}
     all_ratios: list[dict[str, Any]] = []
     for clip in clips:
         own = [point for point in points if point["clip"] == clip]
@@ -286,6 +310,18 @@ def summary(
     if len(clips) > 1:
         tables.append(table("Ratios over all clips", compare.over_clips(all_ratios), OVER_CLIPS_NOTE))
     return {"tables": tables, "broken": list(_broken(points, contents["curves"]))}
+
+
+def _odd_tables(points: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    plants = {name for name, recipe in odd.CLIPS.items() if recipe.plant}
+    for ours in compare.our_names(points):
+        rows = compare.against_simple(points, ours)
+        yield table(f"Odd clips: {ours}", rows, ODD_NOTE, *_absent(points))
+        yield table(f"Odd clips, in short: {ours}", compare.beaten(rows, plants))
+    without = [point for point in points if point["status"] not in (OK, MISSING)]
+    if without:
+        columns = ("clip", "codec", "bound", "status", "why")
+        yield table("Without a file", [{name: point[name] for name in columns} for point in without])
 
 
 def title(clip: str) -> str:

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from bench import charts, plots, rd, store
+from bench import charts, odd, plots, rd, store
 from bench.tables import as_text, table
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -87,9 +87,15 @@ def _pictures(name: str, result: dict[str, Any], folder: Path) -> tuple[dict[str
     try:
         if verb != "rd":
             return {"": charts.draw(verb, name, result, folder)}, ""
-        return {row["clip"]: plots.draw(result, row["clip"], folder, prefix) for row in result["clips"]}, ""
+        clips = [] if _is_odd(result) else [row["clip"] for row in result["clips"]]
+        return {clip: plots.draw(result, clip, folder, prefix) for clip in clips}, ""
     except plots.NoPlots as error:
         return {}, str(error)
+
+
+def _is_odd(result: dict[str, Any]) -> bool:
+    """Whether all clips are odd ones, of which there is one table."""
+    return all(row["clip"] in odd.CLIPS for row in result["clips"])
 
 
 def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: str) -> str:
@@ -100,7 +106,7 @@ def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: s
         return "\n".join([head, *above, as_text(result), ""])
     contents, clips = {key: result[key] for key in rd.KEYS}, [row["clip"] for row in result["clips"]]
     commands = dict.fromkeys(row["command"] for rows in contents.values() for row in rows)
-    content = result | rd.summary(contents, clips, None) | {"command": "`, `".join(commands)}
+    content = result | rd.summary(contents, clips, None, _is_odd(result)) | {"command": "`, `".join(commands)}
     above = {rd.title(clip): "\n".join([*_image_links(files), ""]) for clip, files in pictures.items()}
     return f"{head}\n{missing or PICTURES}\n\n{as_text(content, above)}\n"
 

@@ -88,3 +88,6 @@ CLIPS: dict[str, Odd] = {
     "vertex": _odd("one_vertex", "one vertex", plant=False, frames=100),
     "cube": _odd("tumbling_cube", "thrown cube, rigid", plant=False, frames=127),
 }
+
+SLOW = (*("growth_eased", "grass_unnamed", "grass_interleaved", "grass_shuffled"), *("capture_long", "few_7", "still"))
+FEW = tuple(name for name in CLIPS if name not in SLOW)  # which are measured in a few minutes
