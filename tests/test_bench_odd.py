@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,12 +14,16 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
+import athcodec  # noqa: E402
 from athcodec.hierarchy import hierarchy_of  # noqa: E402
-from bench import data, odd  # noqa: E402
+from bench import compare, data, odd, rd  # noqa: E402
+from bench.codecs import Source, check, simple  # noqa: E402
+from bench.codecs.program import CannotKeep  # noqa: E402
 from bench.odd import growing  # noqa: E402
 from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree  # noqa: E402
 from bench.odd.grass import grass  # noqa: E402
 from bench.odd.others import captured_stem, still_mesh, tumbling_cube  # noqa: E402
+from bench.store import read  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 
 SHAPES = {
@@ -78,6 +83,14 @@ def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
 
 
 # ---- growth ----
+
+
+def test_the_growth_that_ships_with_athcodec_is_that_of_the_benchmark(clips):
+    with athcodec.read_hdf5(athcodec.sample_path("growth")) as shipped:
+        made = clips["growth"]
+        assert np.allclose(shipped.block(0, 120), made.positions, atol=1e-5)  # processors round differently
+        assert np.array_equal(shipped.vertex_branch, made.vertex_branch)
+        assert np.array_equal(shipped.branch_parent, made.branch_parent)
 
 
 @pytest.mark.parametrize("eased", (False, True))
@@ -226,3 +239,87 @@ def test_the_cube_stays_a_cube():
     middle = corners.mean(axis=1, keepdims=True)
     assert np.allclose(np.linalg.norm(corners - middle, axis=-1), np.sqrt(0.75), atol=1e-5)
     assert np.abs(middle[25] - middle[0]).max() > 0.5
+
+
+# ---- the simple codec ----
+
+
+@pytest.mark.parametrize("name", ("vertex", "cube", "noise", "held", "one_frame", "far"))
+@pytest.mark.parametrize("bound", (1e-2, 1e-5))
+def test_the_simple_codec_keeps_its_bound_and_another_decodes_its_bytes(clips, name, bound):
+    source = Source(clips[name])
+    data, decoded = check(simple.Simple(), source, bound * source.diagonal)
+    assert np.array_equal(simple.Simple().decode(data), decoded)
+    assert len(data) < source.positions.nbytes
+
+
+def test_the_simple_codec_takes_the_best_differences_for_straight_and_for_constant_motion():
+    rng = np.random.default_rng(4)
+    start, speed = rng.normal(size=(2, 1, 200, 3))
+    straight = athcodec.MotionClip((start + np.arange(100)[:, None, None] * speed).astype(np.float32), np.arange(100))
+    codec, source = simple.Simple(), Source(straight)
+    size = len(codec.encode(source, 1e-3 * source.diagonal))
+    assert codec.settings["in_time"] in (1, 2) and size < 0.1 * source.positions.nbytes
+    still = Source(straight.replace(positions=np.repeat(straight.positions[:1], 100, axis=0)))
+    alone = Source(straight.replace(positions=straight.positions[:1], time=[0.0]))
+    sizes = [len(codec.encode(one, 1e-3 * source.diagonal)) for one in (still, alone)]
+    assert sizes[0] < sizes[1] + 40
+
+
+def test_the_simple_codec_says_where_integers_are_too_small_for_the_bound(clips):
+    with pytest.raises(CannotKeep, match="31 bits"):
+        simple.Simple().encode(Source(clips["cube"]), 1e-12)
+
+
+# ---- the table ----
+
+
+def point(codec, kind, size, clip="growth", bound=1e-3, status="ok"):
+    return {"clip": clip, "codec": codec, "kind": kind, "bound": bound, "status": status, "bytes": size}
+
+
+def test_ours_may_take_two_per_cent_and_160_bytes_more_than_the_simple_codec():
+    sizes = {1e-2: (1180, True), 1e-3: (1181, False), 1e-4: (900, True)}
+    points = [point("athcodec", "athcodec", size, bound=bound) for bound, (size, _) in sizes.items()]
+    points += [point(simple.NAME, "baseline", 1000, bound=bound) for bound in sizes]
+    rows = compare.against_simple(points, "athcodec")
+    assert [row["within"] for row in rows] == [within for _, within in sizes.values()]
+    assert [row["ours/simple"] for row in rows] == [1.18, 1.181, 0.9]
+
+
+def test_the_best_of_all_others_is_named_and_files_that_broke_their_bound_do_not_count():
+    points = [
+        point("athcodec", "athcodec", 500),
+        point(simple.NAME, "baseline", 600),
+        point("global PCA", "baseline", 400),
+        point("SZ3", "program", 100, status="bound broken"),
+        point("athcodec", "athcodec", 700, clip="cube"),
+        point("SZ3", "program", 690, clip="cube"),
+        point(simple.NAME, "baseline", 10, clip="far"),
+    ]
+    plant, cube = compare.against_simple(points, "athcodec")
+    assert (plant["simple"], plant["best other"], plant["its name"]) == (600, 400, "global PCA")
+    assert (cube["simple"], cube["ours/simple"], cube["within"], cube["best other"]) == (None, None, None, 690)
+    assert compare.beaten([plant, cube], {"growth", "far"}) == [
+        {"rows": "all", "of all": 2, "of plants": 1},
+        {"rows": "ours larger than simple allows", "of all": 0, "of plants": 0},
+        {"rows": "another codec smaller", "of all": 2, "of plants": 1},
+    ]
+
+
+def test_the_suite_prints_one_table_of_its_clips_with_sizes_that_were_checked(tmp_path):
+    file = tmp_path / "result.json"
+    words = ["rd", "vertex", "--suite", "odd-quick", "--bounds", "1e-3", "--json", str(file)]
+    done = subprocess.run(
+        [sys.executable, "-m", "bench", *words],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        timeout=300,
+        env=os.environ | {data.FOLDER_VARIABLE: str(tmp_path)},
+    )
+    assert done.returncode == 0, done.stderr
+    sizes = {point["codec"]: point["bytes"] for point in read(file)["points"]}
+    assert set(sizes) == set(rd.CODECS["odd-quick"])
+    assert f"| vertex | 0.001 | {sizes['athcodec']:4,} | {sizes[simple.NAME]:6,} |" in done.stdout
+    assert (tmp_path / "vertex.h5").exists() and "Mean saving" not in done.stdout

@@ -200,6 +200,14 @@ def test_the_demo_shows_every_depth_of_the_sample_and_keeps_files_on_demand(tmp_
     assert names == ["athcodec_demo.html", "tree_1k_120f.ath", *levels]
 
 
+def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsys):
+    assert run("demo", "--sample", "growth", "--keep", tmp_path) == 0
+    assert "Encoded the sample growth_1k_120f within 0.0001 of its diagonal" in capsys.readouterr().out
+    assert run("verify", tmp_path / "growth_1k_120f.ath", "--against", sample_path("growth")) == 0
+    with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth"):
+        sample_path("oak")
+
+
 # ---- damaged files ----
 
 

@@ -14,6 +14,7 @@ from athcodec.cli import verbs
 from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
 from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.sources import SAMPLES
 from athcodec.units import METRES, Length, parse_length, parse_size
 
 TRACEBACK = "show the traceback of an error"
@@ -98,7 +99,7 @@ def make_parser() -> argparse.ArgumentParser:
         verb(
             "demo",
             verbs.demo,
-            "encode the included sample, decode and measure every level",
+            "encode an included sample, decode and measure every level",
             f"Ends with a page that shows it, {verbs.DEMO_PAGE}, in DIR or in the current folder.",
         )
     )
@@ -451,6 +452,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _demo_arguments(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--sample", choices=SAMPLES, default=SAMPLES[0], help="a tree in wind, or one that grows (default: %(default)s)"
+    )
     verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded level there")
 
 

@@ -290,7 +290,7 @@ def _say_where(address: str, no_browser: bool) -> None:
 def demo(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)
-        source = athcodec.sample_path()
+        source = athcodec.sample_path(args.sample)
         encoded = Path(folder, f"{source.stem}.ath")
         with athcodec.read_hdf5(source) as clip:
             with progress() as report:

@@ -26,6 +26,7 @@ from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
+SAMPLES = ("tree", "growth")
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -336,12 +337,24 @@ def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> 
     return read(path, "hdf5", rest=rest, **options)
 
 
-def sample_path() -> Path:
-    """The clip that is installed with athcodec: a small finite-element tree in wind.
+def sample_path(name: str = "tree") -> Path:
+    """A clip that is installed with athcodec.
+
+    Parameters
+    ----------
+    name : {"tree", "growth"}, optional
+        A small finite-element tree in wind, or a tree whose branches grow out of each other.
 
     Returns
     -------
     pathlib.Path
-        An HDF5 file of athcodec's schema, with 120 frames.
+        An HDF5 file of athcodec's schema, with 120 frames of 1,001 vertices.
+
+    Raises
+    ------
+    ValueError
+        For another name.
     """
-    return Path(__file__).resolve().parent.parent / "sample" / "tree_1k_120f.h5"
+    if name not in SAMPLES:
+        raise ValueError(f"sample: got {name!r}, expected one of {', '.join(SAMPLES)}")
+    return Path(__file__).resolve().parent.parent / "sample" / f"{name}_1k_120f.h5"

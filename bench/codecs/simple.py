@@ -1,8 +1,8 @@
-"""What anyone would write in an afternoon: integers on a grid, differences, and zstd at level 19.
+"""The least that a codec of motion has to beat: integers on a grid, differences, and zstd at level 19.
 
 The grid is as fine as the bound needs in its cells' corners; differences are of degree 0 to 2 in time and 0 to 2 from
 vertex to vertex in the source's order, then bytes are shuffled. All are tried, in four orders of the numbers. There is
-no rest pose, no branch and no search for a coarser step: a codec of motion should be no worse on any clip.
+no rest pose, no branch and no search for a coarser step.
 """
 
 from __future__ import annotations
