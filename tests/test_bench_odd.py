@@ -6,6 +6,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +88,7 @@ def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
 
 def test_the_growth_that_ships_with_athcodec_is_that_of_the_benchmark(clips):
     with athcodec.read_hdf5(athcodec.sample_path("growth")) as shipped:
-        made = clips["growth"]
+        made = clips["growth_carried"]
         assert np.allclose(shipped.block(0, 120), made.positions, atol=1e-5)  # processors round differently
         assert np.array_equal(shipped.vertex_branch, made.vertex_branch)
         assert np.array_equal(shipped.branch_parent, made.branch_parent)
@@ -120,14 +121,17 @@ def test_branches_begin_when_their_parent_has_stopped_and_grow_steadily_or_eased
     assert (eased >= 0).all() and eased.max() == pytest.approx(1.5 * whole[0], rel=0.02)
 
 
-def test_in_wind_a_branch_that_waits_is_carried_by_its_parent():
-    clip = growing.growth_in_wind(5, 90, 400)
+@pytest.mark.parametrize("maker", (growing.growth_in_wind, partial(growing.growth, carried=True)))
+def test_a_branch_that_waits_is_carried_by_its_parent(maker):
+    clip = maker(5, 90, 400)
     bones = Bones.of(grow(400, 2, 8.0, 5))
     begin = growing.begin_and_end(bones, 90, np.random.default_rng(5))[:, 0]
     attach = growing.attach_node(bones)[bones.branch]
     waits = np.arange(90)[:, None] <= begin[bones.branch]
     assert np.allclose((clip.positions - clip.positions[:, attach])[waits], 0, atol=1e-6)
-    assert np.ptp(clip.positions[60:, 10], axis=0).max() > 0.01, "what has grown sways"
+    assert np.linalg.norm(clip.positions[0], axis=1).max() == 0, "at first all of it is at the root"
+    what_has_grown_sways = np.ptp(clip.positions[60:, 10], axis=0).max() > 0.01
+    assert what_has_grown_sways == (maker is growing.growth_in_wind)
 
 
 def test_leaves_open_one_after_the_other_and_keep_their_foot():

@@ -64,6 +64,9 @@ def _odd(maker: str, text: str, plant: bool = True, seed: int = 1, **options: An
 CLIPS: dict[str, Odd] = {
     "growth": _odd("growth", "branches grow one after the other", frames=120, vertices=1001),
     "growth_eased": _odd("growth", "as growth, eased", seed=2, frames=120, vertices=1001, eased=True),
+    "growth_carried": _odd(
+        "growth", "as growth, those that wait are carried: the sample", seed=4, frames=120, vertices=1001, carried=True
+    ),
     "growth_in_wind": _odd("growth_in_wind", "grows while it sways", seed=3, frames=120, vertices=1001),
     "unfolding": _odd("unfolding_leaves", "leaves unfold on a twig", frames=120, leaves=60),
     "grass": _odd("grass", "800 blades in one wind"),

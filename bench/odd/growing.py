@@ -12,15 +12,17 @@ from bench.trees.ride import rotations, sideways
 PARTS = 4  # of the clip: trunk, orders 1 and 2 on each other, and rest
 
 
-def growth(seed: int, frames: int, vertices: int, eased: bool = False) -> MotionClip:
-    """A tree whose branches wait where they will be attached, grow out of there when their parent has stopped, and stop
-    too.
+def growth(seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False) -> MotionClip:
+    """A tree whose branches grow out of their parents when these have stopped, and stop too. Until then they wait where
+    they will be attached, or are `carried` there by what grows.
     """
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
-    grown = growing(bones, frames, np.random.default_rng(seed), eased)[:, bones.branch, None]
+    grown = growing(bones, frames, np.random.default_rng(seed), eased)
+    if carried:
+        return clip_of(bones, bones.bent(np.zeros((*grown.shape, 3)), grown))
     rest = bones.rest
     base = rest[attach_node(bones)[bones.branch]]
-    return clip_of(bones, base + grown * (rest - base), rest=rest)
+    return clip_of(bones, base + grown[:, bones.branch, None] * (rest - base))
 
 
 def growth_in_wind(seed: int, frames: int, vertices: int, amount: float = 0.15) -> MotionClip:
