@@ -38,12 +38,8 @@ class Source:
 
     @cached_property
     def hierarchy(self) -> Hierarchy:
-        """Branches and vertices in file order; its vertex_source has their numbers in the source. A single stem in the
-        source's order where the clip names no branches.
-        """
-        if self.clip.has_branches:
-            return hierarchy_of(self.clip)
-        return Hierarchy.from_parts(np.array([-1]), np.array([self.clip.vertex_count]), np.array([-1]))
+        """Branches and vertices in file order; its vertex_source has their numbers in the source."""
+        return hierarchy_of(self.clip)
 
     @cached_property
     def diagonal(self) -> float:

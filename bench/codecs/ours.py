@@ -9,7 +9,9 @@ import numpy as np
 
 import athcodec
 from athcodec.ath import Thresholds
+from athcodec.errors import BoundError
 from bench.codecs import Source
+from bench.codecs.program import CannotKeep
 
 
 class Athcodec:
@@ -36,17 +38,20 @@ class Athcodec:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "clip.ath"
             far = 1e3 * source.diagonal
-            summary = athcodec.encode(
-                source.clip,
-                file,
-                max_error=None if self.lossless else bound,
-                lossless=self.lossless,
-                attributes="none",
-                effort=self.effort,
-                segment_frames=self.segment_frames,
-                ladder="none",
-                tam=Thresholds(far, 0, far, 0) if self.single_depth else None,
-            )
+            try:
+                summary = athcodec.encode(
+                    source.clip,
+                    file,
+                    max_error=None if self.lossless else bound,
+                    lossless=self.lossless,
+                    attributes="none",
+                    effort=self.effort,
+                    segment_frames=self.segment_frames,
+                    ladder="none",
+                    tam=Thresholds(far, 0, far, 0) if self.single_depth else None,
+                )
+            except BoundError as error:
+                raise CannotKeep(str(error)) from error
             self.settings = dict(summary.choices) | {"chunk_bytes": dict(summary.chunk_bytes)}
             return file.read_bytes()
 

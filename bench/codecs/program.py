@@ -113,14 +113,14 @@ def pack_integers(values: np.ndarray) -> bytes:
     coded = []
     for order in range(3):
         coded.append(bytes([order]) + deflate(planes(zigzag(rows))))
-        rows = difference(rows, axis=1)
+        rows = _difference(rows, axis=1)
     return min(coded, key=len)
 
 
 def unpack_integers(data: bytes, count: int) -> np.ndarray:
     rows = from_zigzag(from_planes(inflate(data[1:]), np.uint32)).reshape(-1, count)
     for _ in range(data[0]):
-        rows = running_sum(rows, axis=1)
+        rows = _sum(rows, axis=1)
     return np.ascontiguousarray(rows.T)
 
 
@@ -148,26 +148,26 @@ def from_arrays(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int
     return np.ascontiguousarray(turned.transpose(np.argsort(AXES[layout])))
 
 
-def difference(values: np.ndarray, axis: int) -> np.ndarray:
+def _difference(values: np.ndarray, axis: int) -> np.ndarray:
     """Modulo 2**32, the first ones as they are."""
     first = np.take(values, [0], axis=axis)
     return np.concatenate([first, np.diff(values, axis=axis)], axis=axis)
 
 
-def running_sum(values: np.ndarray, axis: int) -> np.ndarray:
+def _sum(values: np.ndarray, axis: int) -> np.ndarray:
     return np.cumsum(values, axis=axis, dtype=np.int32)
 
 
 def predict(values: np.ndarray, predictor: str) -> np.ndarray:
     """(T, N, 3) int32 residuals; exact, modulo 2**32."""
     for axis in _predictor_axes(predictor):
-        values = difference(values, axis)
+        values = _difference(values, axis)
     return values
 
 
 def unpredict(values: np.ndarray, predictor: str) -> np.ndarray:
     for axis in _predictor_axes(predictor):
-        values = running_sum(values, axis)
+        values = _sum(values, axis)
     return values
 
 

@@ -81,7 +81,7 @@ CLIPS: dict[str, Odd] = {
     "few_9": _odd("swaying_tree", "9 frames of a tree", seed=9, frames=9, vertices=7207, orders=3, fps=4.0),
     "teleport": _odd("moved_tree", "a tree moved every 20 frames", frames=120, vertices=300, every=20),
     "held": _odd("held_tree", "each pose three times", seed=2, frames=120, vertices=300, repeats=3),
-    "far": _odd("far_tree", "1e5 m from the origin", seed=3, frames=60, vertices=300, distance=1e5),
+    "far": _odd("far_tree", "1e5 cm from the origin", seed=3, frames=60, vertices=300, distance=1e5),
     "still": _odd("still_mesh", "60 frames alike of a mesh", frames=60, nodes=1000, leaves=420),
     "one_frame": _odd("still_mesh", "the mesh alone", frames=1, nodes=1000, leaves=420),
     "morph": _odd(

@@ -123,12 +123,11 @@ def held_tree(seed: int, frames: int, vertices: int, repeats: int) -> MotionClip
 
 
 def far_tree(seed: int, frames: int, vertices: int, distance: float) -> MotionClip:
-    """A tree that sways so far from the origin that float32 leaves few bits for its motion."""
+    """A tree in centimetres that sways so far from the origin that float32 leaves few bits for its motion."""
     clip = swaying_tree(seed, frames, vertices)
     place = np.array([1.0, 0.0, 0.0]) * distance
-    return clip.replace(
-        positions=(clip.positions + place).astype(np.float32), rest=(clip.rest + place).astype(np.float32)
-    )
+    positions, rest = ((100.0 * array + place).astype(np.float32) for array in (clip.positions, clip.rest))
+    return clip.replace(positions=positions, rest=rest, metadata=clip.metadata | {"unit": "cm"})
 
 
 def scanned_tree(seed: int, frames: int, stems: int, longest: int, lean: float) -> MotionClip:
