@@ -217,6 +217,10 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
             c_int32,
         ],
     ),
+    "ath_encode_source_rest": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p, c_void_p, c_void_p],
+    ),
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),

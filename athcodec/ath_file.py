@@ -644,13 +644,17 @@ class AthFile:
 
     @property
     def rest(self) -> np.ndarray:
-        """Rest pose as decoded for the deepest complete level, (N, 3), float32 or float64 as the source had it."""
+        """Rest pose of the source as decoded with the deepest complete level, (N, 3), float32 or float64 as the source
+        had it; where the source gave none, the reference pose of that level."""
+        level = max(self._first_lacking - 1, 0)
         with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
             dtype = np.float64 if self.core.info.rest_is_float64 else np.float32
-            return self.level_rest(max(self._first_lacking - 1, 0)).astype(dtype, copy=False)
+            with self._poses_read(level):
+                return self.core.rest(level).astype(dtype, copy=False)
 
     def level_rest(self, level: int, order: int = core_file.SOURCE_ORDER) -> np.ndarray:
-        """The rest pose that a level moves: levels that refine the plant may refine it, too.
+        """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
+        closer to. Levels that refine the plant may refine it, too.
 
         Parameters
         ----------
@@ -671,12 +675,17 @@ class AthFile:
         FormatError
             Where it is damaged.
         """
+        with self._poses_read(level):
+            return self.core.level_rest(level, order)
+
+    @contextmanager
+    def _poses_read(self, level: int) -> Iterator[None]:
+        """The core has, or can read, the reference poses up to a level's for as long as this lasts."""
         with self._lock:
             chunks = [chunk for chunk in self._chunks_of(ct.REFINED_REST) if self._rests_read < chunk.level <= level]
-            with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"rest pose of level {level}"):
-                rest = self.core.level_rest(level, order)
+            with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"reference pose of level {level}"):
+                yield
             self._rests_read = max(self._rests_read, level)
-        return rest
 
     @cached_property
     def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -85,7 +85,7 @@ class MotionClip:
         The branch that each branch grows on, -1 for a root, of which there may be several. Becomes int32.
     rest : (N, 3) array of float32 or float64, optional
         The rest pose. Becomes float64; `rest_dtype` keeps the dtype that was given. None: made of the motion, see
-        rest_pose.
+        rest_pose; files then do without it.
     edges : (E, 2) array of integers, optional
         Pairs of vertices.
     faces : (F, k) array of integers, optional
@@ -119,6 +119,8 @@ class MotionClip:
     ----------
     rest_dtype : numpy.dtype
         float32 or float64: the dtype in which the rest pose was given or made, and in which files store it.
+    rest_given : bool
+        Whether the rest pose was given, so that files keep it, and not made of the motion.
 
     Raises
     ------
@@ -142,6 +144,7 @@ class MotionClip:
     unchanged: Callable[[], bool] | None = None
     skin: Skin | None = None
     rest_dtype: np.dtype = field(init=False)
+    rest_given: bool = field(init=False, default=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
@@ -207,7 +210,10 @@ class MotionClip:
         ClipError
             Where the changed structure is wrong.
         """
-        return replace(self, **{"rest": self.source_rest} | changes)
+        clip = replace(self, **{"rest": self.source_rest} | changes)
+        if "rest" not in changes:
+            clip.rest_given = self.rest_given
+        return clip
 
     @property
     def polygons(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -358,7 +364,7 @@ class MotionClip:
             raise ClipError(f'rest_pose: got {self.rest_pose!r}, expected "first" or "mean"')
         if cast(np.ndarray | None, self.rest) is None:
             pose = self.block(0, 1)[0] if self.rest_pose == "first" else self._mean_pose()
-            self.rest_dtype = pose.dtype
+            self.rest_dtype, self.rest_given = pose.dtype, False
             self.rest = self._checked_rest = pose.astype(np.float64)
             return
         rest = np.asarray(self.rest)
@@ -369,7 +375,7 @@ class MotionClip:
         if bad.size:
             raise ClipError(f"rest: vertex {bad[0]} is {_point(rest[bad[0]])}, expected finite numbers")
         if self.rest is not self._checked_rest:
-            self.rest_dtype = rest.dtype.newbyteorder("=")
+            self.rest_dtype, self.rest_given = rest.dtype.newbyteorder("="), True
         self.rest = self._checked_rest = rest.astype(np.float64)
 
     def _mean_pose(self) -> np.ndarray:

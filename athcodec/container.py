@@ -34,6 +34,7 @@ OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 CLIPS = 7
+SOURCE_REST = 8
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
 ATTRIBUTE = OPTIONAL | 32
 KIND_NAMES = {
@@ -44,6 +45,7 @@ KIND_NAMES = {
     FACES: "FACES",
     EDGES: "EDGES",
     CLIPS: "CLIPS",
+    SOURCE_REST: "SOURCE_REST",
     STEMS: "STEMS",
     AFFINES: "AFFINES",
     CORRECTIONS: "CORRECTIONS",
@@ -232,6 +234,7 @@ class ChunkStore:
 
 _HIERARCHY = struct.Struct("<HHHH")
 _REST = struct.Struct("<B3ff")
+_SOURCE_REST = struct.Struct("<Bf")
 _TIME = struct.Struct("<B")
 _STEADY = struct.Struct("<dd")
 _RATE = struct.Struct("<H")
@@ -279,6 +282,14 @@ def pack_rest(rest: Rest) -> bytes:
         _REST.pack(int(rest.exact) | int(is_float64) << 1 | int(rest.adaptive) << 3, *rest.origin, rest.step)
         + rest.stream
     )
+
+
+def pack_source_rest(step: float, stream: bytes) -> bytes:
+    return _SOURCE_REST.pack(0, step) + stream
+
+
+def pack_exact_source_rest(stream: bytes) -> bytes:
+    return b"\1" + stream
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:

@@ -259,11 +259,19 @@ class File:
         return lib.ath_seam_error(self._file, clip, level)
 
     def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
-        """(N, 3) float64: the rest pose that the level moves, read unless that is done."""
+        """(N, 3) float64: the reference pose of the level, read unless that is done."""
         with self._building:
             self._refine_size(level)
         out = np.empty((self.info.vertex_count, 3))
         self._check(lib.ath_level_rest(self._file, level, order, out.ctypes.data, out.strides[0]))
+        return out
+
+    def rest(self, level: int, order: int = SOURCE_ORDER) -> np.ndarray:
+        """(N, 3) float64: the rest pose of the source, as close as the reference poses up to a level bring it."""
+        with self._building:
+            self._refine_size(level)
+        out = np.empty((self.info.vertex_count, 3))
+        lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0])
         return out
 
     def chunks(self) -> np.ndarray:
@@ -278,6 +286,8 @@ class File:
             self._check(lib.ath_check_chunk(self._file, index, byref(fault)), fault)
         finally:
             self.drop(offset, len(there))
+            if offset < len(self._prelude):  # which stays
+                self.feed(self._prelude, 0)
 
     def errors(self) -> np.ndarray:
         """(levels, segments, 3) float64: the error of each level in each segment by each of MEASURES, scene units."""

@@ -43,7 +43,7 @@ class Affines:
     is_stem : (K,) bool
         Whether it is an exact stem, whose matrix is a least-squares fit, or a node of the ATH, which moves as one.
     matrices : (K, 3, 4) float64
-        From the rest pose of the level (`Decoder.level_rest`) to positions, both absolute, in scene units:
+        From the reference pose of the level (`Decoder.level_rest`) to positions, both absolute, in scene units:
         x' = matrix[:, :3] @ x + matrix[:, 3].
     """
 
@@ -353,9 +353,10 @@ class Decoder:
             yield low, self.positions(slice(low, high), level, dtype)
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
-        """The rest pose that a level moves: levels that refine the plant may refine it, too.
+        """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
+        closer to. Levels that refine the plant may refine it, too.
 
-        `rest` is that of the deepest complete level, rounded to the source's type.
+        `rest` is the rest pose of the source, rounded to its type.
 
         Parameters
         ----------
@@ -387,7 +388,7 @@ class Decoder:
         Returns
         -------
         Affines
-            Maps from the rest pose of the level, `level_rest`, to the frame.
+            Maps from the reference pose of the level, `level_rest`, to the frame.
 
         Raises
         ------

@@ -6,6 +6,7 @@ from athcodec._native import PIECE_VERTICES, SEGMENT_FRAMES
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 128 << 20
+SMALL_BYTES = 32 << 20  # of the float32 positions of a clip that may be one segment of MAX_SEGMENT frames
 
 
 def decoding_bytes(vertex_count: int, frames: int) -> int:
@@ -14,10 +15,13 @@ def decoding_bytes(vertex_count: int, frames: int) -> int:
 
 
 def split_segments(
-    frame_count: int, vertex_count: int, limit: int = DEFAULT_SEGMENT, memory: int = 2 << 30
+    frame_count: int, vertex_count: int, limit: int | None = None, memory: int = 2 << 30
 ) -> list[tuple[int, int]]:
     """Balanced runs of at most `limit` frames, fewer where a run's float32 positions would exceed 128 MiB, or where a
-    decoder would need more than `memory` bytes."""
+    decoder would need more than `memory` bytes. None: DEFAULT_SEGMENT, or all of a short and small clip."""
+    if limit is None:
+        short = frame_count <= MAX_SEGMENT and 12 * vertex_count * frame_count <= SMALL_BYTES
+        limit = MAX_SEGMENT if short else DEFAULT_SEGMENT
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
     while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
         limit -= 1

@@ -11,7 +11,8 @@ answer, raw, to its standard output and exit with 0; or, where the file is to be
     open        opens for streaming, as all that follow; no answer
     0, 1, ...   positions of that level: frames of all clips x vertices x 3 numbers, little-endian, in source
                 order, binary64 where Is_Float64 is set, else binary32
-    rest        the rest pose of layer 0: vertices x 3 numbers of Rest_Type, little-endian, in source order
+    rest        the rest pose, as the reference pose of level 0 gives it: vertices x 3 numbers of Rest_Type,
+                little-endian, in source order
     time        the time of every frame, clip by clip, binary64, little-endian
     clips       the entries of CLIPS, written from the decoder's values for every clip: frames, segments, flags,
                 name, seams; for a file without CLIPS, the entry that it would have
@@ -240,7 +241,9 @@ def ask_package(decoder, item: str) -> bytes:
         return b""
     if item == "rest":
         with np.errstate(over="ignore"):  # a pose beyond binary32 is infinite
-            return decoder.level_rest(0).astype("<f8" if decoder.file.core.info.rest_is_float64 else "<f4").tobytes()
+            return (
+                decoder.file.core.rest(0).astype("<f8" if decoder.file.core.info.rest_is_float64 else "<f4").tobytes()
+            )
     if item == "clips":
         return b"".join(clip_entry(clip) for clip in decoder.clips)
     if item != "static":

@@ -44,6 +44,7 @@ from spec.scripted import (
     refined_row,
     rest_chunk,
     row,
+    source_rest_chunk,
     steady_time,
     steady_times,
     stems_head,
@@ -757,6 +758,75 @@ valid(
     lambda: still(FORK, rest=exact_rest(FORK, [1e39, -1e39, 0.0] * 5, True, origin=(FLOAT_MAX, -FLOAT_MAX, 0.0))),
 )
 
+# ---- valid: rest poses of the source -----------------------------------------------------------------------
+
+BUSH = [
+    Stem(-1, 70, lag=0),
+    Stem(0, 5, 3, SHEET, lag=1),
+    Stem(1, 4, 4, lag=0),
+    Stem(0, 33, 69, LOOSE, lag=0),
+    Stem(3, 1, 32, lag=0),
+    Stem(-1, 6, lag=2),
+    Stem(5, 3, 0, lag=0),
+]
+
+
+def bent(stems: list[Stem], script: list | Chance, rest: bytes | None = None) -> bytes:
+    """SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
+    branches, reference = branches_of(stems), 0.25 * np.array(grown(stems), float)
+    if rest is not None:
+        reference = np.array(rd.decode_rest(rest[17:], branches, 0.25).rest)
+    return source_rest_chunk(write(rd.BentPose, script, branches, 0.25, reference))
+
+
+def bent_bush(script: list | Chance, rest: list | Chance, **fields) -> Plant:
+    reference = coded_rest(BUSH, rest, **{"rest_type": 1, "origin": fields.pop("origin")} if fields else {})
+    return still(BUSH, rest=reference, source_rest=bent(BUSH, script, reference), **fields)
+
+
+valid(
+    "source-rest",
+    "a rest pose about the reference pose: beams of several runs, stems that are none, roots",
+    lambda: bent_bush(Chance(201, large=6), Chance(211, large=9)),
+)
+valid("source-rest-same", "the same pose once more: a stream of no bytes", lambda: bent_bush([], Chance(212, large=9)))
+valid(
+    "source-rest-far",
+    "steps as large as the plant: tangents are opposed and vanish",
+    lambda: bent_bush(Chance(202, large=12), Chance(213, large=9)),
+)
+valid(
+    "source-rest-point",
+    "a reference pose that is one point: no tangents, no turns",
+    lambda: bent_bush(Chance(203, large=4), []),
+)
+valid(
+    "source-rest-wide",
+    "with a pose of binary64",
+    lambda: bent_bush(Chance(204, large=9), Chance(214, large=9), is_float64=True, origin=(FLOAT_MAX, 0.0, -FLOAT_MAX)),
+)
+valid(
+    "source-rest-largest-step",
+    "Rest_Step is the largest number: positions beyond binary32",
+    lambda: still(FORK, source_rest=source_rest_chunk(bent(FORK, Chance(205))[5:], FLOAT_MAX)),
+)
+valid(
+    "source-rest-exact",
+    "the very numbers of the source, the reference pose at a step",
+    lambda: still(
+        FORK, source_rest=source_rest_chunk(exact_rest(FORK, [*AWKWARD_FLOATS, *[1.5] * 6], False)[17:], method=1)
+    ),
+)
+valid(
+    "source-rest-exact-wide",
+    "the same in binary64",
+    lambda: still(
+        FORK,
+        is_float64=True,
+        source_rest=source_rest_chunk(exact_rest(FORK, [*AWKWARD_DOUBLES, *[1.5] * 6], True)[17:], method=1),
+    ),
+)
+
 # ---- valid: motion -----------------------------------------------------------------------------------------
 
 valid(
@@ -923,7 +993,7 @@ valid(
     "optional kinds that are not known, in every place where they may stand, some twice",
     lambda: fork().add(
         Entry(0x8000, FUTURE),
-        Entry(0x8008, FUTURE),
+        Entry(0x8009, FUTURE),
         Entry(0x800F, b""),
         Entry(0x8016, FUTURE, 0, 1),
         Entry(0x8016, FUTURE, 1, 1),
@@ -1415,6 +1485,12 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
     return forked(**{"layers": layers, "heads": LAYER_HEADS} | more | {"scripts": scripts | more["scripts"]})
 
 
+valid(
+    "source-rest-layers",
+    "a rest pose about the reference poses of all layers",
+    lambda: layered(source_rest=bent(FORK, Chance(207, large=9))),
+)
+
 SHARED_BASES = {
     1: stems_head(0.5, 1, 8, 1, basis_stream([[77, -90]], 8)),
     2: stems_head(0.5, 2, 9, 1, base=1),
@@ -1834,7 +1910,7 @@ def inserted(at: int, *entries: Entry) -> Draft:
 
 for kind, level, why in (
     (0x0000, 255, "kind 0"),
-    (0x0008, 255, "in the prelude"),
+    (0x0009, 255, "in the prelude"),
     (0x0016, 0, "of motion"),
     (0x0021, 255, "behind the motion"),
     (0x7FFF, 255, "the last one"),
@@ -1852,6 +1928,7 @@ for kind, level, name in (
     (0x8013, 1, "SHAPES"),
     (0x8015, 1, "REFINED_REST"),
     (0x8007, 255, "CLIPS"),
+    (0x8008, 255, "SOURCE_REST"),
     (0x0020, 255, "ATTRIBUTE"),
 ):
     table(
@@ -1935,7 +2012,7 @@ table(
     "length-limit-of-unknown",
     "UNKNOWN_CHUNK",
     "the Kind is checked before the Length",
-    lambda: fork().add(Entry(8, b"", length=2**30 - 1)),
+    lambda: fork().add(Entry(9, b"", length=2**30 - 1)),
 )
 table(
     "length-limit-before-place",
@@ -2253,6 +2330,49 @@ invalid(
         .draft()
         .change(rd.REST, content=coded_rest([Stem(-1, 3, lag=0)], [0, 0, 0, 3]))
     ),
+)
+
+
+def source_rest(
+    name: str, reason: str, content: bytes | Callable[[], bytes], plant: Callable[..., Plant] = forked
+) -> None:
+    def make() -> Plant:
+        return plant(source_rest=content() if callable(content) else content)
+
+    invalid(f"source-rest-{name}", "BAD_CHUNK", "open", reason, make)
+
+
+source_rest("empty", "no bytes", b"")
+source_rest("method", "Method 2", b"\2" + bytes(8))
+source_rest("short", "3 bytes of Rest_Step", bytes(4))
+for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    source_rest(f"step-{what}", f"Rest_Step is {value}", lambda value=value: source_rest_chunk(b"", value))
+source_rest("zero-behind", "a zero byte behind the stream", lambda: bent(FORK, Chance(206)) + b"\0")
+source_rest("bytes-behind", "bytes behind the stream", lambda: bent(FORK, Chance(206)) + b"\1" * 12)
+TWO = [Stem(-1, 2, lag=0)]
+source_rest(
+    "frequencies",
+    "a run of one vertex codes two modes",
+    lambda: bent(TWO, [0, 0, 0, 2], coded_rest(TWO, [])),
+    lambda **fields: still(TWO, rest=coded_rest(TWO, []), **fields),
+)
+source_rest(
+    "exact-infinite",
+    "an infinite number",
+    lambda: source_rest_chunk(exact_of_fork([0.0, INFINITE_BITS[False]], False)[17:], method=1),
+)
+source_rest(
+    "of-exact",
+    "REST is exact",
+    lambda: bent(FORK, []),
+    lambda **fields: forked(rest=exact_of_fork([0.0] * 15, False), **fields),
+)
+invalid(
+    "source-rest-damaged",
+    "BAD_CHECKSUM",
+    "open",
+    "a bit of SOURCE_REST is flipped",
+    lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(rd.SOURCE_REST, checksum=0),
 )
 
 

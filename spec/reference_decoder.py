@@ -98,7 +98,7 @@ SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255
 
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
-METADATA, FACES, EDGES, CLIPS = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7
+METADATA, FACES, EDGES, CLIPS, SOURCE_REST = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7, 8
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
 ATTRIBUTE = OPTIONAL | 32
 KINDS = {
@@ -109,6 +109,7 @@ KINDS = {
     FACES: "FACES",
     EDGES: "EDGES",
     CLIPS: "CLIPS",
+    SOURCE_REST: "SOURCE_REST",
     STEMS: "STEMS",
     AFFINES: "AFFINES",
     CORRECTIONS: "CORRECTIONS",
@@ -397,6 +398,7 @@ def divide_to_zero(a: int, b: int) -> int:
 # ---- front stream ------------------------------------------------------------------------------------------
 
 OTHER = len(KINDS)  # any kind but those
+KIND_BITS = 5
 SHORT_FLOATS, MEASURES = 8160, 3
 KIND_LIST = list(KINDS)
 
@@ -512,7 +514,7 @@ class ChunkModel:
     """Contexts of the chunk table, and what is remembered of the chunk before."""
 
     def __init__(self):
-        self.kinds = [[Context(32768) for _ in range(16)] for _ in range(OTHER + 1)]
+        self.kinds = [[Context(32768 if i > 1 else 2000) for i in range(1 << KIND_BITS)] for _ in range(OTHER + 1)]
         self.usual = [Context(60000) for _ in range(OTHER + 1)]
         self.places, self.sizes = NumberModel(), NumberModel()
         self.bits = [8] * (OTHER + 1)
@@ -521,9 +523,9 @@ class ChunkModel:
     def code_kind(self, coder: RangeDecoder) -> tuple[int, int]:
         """Its number in the list, and the Kind."""
         node = 1
-        while node < 16:
+        while node < 1 << KIND_BITS:
             node = node << 1 | coder.bit(self.kinds[self.before][node])
-        index = min(node - 16, OTHER)
+        index = min(node - (1 << KIND_BITS), OTHER)
         return index, KIND_LIST[index] if index < OTHER else raw_bits(coder, 16)
 
     def code_place(self, coder: RangeDecoder, index: int, segment_count: int) -> None:
@@ -843,7 +845,13 @@ class AdaptiveRest:
 
 
 def decode_adaptive_vertex(
-    coder: RangeDecoder, model: AdaptiveRest, branch: Branch, i: int, unit: float, rest: Points, before: RestLayer | None
+    coder: RangeDecoder,
+    model: AdaptiveRest,
+    branch: Branch,
+    i: int,
+    unit: float,
+    rest: Points,
+    before: RestLayer | None,
 ) -> tuple[list[float], list[int]]:
     """Position and integers of vertex i of a stem."""
     lag, per_unit = max(branch.lag, 1), 1.0 / unit
@@ -971,6 +979,87 @@ def learn_weights(weights: RestFilter, terms: Points, guess: list[float], offset
                 weights.spread[m][j] = weights.spread[j][m]
     most = 8.0 * weights.noise + 4.0
     weights.noise = weights.noise + ((squares if squares < most else most) - weights.noise) * 0.1
+
+
+# ---- rest pose of the source -------------------------------------------------------------------------------
+
+
+class BentPose:
+    """The rest pose about the reference pose, both (vertices, 3, 1) less Origin: vertices of `rest` become known stem
+    by stem."""
+
+    def __init__(self, stream: bytes, branches: list[Branch], step: float, reference: np.ndarray):
+        self.coder, self.rows, self.numbers = RangeDecoder(stream), CoefficientModel(), NumberModel()
+        self.mean, self.step = [64, 64, 64], step
+        self.reference, self.rest = reference[:, :, None], np.zeros((*reference.shape, 1))
+        turns: list[np.ndarray] = []  # of the branches
+        for branch in branches:
+            turn = np.eye(3)[:, :, None]
+            if branch.parent >= 0:
+                parent = branches[branch.parent]
+                last = parent.first + parent.count - 1
+                turn = self._turn_at(parent, branch.attach, last, turns[branch.parent])
+            turns.append(self._beam(branch, turn) if branch.lag == 0 else self._sheet(branch, turn))
+        self.coder.finish()
+
+    def _turn_at(self, stem: Branch, v: int, last: int, turn: np.ndarray) -> np.ndarray:
+        """Of what hangs on vertex v of a stem whose vertices up to `last` are known."""
+        before = v - 1 if v > stem.first else stem.attach if stem.attach >= 0 else v
+        after = min(v + 1, last)
+        tangent = self.reference[after] - self.reference[before]
+        length2 = 0.0 + tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]
+        if stem.lag > 0 or not length2[0] > 1e-200:
+            return turn
+        return follow_tangent(turn, tangent * (1.0 / np.sqrt(length2)), self.rest[after] - self.rest[before])
+
+    def _vertex(self, v: int, before: int, turn: np.ndarray) -> None:
+        """before: the vertex before it, -1 for the first one of a root."""
+        predicted, m = self.reference[v], self.mean
+        if before >= 0:
+            predicted = self.rest[before] + mat_vec(turn, self.reference[v] - self.reference[before])
+        for k in range(3):
+            steps = code_signed(self.coder, self.numbers, (m[k] + (m[0] + m[1] + m[2])) // 4)
+            self.rest[v, k] = predicted[k] + float(steps) * self.step
+            m[k] = m[k] - (m[k] + 7) // 8 + clipped(steps) * 2
+
+    def _sheet(self, stem: Branch, turn: np.ndarray) -> np.ndarray:
+        """A stem that is no beam turns as its vertices so far did."""
+        H, size2 = np.zeros((3, 3, 1)), 0.0
+        for v in range(stem.first, stem.first + stem.count):
+            before = v - 1 if v > stem.first else stem.attach
+            self._vertex(v, before, turn)
+            if before < 0:
+                continue
+            d, moved = self.reference[v] - self.reference[before], self.rest[v] - self.rest[before]
+            size2 = 0.75 * size2
+            for k in range(3):
+                size2 = size2 + float(d[k, 0]) * float(d[k, 0])
+            H = 0.75 * H + moved[:, None] * d[None, :]
+            if size2 > 1e-200:
+                weight = 0.01 * size2 + 3.0 * (self.step * self.step)
+                turn = turn_towards(H + weight * turn, 1e-9 * size2, turn)
+        return turn
+
+    def _beam(self, stem: Branch, turn: np.ndarray) -> np.ndarray:
+        first = stem.first
+        if stem.attach < 0:
+            self._vertex(first, -1, turn)
+            first += 1
+        left = stem.first + stem.count - first
+        runs = (left + RUN_VERTICES - 1) // RUN_VERTICES
+        for r in range(runs):
+            n = left * (r + 1) // runs - left * r // runs
+            before = first - 1 if first > stem.first else stem.attach
+            self._run(first, n, before, turn if r == 0 else self._turn_at(stem, before, before, turn))
+            first += n
+        return turn
+
+    def _run(self, first: int, n: int, before: int, turn: np.ndarray) -> None:
+        row, _ = decode_row(self.coder, self.rows, RUN_VERTICES, n, 0)
+        modes = cantilever((1,) * n, 100.0, 0.0)
+        bent = np.array([in_order(modes * np.array(row[k][:n], float)[:, None]) * self.step for k in range(3)])
+        local = self.reference[first : first + n, :, 0] - self.reference[before, :, 0] + bent.T
+        self.rest[first : first + n] = self.rest[before] + mat_vec(turn, local.T).T[:, :, None]
 
 
 # ---- exact numbers: rest poses and times bit for bit -------------------------------------------------------
@@ -2468,6 +2557,7 @@ class AthFile:
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
             self._read_rest(self.content(REST))
+            self.rest()
             self.times = frame_times(self.content(TIME), self.clips)
 
     def _check_length(self, strict: bool) -> None:
@@ -2603,7 +2693,24 @@ class AthFile:
         return rest
 
     def rest(self, level: int = 0) -> np.ndarray:
-        """(vertices, 3) of Rest_Type, source order: that which the level moves."""
+        """(vertices, 3) of Rest_Type, source order: the rest pose, as a level's reference pose gives it."""
+        if not self.find(SOURCE_REST):
+            return self.level_rest(level)
+        chunk = self.content(SOURCE_REST)
+        require(self._rests != [], "there is a second rest pose, though the first is exact")
+        require(len(chunk) >= 1 and chunk[0] <= 1, "Method has reserved bits")
+        if chunk[0] == 1:
+            with np.errstate(over="ignore"):
+                exact = decode_exact_rest(chunk[1:], self.branches, self.rest_type == np.dtype("<f8"))
+            return self._in_source_order(np.array(exact).astype(self.rest_type))
+        require(len(chunk) >= 5 and finite(f32(chunk, 1)) and f32(chunk, 1) > 0.0, "Rest_Step is out of range")
+        with np.errstate(all="ignore"):
+            reference = self._plan_of(level, self._layer_of(level)).rest
+            bent = BentPose(chunk[5:], self.branches, f32(chunk, 1), reference).rest[:, :, 0]
+            return self._in_source_order((bent + self.origin).astype(self.rest_type))
+
+    def level_rest(self, level: int = 0) -> np.ndarray:
+        """(vertices, 3) of Rest_Type, source order: the reference pose, which the level moves."""
         plan = self._plan_of(level, self._layer_of(level))
         if plan.rest is self.plan.rest:
             return self._in_source_order(self._shown_rest)

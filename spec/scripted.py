@@ -225,7 +225,7 @@ class FrontScript:
     def add_chunk(self, entry: Entry) -> None:
         known = entry.kind in rd.KINDS and not entry.spelt
         index = rd.KIND_LIST.index(entry.kind) if known else rd.OTHER
-        self.values += _bits(index, 4) + ([] if known else _bits(entry.kind, 16))
+        self.values += _bits(index, rd.KIND_BITS) + ([] if known else _bits(entry.kind, 16))
         if entry.chunk.is_motion:
             self._add_place(index, (entry.level, entry.segment))
         length = entry.chunk.length
@@ -426,6 +426,10 @@ def refined_rest_chunk(stream: bytes, step: float = 0.0625) -> bytes:
     return struct.pack("<f", step) + stream
 
 
+def source_rest_chunk(stream: bytes, step: float = 0.25, method: int = 0) -> bytes:
+    return bytes([method]) + (struct.pack("<f", step) if method == 0 else b"") + stream
+
+
 def clip_entry(
     frames: int,
     segments: int = 1,
@@ -489,6 +493,7 @@ class Plant:
     clips: tuple[rd.Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
     points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
+    source_rest: bytes | None = None  # SOURCE_REST
     time: bytes | None = None  # TIME
     branch_source: list | None = None
     vertex_source: list | None = None
@@ -526,6 +531,8 @@ class Plant:
                     rd.CLIPS, b"".join(clip_entry(clip.frames, clip.segments, clip.name, clip.seams) for clip in clips)
                 )
             )
+        if self.source_rest is not None:
+            entries.append(Entry(rd.SOURCE_REST, self.source_rest))
         if (rd.REFINED_REST, 1, 0) in self.scripts:
             entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
             self.plan = rd.Plan(branches)

@@ -119,8 +119,9 @@ def test_every_prefix_plays_its_complete_levels(layered_ath):
         ends = [chunk.offset + chunk.length // 2 for chunk in whole.file.chunks if chunk.is_motion]
         ends += [chunk.offset + chunk.length for chunk in whole.file.chunks if chunk.is_motion]
         frames = [start for start, _ in whole.segments]
+        levels = whole.level_count
         shown = [[whole.positions(frame, level.level) for frame in frames] for level in whole.levels]
-        rests = [whole.level_rest(level.level) for level in whole.levels]
+    rests = [cut_rest(layered_ath, level) for level in range(levels)]
     for end in ends:
         with athcodec.open(BytesIO(data[:end])) as part:
             there = [level.level for level in part.levels if level.available]
@@ -137,18 +138,29 @@ def test_every_prefix_plays_its_complete_levels(layered_ath):
 # ---- rest poses ----
 
 
-def test_the_rest_pose_is_as_precise_as_the_deepest_level_that_is_there(layered_ath, bushy_clip, tmp_path):
+def cut_rest(path, level):
+    """The rest pose of the file cut off behind a level."""
+    with athcodec.open(path) as whole:
+        end = whole.levels[level].bytes
+    with athcodec.open(BytesIO(path.read_bytes()[:end])) as part:
+        assert part.deepest >= level
+        return part.rest
+
+
+def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bushy_clip, tmp_path):
     with athcodec.open(layered_ath) as whole:
-        rests = [whole.level_rest(level.level) for level in whole.levels]
-        assert np.array_equal(whole.rest, whole.level_rest())
+        poses = [whole.level_rest(level.level) for level in whole.levels]
         refined = [chunk.level for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST]
-    errors = [np.abs(rest - bushy_clip.rest).max() for rest in rests]
-    assert refined == [len(rests) - 2, len(rests) - 1]
-    assert errors[0] == errors[refined[0] - 1] > 3 * errors[refined[0]] > 9 * errors[refined[1]]
-    for level, rest in enumerate(rests):
+        deepest, diagonal = whole.rest, np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
+        assert np.linalg.norm(deepest - bushy_clip.rest, axis=1).max() <= 2e-3 * diagonal
+    errors = [np.abs(pose - poses[-1]).max() for pose in poses]
+    assert refined == [len(poses) - 2, len(poses) - 1]
+    assert errors[0] == errors[refined[0] - 1] > 3 * errors[refined[0]] > errors[refined[1]] == 0
+    for level, pose in enumerate(poses):
         athcodec.truncate(layered_ath, tmp_path / "cut.ath", level)
         with athcodec.open(tmp_path / "cut.ath", strict=True) as cut:
-            assert np.array_equal(cut.rest, rest)
+            assert np.array_equal(cut.level_rest(), pose) and np.array_equal(cut.rest, cut_rest(layered_ath, level))
+    assert np.array_equal(cut.rest, deepest)
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +176,7 @@ def test_level_0_has_a_rest_pose_of_its_own_where_that_costs_little(in_steps):
     path, clip = in_steps
     check_levels(clip, path)
     with athcodec.open(path) as decoder:
-        least, of_layer = (np.abs(decoder.level_rest(level) - clip.rest).max() for level in (0, 1))
+        least, of_layer = (np.abs(decoder.level_rest(level) - decoder.level_rest()).max() for level in (0, 1))
         rests = [decoder.level_rest(level) for level in range(1, decoder.file.core.info.depth_levels)]
         lengths = [chunk.length for chunk in decoder.file.chunks if chunk.kind in (ct.REST, ct.REFINED_REST)]
     assert decoder.levels[0].bytes < 700 and 2 * lengths[0] < 1.4 * sum(lengths[:2])
@@ -226,7 +238,7 @@ def test_a_damaged_rest_pose_hides_the_levels_of_its_layer(layered_ath):
     data = bytearray(layered_ath.read_bytes())
     with athcodec.open(layered_ath) as whole:
         chunk = next(chunk for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST)
-        coarse, rest = whole.positions(20, chunk.level - 1), whole.level_rest(chunk.level - 1)
+        coarse, rest = whole.positions(20, chunk.level - 1), cut_rest(layered_ath, chunk.level - 1)
     data[chunk.offset] ^= 1
     with athcodec.open(BytesIO(data), allow_partial=True) as part:
         assert part.deepest == chunk.level - 1

@@ -25,7 +25,7 @@ from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.clip import MotionClip
 from athcodec.encoding import CodedSegment, Draft
 from athcodec.errors import AthError, ClipError
-from athcodec.segmentation import DEFAULT_SEGMENT, split_segments
+from athcodec.segmentation import split_segments
 
 BETWEEN_REPORTS = 0.3  # seconds
 
@@ -172,7 +172,7 @@ def _target(item: Item, folder: str) -> str:
 
 
 def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:
-    longest = options.get("segment_frames") or DEFAULT_SEGMENT
+    longest = options.get("segment_frames")
     return len(split_segments(clip.frame_count, clip.vertex_count, longest, ct.Limits.memory_bytes))
 
 

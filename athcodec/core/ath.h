@@ -94,6 +94,7 @@ enum {
     ATH_FACES = ATH_OPTIONAL | 5,
     ATH_EDGES = ATH_OPTIONAL | 6,
     ATH_CLIPS = 7,
+    ATH_SOURCE_REST = 8,
     ATH_STEMS = 16,
     ATH_AFFINES = 17,
     ATH_CORRECTIONS = 18,
@@ -276,12 +277,15 @@ ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
-/* The rest pose of level 0: vertex_count positions, `stride` bytes apart. Where info.rest_is_float64 is 0 the source's
- * numbers were floats: what the file's arithmetic has as doubles is rounded to them. */
+/* The rest pose of the source, for binding, normals and the like: vertex_count positions, `stride` bytes apart. Where
+ * the source gave none it is the finest reference pose, see below, that ath_refine_size has read;
+ * with each of these a rest pose that is coded about it comes out closer to the source's. Where info.rest_is_float64 is
+ * 0 the source's numbers were floats: what the file's arithmetic has as doubles is rounded to them. */
 ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
-/* The rest pose that a level moves, and that its matrices apply to: the one above for level 0; the same for all levels
- * with nodes above it. ATH_BAD_ARGUMENT for no level of the file, and where ath_refine_size has not read it. */
+/* The reference pose of a level, which it moves and which its matrices apply to: the rest pose of the source, or another
+ * that the motion is closer to, such as its mean. The same for all levels with nodes above level 0. ATH_BAD_ARGUMENT for
+ * no level of the file, and where ath_refine_size has not read it. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* How errors of all vertices in all frames are made one number: the largest; what at most a hundredth of them exceeds,

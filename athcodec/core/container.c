@@ -332,6 +332,15 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     return valid ? ATH_OK : ATH_BAD_CHUNK;
 }
 
+int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body)
+{
+    if (chunk.size < 1 || chunk.bytes[0] > 1) return ATH_BAD_CHUNK;
+    head->exact = chunk.bytes[0];
+    head->step = 1.0;
+    *body = rest_of(chunk, 1);
+    return head->exact ? ATH_OK : ath_parse_refined_rest(*body, &head->step, body);
+}
+
 /* Bytes of the character at the front; 0 where it is not UTF-8 (RFC 3629), or a control character. */
 static size_t character_size(ath_bytes text)
 {

@@ -53,6 +53,11 @@ typedef struct {
 } ath_rest_head;
 
 typedef struct {
+    double step;
+    int32_t exact;
+} ath_source_rest_head;
+
+typedef struct {
     uint32_t frames, segments;
     int32_t loop;
     ath_bytes name;       /* UTF-8 */
@@ -73,6 +78,7 @@ typedef struct {
 
 int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
+int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
 /* Parses the entry at the front of `chunk`, and moves `chunk` past it. */
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);
 float ath_seam(const ath_clip_entry *entry, int32_t level);

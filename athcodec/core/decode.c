@@ -59,6 +59,15 @@ int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_br
     return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
 }
 
+int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                           int32_t branch_count, double step, const double *reference, double *turns, double *rest)
+{
+    ath_coder coder;
+    bent_pose pose = {reference, 0, rest, turns, step};
+    coder_start(&coder, bytes, size);
+    return finished(&coder, code_source_rest(&coder, (rest_model *)model, &pose, branches, branch_count));
+}
+
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, int is_float64, double *rest)
 {

@@ -14,6 +14,9 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
                     double step, int adaptive, const int32_t *coarse, const double *before, int32_t *steps,
                     double *rest);
+/* The rest pose of the source about the reference pose, both less the origin; turns: scratch, branch_count x 9. */
+int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
+                           int32_t branch_count, double step, const double *reference, double *turns, double *rest);
 /* Positions as stored, floats or (is_float64) doubles, the origin not taken off. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, int is_float64, double *rest);

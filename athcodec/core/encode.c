@@ -64,6 +64,16 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }
 
+int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                               int32_t branch_count, double step, const double *reference, const double *source,
+                               double *turns, double *rest)
+{
+    ath_coder coder;
+    bent_pose pose = {reference, source, rest, turns, step};
+    coder_start(&coder, bytes, capacity);
+    return written(&coder, code_source_rest(&coder, (rest_model *)model, &pose, branches, branch_count));
+}
+
 int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                               int32_t branch_count, int is_float64, const double *rest)
 {

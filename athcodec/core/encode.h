@@ -125,6 +125,10 @@ ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capa
                                         int32_t branch_count, double step, int adaptive, double slack,
                                         const int32_t *coarse, const double *before, int32_t *steps,
                                         const double *source, double *rest);
+/* turns: scratch, branch_count x 9. */
+ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
+                                               int32_t branch_count, double step, const double *reference,
+                                               const double *source, double *turns, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                               int32_t branch_count, int is_float64, const double *rest);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,

@@ -45,6 +45,7 @@ const char *ath_kind_name(int kind)
     case ATH_FACES: return "FACES";
     case ATH_EDGES: return "EDGES";
     case ATH_CLIPS: return "CLIPS";
+    case ATH_SOURCE_REST: return "SOURCE_REST";
     case ATH_STEMS: return "STEMS";
     case ATH_AFFINES: return "AFFINES";
     case ATH_CORRECTIONS: return "CORRECTIONS";

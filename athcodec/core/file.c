@@ -13,10 +13,14 @@ static int32_t most_pieces(const ath_header *header)
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
+/* Where in the scratch memory, behind the models, the rotations of branches stand. */
+static size_t turns_place(void) { return (ath_prelude_model_size() + 15) & ~(size_t)15; }
+
 static uint64_t scratch_size(const ath_header *header)
 {
     uint64_t size = larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
-    return larger(larger(size, ath_prelude_model_size()), ATH_BASIS_WORK * sizeof(double));
+    size = larger(size, turns_place() + (uint64_t)header->branch_count * 9 * sizeof(double));
+    return larger(size, ATH_BASIS_WORK * sizeof(double));
 }
 
 /* The rest poses of layers are there where the file has any, whether all of them are stored or not. */
@@ -50,7 +54,7 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     file->vertex_source = (int32_t *)ath_take(&arena, vertices * sizeof(int32_t));
     file->times = (double *)ath_take(&arena, (uint64_t)header->frame_count * sizeof(double));
     file->rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
-    file->stored_rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
+    file->source_rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
     file->pieces = (ath_piece *)ath_take(&arena, (uint64_t)most_pieces(header) * sizeof(ath_piece));
     file->nodes = (ath_node *)ath_take(&arena, branches * sizeof(ath_node));
     file->gaps = (uint8_t *)ath_take(&arena, vertices);
@@ -319,6 +323,11 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
+static int has_source_rest(const ath_file *file)
+{
+    return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0) != 0;
+}
+
 static int read_rest(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
@@ -333,14 +342,35 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     file->adaptive_rest = head.adaptive;
     if (head.exact) {
         result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
-                                       (int32_t)header->branch_count, head.is_float64, file->stored_rest);
-        for (size_t i = 0; i < numbers; i++) file->rest[i] = file->stored_rest[i] - head.origin[i % 3];
+                                       (int32_t)header->branch_count, head.is_float64, file->source_rest);
+        for (size_t i = 0; i < numbers; i++) file->rest[i] = file->source_rest[i] - head.origin[i % 3];
         if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
                                  head.step, head.adaptive, 0, 0, file->rest_steps, file->rest);
-        file->stored_rest = 0;
+        if (!has_source_rest(file)) file->source_rest = 0;
     }
+    file->rest_is_exact = head.exact;
+    return result;
+}
+
+/* The rest pose of the source about a reference pose, where the file has one that is another. */
+static int read_source_rest(ath_file *file, const double *reference, ath_fault_info *fault)
+{
+    ath_bytes chunk, body;
+    ath_source_rest_head head;
+    double *turns = (double *)(void *)((uint8_t *)file->scratch + turns_place());
+    if (!has_source_rest(file)) return ATH_OK;
+    int result = load(file, ATH_SOURCE_REST, &chunk, fault);
+    if (result == ATH_OK) result = file->rest_is_exact ? ATH_BAD_CHUNK : ath_parse_source_rest(chunk, &head, &body);
+    if (result != ATH_OK) return result;
+    if (head.exact)
+        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+                                     file->info.rest_is_float64, file->source_rest);
+    result = ath_decode_source_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+                                    head.step, reference, turns, file->source_rest);
+    for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
+        file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];
     return result;
 }
 
@@ -412,6 +442,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     plan_layers(file);
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
+    if ((result = read_source_rest(file, file->rest, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
     file->plan.rest = file->rest;
     if (file->first_layer > 0)
@@ -544,7 +575,7 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
     int32_t index = (int32_t)(chunk - file->chunks);
     int result = ath_check_chunk(file, index, fault);
     if (result != ATH_OK) return result;
-    if (file->stored_rest || decode_layer_rest(file, q, content) != ATH_OK) {
+    if (file->rest_is_exact || decode_layer_rest(file, q, content) != ATH_OK) {
         ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
         return ath_fault_at(fault, chunk, index);
     }
@@ -552,7 +583,9 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);
     if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes);
-    return ATH_OK;
+    result = read_source_rest(file, layer->rest, fault);
+    fault->code = result;
+    return result;
 }
 
 int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
@@ -608,13 +641,10 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
     int32_t layer = ath_layer_of(file, level);
     const ath_plan *plan = ath_level_plan(file, level);
     if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
-    if (plan->rest == file->rest) {
-        ath_rest_float64(file, order, xyz, stride);
-        return ATH_OK;
-    }
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = plan->rest[3 * v + k] + file->info.origin[k];
+        for (size_t k = 0; k < 3; k++)
+            out[k] = file->rest_is_exact ? file->source_rest[3 * v + k] : plan->rest[3 * v + k] + file->info.origin[k];
     }
     return ATH_OK;
 }
@@ -647,24 +677,35 @@ double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
     return (double)file->seams[clip * file->header.full_level_count + level];
 }
 
-static double rest_number(const ath_file *file, size_t i)
+/* The finest reference pose that has been read. */
+static const double *finest_reference(const ath_file *file)
 {
-    return file->stored_rest ? file->stored_rest[i] : file->rest[i] + file->info.origin[i % 3];
+    const double *reference = file->rest;
+    for (int32_t q = file->first_layer; q < file->header.layer_count && file->layers[q].rest_known; q++)
+        reference = file->layers[q].plan.rest;
+    return reference;
+}
+
+static double rest_number(const ath_file *file, const double *reference, size_t i)
+{
+    return file->source_rest ? file->source_rest[i] : reference[i] + file->info.origin[i % 3];
 }
 
 void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
 {
+    const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         float *out = (float *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = (float)rest_number(file, 3 * v + k);
+        for (size_t k = 0; k < 3; k++) out[k] = (float)rest_number(file, reference, 3 * v + k);
     }
 }
 
 void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
 {
+    const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
-        for (size_t k = 0; k < 3; k++) out[k] = rest_number(file, 3 * v + k);
+        for (size_t k = 0; k < 3; k++) out[k] = rest_number(file, reference, 3 * v + k);
     }
 }
 

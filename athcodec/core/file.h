@@ -29,8 +29,8 @@ struct ath_file {
     ath_branch *branches;
     int32_t *branch_source, *vertex_source;
     double *times;
-    double *rest;        /* relative to the origin */
-    double *stored_rest; /* as stored, where the file holds it exactly, else null */
+    double *rest;        /* the reference pose, relative to the origin */
+    double *source_rest; /* the rest pose, where it is another or exact numbers, else null */
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
@@ -42,6 +42,7 @@ struct ath_file {
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
     int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
+    int32_t rest_is_exact;              /* the reference pose is in the very numbers of source_rest */
     int32_t longest;                    /* frames of the longest segment */
     uint32_t stems_levels;              /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */

@@ -6,14 +6,15 @@
 #include "container.h"
 #include "number_model.h"
 
-enum { KNOWN_KINDS = 14, SIZE_BITS = 30 };
+enum { KNOWN_KINDS = 15, KIND_BITS = 5, SIZE_BITS = 30 };
 
-static const uint16_t known_kinds[KNOWN_KINDS] = {
-    ATH_HIERARCHY, ATH_REST,    ATH_TIME,        ATH_METADATA, ATH_FACES, ATH_EDGES,        ATH_CLIPS,
-    ATH_STEMS,     ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES,   ATH_EXACT, ATH_REFINED_REST, ATH_ATTRIBUTE};
+static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,         ATH_TIME,        ATH_METADATA,
+                                                  ATH_FACES,     ATH_EDGES,        ATH_CLIPS,       ATH_SOURCE_REST,
+                                                  ATH_STEMS,     ATH_AFFINES,      ATH_CORRECTIONS, ATH_SHAPES,
+                                                  ATH_EXACT,     ATH_REFINED_REST, ATH_ATTRIBUTE};
 
 typedef struct {
-    ath_context kind[KNOWN_KINDS + 1][16], usual[KNOWN_KINDS + 1]; /* by the kind before */
+    ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind before */
     number_model place, size;
     int32_t bits[KNOWN_KINDS + 1]; /* of the last length of each kind */
     int32_t before;                /* which of the known kinds; KNOWN_KINDS: none of them */
@@ -77,7 +78,8 @@ static void code_counts(ath_coder *coder, ath_header *header)
 static void chunk_model_init(chunk_model *model)
 {
     for (int32_t i = 0; i <= KNOWN_KINDS; i++) {
-        for (int32_t node = 0; node < 16; node++) context_init(&model->kind[i][node], 32768);
+        for (int32_t node = 0; node < 1 << KIND_BITS; node++)
+            context_init(&model->kind[i][node], node > 1 ? 32768 : 2000);
         context_init(&model->usual[i], 60000);
         model->bits[i] = 8;
     }
@@ -92,9 +94,9 @@ static int32_t code_kind(ath_coder *coder, chunk_model *model, uint16_t *kind)
 {
     int32_t index = 0, node = 1;
     while (ENCODING && index < KNOWN_KINDS && known_kinds[index] != *kind) index++;
-    for (int32_t bit = 3; bit >= 0; bit--)
+    for (int32_t bit = KIND_BITS - 1; bit >= 0; bit--)
         node = node << 1 | coder_bit(coder, &model->kind[model->before][node], index >> bit & 1);
-    index = ath_min(node - 16, KNOWN_KINDS);
+    index = ath_min(node - (1 << KIND_BITS), KNOWN_KINDS);
     *kind = index < KNOWN_KINDS ? known_kinds[index] : (uint16_t)code_raw_bits(coder, 16, *kind);
     return index;
 }

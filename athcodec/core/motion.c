@@ -109,6 +109,12 @@ ATH_HOT static void follow_tangent(int32_t T, const double *tangent, const doubl
     }
 }
 
+void ath_follow_tangent(const double tangent[3], const double from[3], const double to[3], const double R[9],
+                        double turned[9])
+{
+    follow_tangent(1, tangent, from, to, R, turned);
+}
+
 static void copy_rows(double *to, const double *from, size_t count) { memcpy(to, from, count * sizeof(double)); }
 
 static void attach_root(const ath_plan *plan, int32_t T, const ath_piece *piece, ath_frames at)

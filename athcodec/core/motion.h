@@ -131,6 +131,9 @@ void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t coun
 void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
+/* R and the least rotation behind it that takes a tangent, as R turns it, to the way from one point to another. */
+void ath_follow_tangent(const double tangent[3], const double from[3], const double to[3], const double R[9],
+                        double turned[9]);
 void ath_turn_towards(const double H[9], double size2, double R[9]);
 double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);

@@ -46,7 +46,7 @@ from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
-from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
+from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
@@ -57,7 +57,7 @@ STATIC_METADATA = ("unit", "up_axis")
 class EncodingOptions:
     """The options of `encode` that are not the bound, checked. Raises ValueError."""
 
-    segment_frames: int = DEFAULT_SEGMENT
+    segment_frames: int | None = None  # as split_segments has it
     tam: Thresholds | None = None
     exact_rest: bool = False
     lossless: bool = False
@@ -68,14 +68,12 @@ class EncodingOptions:
     ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
 
     @classmethod
-    def of(
-        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = DEFAULT_LADDER, **options
-    ) -> EncodingOptions:
-        """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
-        return cls(DEFAULT_SEGMENT if segment_frames is None else segment_frames, ladder=ladder_of(ladder), **options)
+    def of(cls, *, ladder: str | Sequence[float] = DEFAULT_LADDER, **options) -> EncodingOptions:
+        """ladder: as `ladder_of` takes it."""
+        return cls(ladder=ladder_of(ladder), **options)
 
     def __post_init__(self) -> None:
-        if not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
+        if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
         if self.attributes not in ("all", "none"):
             raise ValueError(f"attributes: got {self.attributes!r}; expected 'all' or 'none'")
@@ -166,10 +164,12 @@ class _Decided:
     choice: Choice
     prelude: CodedPrelude
     layers: Layers
+    source_rest: np.ndarray
 
     @property
     def fingerprint(self) -> str:
-        return hashlib.sha256(self.prelude.hierarchy_stream + self.prelude.rest_chunk.stream).hexdigest()
+        streams_and_pose = (self.prelude.hierarchy_stream, self.prelude.rest_chunk.stream, self.source_rest.tobytes())
+        return hashlib.sha256(b"".join(streams_and_pose)).hexdigest()
 
 
 @dataclass
@@ -220,7 +220,7 @@ class EncodingJob:
             seen.hierarchy,
             seen,
             options.segment_frames,
-            options.exact_rest or options.lossless,
+            options.exact_rest or (options.lossless and clip.rest_given),
             None if factors is None else factors[seen.hierarchy.vertex_source],
             pool,
         )
@@ -268,8 +268,9 @@ class EncodingJob:
         return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
 
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
-        layers = layers_of(self.source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
-        return _Decided(ath, choice, prelude, layers)
+        source = self.source.about(choice.reference)
+        layers = layers_of(source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
+        return _Decided(ath, choice, prelude, layers, source.source_rest)
 
     def draft(self, decided: _Decided) -> Draft:
         return Draft(decided.choice, self.seen, self.segment_count, self.found, self.options, decided.fingerprint)
@@ -278,7 +279,8 @@ class EncodingJob:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         settings = draft.choice.settings
         ath = self.seen.ath(self.thresholds(settings.bound))
-        decided = self._layered(ath, draft.choice, CodedPrelude(self.source, ath, settings))
+        source = self.source.about(draft.choice.reference)
+        decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(
                 "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
@@ -387,6 +389,8 @@ class EncodingJob:
             ct.pack_hierarchy((limits.epsilon, limits.eta, limits.xi, limits.lam), decided.prelude.hierarchy_stream),
         )
         store.add(ct.REST, ct.pack_rest(decided.layers.rest))
+        if decided.layers.source_rest:
+            store.add(ct.SOURCE_REST, decided.layers.source_rest)
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
         metadata = (
             self.clip.metadata

@@ -26,6 +26,7 @@ from athcodec.encoding.segment import (
     Source,
     StreamBasis,
     analyse,
+    code_source_rest,
     correct,
     correction_chunk,
     learned_bases,
@@ -74,9 +75,11 @@ class Layer:
 
 @dataclass
 class Layers:
-    """The layers of a file, the content of REST, and the plan on it, which level 0 is shown with."""
+    """The layers of a file, the contents of REST and SOURCE_REST (empty: none), and the plan on the pose of REST, which
+    level 0 is shown with."""
 
     rest: ct.Rest
+    source_rest: bytes
     level_0: Plan
     each: list[Layer]
 
@@ -136,7 +139,8 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
             limit=settings.limit * ratio,
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
-    return Layers(rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
+    source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
+    return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
 
 
 def _plan_on(pose: np.ndarray, prelude: CodedPrelude, refined: bool = False) -> Plan:

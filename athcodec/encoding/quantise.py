@@ -24,6 +24,8 @@ LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still e
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
 LATTICE_REST_CAP = 3.2 / 5**0.5  # and for that to the lattice of adaptive rest poses
+SOURCE_REST_TOLERANCE = 2e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
+SOURCE_REST_STEP = 2.0  # over that, at first
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 

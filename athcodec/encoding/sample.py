@@ -52,11 +52,13 @@ class PlantSample:
             rest=clip.source_rest[chosen],
             clip_ranges=clip.clip_ranges,
         )
+        some.rest_given = clip.rest_given
         sample = replace(
             source,
             clip=some,
             hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
             weights=None if source.weights is None else source.weights[self.vertices],
+            reference=None if source.reference is None else source.reference[self.vertices],
         )
         sample.segments = source.segments
         return sample

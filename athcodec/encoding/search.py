@@ -10,7 +10,8 @@ import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import TRIALS, Progress, trials
+from athcodec.encoding.reference import mean_pose
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -85,27 +87,30 @@ def _moved(source: Source, segment: int) -> float:
 class Choice:
     """Settings of a file: those of its only layer of precision, or of the refinements and of the first layer.
 
-    learned_modes: of the last layer.
+    learned_modes: of the last layer. reference: the pose that motion is coded about, (N, 3) float64 less the origin,
+    file order; None: the rest pose.
     """
 
     settings: Settings
     first_layer: Settings
     learned_modes: LearnedModes | None
+    reference: np.ndarray | None
 
 
 def decide(
     source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
 ) -> tuple[list[Choice], CodedPrelude]:
-    """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the
-    last one's, 1 if that is the same layer."""
+    """Settings to choose from, and hierarchy and poses as coded with them; ratio: of the first layer's step to the last
+    one's, 1 if that is the same layer."""
     if source.still:
         settings = still_settings(source, ath, bound)
-        return [Choice(settings, _coarser(settings, ratio), None)], CodedPrelude(source, ath, settings)
-    search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1)
+        return [Choice(settings, _coarser(settings, ratio), None, None)], CodedPrelude(source, ath, settings)
+    search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1).about_best_reference()
     first_layer, candidates = search.found(ratio)
     prelude = search.prelude(candidates[0])
     return [
-        Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)) for settings in candidates
+        Choice(settings, first_layer, search.learned_modes(prelude.plan, settings), search.source.reference)
+        for settings in candidates
     ], prelude
 
 
@@ -191,6 +196,7 @@ class Search:
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
+        self._layered = layered
         self._extra_trials, self._trials = 0, trials(effort, layered)
 
     @classmethod
@@ -234,9 +240,8 @@ class Search:
     def found(self, ratio: int = 1) -> tuple[Settings, list[Settings]]:
         """Settings of a first layer, and those to choose from for refinements; for a large plant those of a sample of
         it. Where the ratio is 1, the best of the only layer."""
-        sample = sample_plant(self.source, self.ath, self.effort)
-        if sample:
-            first, candidates = self.best_of_sample(sample, ratio)
+        if self.of_sample:
+            first, candidates = self.best_of_sample(ratio)
         else:
             best = self.best()
             candidates = list(self.refinements(best, ratio))  # first: components are of the step that asks first
@@ -288,8 +293,29 @@ class Search:
         self._extra_trials += worth
         self.report("search", min((len(self._known) + self._extra_trials) / self._trials, 0.99))
 
-    def best_of_sample(self, sample: PlantSample, ratio: int) -> tuple[Settings, list[Settings]]:
-        """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
+    def about_best_reference(self) -> Search:
+        """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file as far as the
+        first trials tell."""
+        if self.effort == "fast":
+            return self
+        source = self.source.about(mean_pose(self.source, self.ath, self.start))
+        ath = replace(self.ath, rest=source.rest + source.origin)
+        start = first_settings(source, ath, self.start.bound, self.samples[-1])
+        other = Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, layered=self._layered)
+        return min(self, other, key=Search._first_cost)
+
+    def _first_cost(self) -> float:
+        """Bytes of the file before anything is searched: without rotations or with some."""
+        search = self.of_sample or self
+        rotating = replace(search.start, rotation_step_factors=(2,) * self.levels)
+        return min(cost for cost, _ in search._costs([search.start, rotating]))
+
+    @cached_property
+    def of_sample(self) -> Search | None:
+        """The search on a sample of a large plant."""
+        sample = sample_plant(self.source, self.ath, self.effort)
+        if sample is None:
+            return None
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
         some = replace(
@@ -300,10 +326,13 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in self.samples]
-        layered = ratio > 1
-        search = Search(
-            sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, layered
+        return Search(
+            sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, self._layered
         )
+
+    def best_of_sample(self, ratio: int) -> tuple[Settings, list[Settings]]:
+        """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
+        search, start = cast(Search, self.of_sample), self.start
         found = search.best()
         candidates = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
         if ratio == 1:
@@ -505,7 +534,7 @@ class Search:
         """Walks step and rest step in turn to the cheapest on geometric grids."""
         for _ in range(WALKS):
             before, settings = settings, self._walk(settings, "step", factor, math.inf)
-            if self.source.exact_rest:
+            if self.source.reference_is_exact:
                 break
             settings = self._walk(settings, "rest_step", rest_factor, self.extrapolation.rest_cap * settings.bound)
             if (settings.step, settings.rest_step) == (before.step, before.rest_step):

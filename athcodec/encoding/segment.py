@@ -40,16 +40,22 @@ def thread_count(jobs: int | None, source: Source) -> int:
 
 @dataclass
 class Source:
-    """A clip in file order, relative to an origin, cut into segments."""
+    """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion.
+
+    exact_rest: the numbers of its rest pose are to come back. reference: (N, 3) float64 less the origin, file order;
+    None: the rest pose.
+    """
 
     clip: MotionClip
     hierarchy: Hierarchy
     seen: Survey
-    segment_frames: int
+    segment_frames: int | None
     exact_rest: bool
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     pool: ThreadPool = SERIAL
-    rest: np.ndarray = field(init=False)  # (N, 3) float64
+    reference: np.ndarray | None = None
+    source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
+    rest: np.ndarray = field(init=False)  # likewise: the reference pose
     origin: np.ndarray = field(init=False)  # (3,) float64
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
@@ -57,7 +63,8 @@ class Source:
 
     def __post_init__(self) -> None:
         self.origin = qz.nearest_singles((self.seen.low + self.seen.high) / 2)
-        self.rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
+        self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
+        self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
         self.clip_range_segments = [
             [
@@ -69,6 +76,24 @@ class Source:
             for start, stop in self.clip.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
+
+    def about(self, reference: np.ndarray | None) -> Source:
+        """The same about another reference pose."""
+        if reference is None and self.reference is None:
+            return self
+        source = replace(self, reference=reference)
+        source.clip_range_segments, source.segments = self.clip_range_segments, self.segments
+        return source
+
+    @property
+    def reference_is_exact(self) -> bool:
+        """Whether the reference pose is the rest pose in its very numbers."""
+        return self.exact_rest and self.reference is None
+
+    @property
+    def has_source_rest(self) -> bool:
+        """Whether the rest pose is to come back, and is another than the reference pose."""
+        return self.reference is not None and (self.clip.rest_given or self.exact_rest)
 
     @property
     def clip_range_starts(self) -> list[int]:
@@ -88,8 +113,8 @@ class Source:
     @property
     def extent(self) -> float:
         """Diagonal of the box around all frames and the rest pose: the longest way a vertex can be from its place."""
-        low = np.minimum(self.seen.low, self.rest.min(axis=0) + self.origin)
-        high = np.maximum(self.seen.high, self.rest.max(axis=0) + self.origin)
+        low = np.minimum(self.seen.low, self.source_rest.min(axis=0) + self.origin)
+        high = np.maximum(self.seen.high, self.source_rest.max(axis=0) + self.origin)
         return float(np.linalg.norm(high - low))
 
     def limit(self, bound: float) -> float | np.ndarray:
@@ -182,13 +207,14 @@ class CodedPrelude:
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-        self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
+        self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
+        self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
 
 
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
     """REST, and the rest pose as decoded; the branches get the lags that make it smallest."""
     head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
-    if source.exact_rest:
+    if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
         head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
         return head, pose.astype(np.float64) - source.origin
@@ -223,6 +249,22 @@ def _rest_variants(branches: np.ndarray, source: Source) -> Iterator[tuple[np.nd
         changed = branches.copy()
         changed["lag"] = own
         yield changed, True
+
+
+def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
+    """SOURCE_REST about the reference pose as decoded, (N, 3) float64 less the origin; empty where none is needed."""
+    if not source.has_source_rest:
+        return b""
+    if source.exact_rest:
+        pose = source.clip.source_rest[source.hierarchy.vertex_source]
+        return ct.pack_exact_source_rest(streams.encode_exact_rest(branches, pose))
+    tolerance = max(bound, qz.SOURCE_REST_TOLERANCE * source.seen.diagonal)
+    step = qz.single(qz.SOURCE_REST_STEP * tolerance)
+    coded = streams.encode_source_rest(branches, step, reference, source.source_rest)
+    while np.linalg.norm(coded.decoded - source.source_rest, axis=1).max() > tolerance:
+        step = qz.single(0.8 * step)
+        coded = streams.encode_source_rest(branches, step, reference, source.source_rest)
+    return ct.pack_source_rest(coded.step, coded.stream)
 
 
 def lags(source: Source, step: float) -> np.ndarray:
@@ -274,15 +316,15 @@ class StreamBasis:
     base: int = ct.NO_LEVEL
 
 
-def _level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
-    level_streams = []
+def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
+    found = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
         stream = LevelStream(settings.step_of(level), factor, only_tips=settings.only_tips)
         if level in bases:
             stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
-        level_streams.append(stream)
-    return level_streams
+        found.append(stream)
+    return found
 
 
 def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]:
@@ -310,7 +352,7 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
     """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
-    segment = SegmentMotion(plan, positions.shape[2], _level_streams(fine, plan.level_count, {}))
+    segment = SegmentMotion(plan, positions.shape[2], level_streams(fine, plan.level_count, {}))
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 
@@ -369,8 +411,8 @@ def analyse(
 ) -> SegmentMotion:
     """The integers of the stems; bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has
     them."""
-    level_streams = _level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], level_streams, learned_modes, before, ratio, layered)
+    own = level_streams(settings, plan.level_count, bases)
+    segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered)
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 

@@ -31,12 +31,13 @@ def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_sou
 
 @dataclass
 class CodedRest:
-    """A rest pose at one precision: the stream, what it decodes to, (N, 3) float64, and its integers, (N, 3) int32."""
+    """A rest pose at one precision: the stream, what it decodes to, (N, 3) float64, and its integers, (N, 3) int32,
+    where another is coded about it."""
 
     step: float
     stream: bytes
     decoded: np.ndarray
-    steps: np.ndarray
+    steps: np.ndarray | None = None
     adaptive: bool = False
 
 
@@ -68,6 +69,23 @@ def encode_rest(
         address(decoded, np.float64, rest.size),
     )
     return CodedRest(step, data, decoded, steps, adaptive)
+
+
+def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
+    """The source's rest pose about the reference pose as decoded, both (N, 3) float64 less the origin."""
+    decoded, turns = np.zeros_like(rest), np.empty((len(branches), 9))
+    data = encode_stream(
+        "ath_encode_source_rest",
+        1024 + 8 * rest.size,
+        address(branches, BRANCH, 1),
+        len(branches),
+        step,
+        address(reference, np.float64, rest.size),
+        address(rest, np.float64, rest.size),
+        address(turns, np.float64, turns.size),
+        address(decoded, np.float64, rest.size),
+    )
+    return CodedRest(step, data, decoded)
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:

@@ -219,10 +219,14 @@ export class AthFile {
   branchSource(): Int32Array;
   /** Seconds, one per frame, increasing within a clip. */
   times(): Float64Array;
-  /** The rest pose that a level (0 by default) moves, 3 numbers per vertex; order "source" by default. It is the same for
-   * all levels with nodes above 0. Throws MISSING where bytes of it are still to come. */
-  rest(order?: Order, options?: { level?: number }): Float32Array;
-  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T; level?: number }): T;
+  /** The rest pose of the source, 3 numbers per vertex; order "source" by default. Where the source gave none it is the
+   * finest reference pose that has been read; after levelRest() of a deeper level it is closer to the source's. */
+  rest(order?: Order): Float32Array;
+  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
+  /** The reference pose of a level, which it moves and which its matrices apply to. It is the same for all levels with
+   * nodes above 0. Throws MISSING where bytes of it are still to come. */
+  levelRest(level: number, order?: Order): Float32Array;
+  levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T }): T;
   /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): Errors;
   /** What a level is, for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
@@ -284,7 +288,7 @@ export class AthFile {
   positions(segments: Segments, frame: number, options?: { order?: Order }): Float32Array | null;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
                                                    options: { out: T; order?: Order }): T | null;
-  /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from the level's rest("file") to
+  /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
    * positions.
    * Vertices of exact runs have none, exact() has them. */
   matrices(segments: Segments, frame: number): Float32Array | null;

@@ -440,12 +440,22 @@ export class AthFile {
     return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
   }
 
-  rest(order = "source", { out, level = 0 } = {}) {
+  rest(order = "source", { out } = {}) {
+    return this.#pose(out, order, (which, at) => {
+      this.#c.ath_rest_float64(this.#at, which, at, 24);
+      return OK;
+    });
+  }
+
+  levelRest(level, order = "source", { out } = {}) {
+    this.#refineSize(this.#level(level));
+    return this.#pose(out, order, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
+  }
+
+  #pose(out, order, fill) {
     const length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
     const result = asOut(out, length, [Float32Array, Float64Array]);
-    this.#refineSize(this.#level(level));
-    result.set(this.#fill(new Float64Array(length), length,
-      (at) => this.#c.ath_level_rest(this.#at, level, which, at, 24)));
+    result.set(this.#fill(new Float64Array(length), length, (at) => fill(which, at)));
     return result;
   }
 

@@ -101,7 +101,7 @@ export class Session {
     this.#order = file.vertexSource();
     this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
     if (file.readyLevel(0) > 0) this.#readFinerRest();
-    this.#rest ??= file.rest();
+    this.#rest ??= file.levelRest(0);
     this.post({
       type: "opened", info: { ...info, levelNames }, statics, rest: this.#rest, times: file.times(), branches: file.branches(),
       vertexSource: this.#order, branchSource: file.branchSource(), clips, first: this.#first,
@@ -121,11 +121,11 @@ export class Session {
     }));
   }
 
-  // The rest pose of the levels above 0: matrices of level 0 are at home on it, too.
+  // The reference pose of the levels above 0: matrices of level 0 are at home on it, too.
   #readFinerRest() {
     if (!this.#finerRest) return;
     try {
-      this.#rest = this.#file.rest("source", { level: 1 });
+      this.#rest = this.#file.levelRest(1);
       this.#finerRest = false;
       this.#restNormals = null;
       if (this.#opened) this.post({ type: "rest", rest: this.#rest });

@@ -1,0 +1,37 @@
+"""Reference poses: what motion may be coded about in place of the source's rest pose.
+
+The mean pose has the mean tracks of the motion, each seen from where its piece is attached: stems keep their lengths,
+as they would not in the mean of positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.ath import Ath
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.segment import FINER, Settings, Source, analyse_finely, branch_records, level_streams
+
+SEGMENTS = 4  # that the mean is taken of
+
+
+def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
+    """(N, 3) float64 less the origin, file order; settings: the start of a search."""
+    settings = replace(settings, sheet=source.sheet_like)
+    plan = Plan(branch_records(source.hierarchy, ath, settings), source.clip.vertex_count, source.pool)
+    plan.set_rest(source.rest)
+    some = np.unique(np.linspace(0, len(source.segments) - 1, SEGMENTS).astype(int))
+    coefficients, tracks, frames = 0.0, 0.0, 0
+    for segment in some:
+        motion = analyse_finely(plan, settings, source.positions(segment))
+        of_sum = np.sqrt(motion.frames)  # what the mean wave's coefficient has to be multiplied by
+        coefficients = coefficients + of_sum * motion.coefficients[:, :, 0]
+        tracks = tracks + of_sum * motion.tracks[:, :, :, 0]
+        frames += motion.frames
+    fine = replace(settings, step=qz.single(settings.step / FINER))
+    mean = SegmentMotion(plan, 1, level_streams(fine, plan.level_count, {}))
+    mean.coefficients[:, :, 0], mean.tracks[:, :, :, 0] = np.rint(coefficients / frames), np.rint(tracks / frames)
+    return mean.pose(plan.level_count - 1, np.zeros(3), np.float64)[:, :, 0]
