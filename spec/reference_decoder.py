@@ -843,7 +843,13 @@ class AdaptiveRest:
 
 
 def decode_adaptive_vertex(
-    coder: RangeDecoder, model: AdaptiveRest, branch: Branch, i: int, unit: float, rest: Points, before: RestLayer | None
+    coder: RangeDecoder,
+    model: AdaptiveRest,
+    branch: Branch,
+    i: int,
+    unit: float,
+    rest: Points,
+    before: RestLayer | None,
 ) -> tuple[list[float], list[int]]:
     """Position and integers of vertex i of a stem."""
     lag, per_unit = max(branch.lag, 1), 1.0 / unit
