@@ -186,7 +186,8 @@ def _rests(
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive)
     for step in steps:
-        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1], rest.adaptive))
+        slack = prelude.rest_slack if step == rest.step else 0.0
+        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1], rest.adaptive, slack))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded

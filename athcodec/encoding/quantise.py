@@ -82,6 +82,7 @@ def rest_step_ratio(relative_bound: float) -> float:
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
 
 
+REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # over the bound
 LONGEST_LAG, LONGEST_ROW = 40, 600  # of stems, and of those that may be whole meshes
 MESH = 1000  # vertices
 SHORT_STEM = 16  # vertices: stems that are likely to come in many alike, which a lag of all of them tells apart

@@ -31,10 +31,10 @@ from athcodec.encoding.segment import (
     analyse_finely,
     branch_records,
     code_stems,
-    lags,
     learned_bases,
     loose_branches,
     thread_count,
+    with_best_lags,
 )
 from athcodec.errors import BoundError
 
@@ -43,6 +43,7 @@ WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
 PRELUDES_KEPT = 6  # between trials
+REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
 WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
 
@@ -119,7 +120,7 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
     levels = ath.height + 2
-    return Settings(
+    settings = Settings(
         bound=bound,
         largest_bound=source.largest_bound(bound),
         limit=source.limit(bound),
@@ -128,13 +129,15 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         rest_step=qz.single(rest_step),
         sheet=source.sheet_like,
         loose=loose_branches(source, wildest.positions),
-        lags=lags(source, rest_step),
+        lags=np.zeros(source.hierarchy.branch_count, np.int32),
+        adaptive_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
     )
+    return with_best_lags(source, ath, settings)
 
 
 def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
@@ -142,15 +145,18 @@ def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
     step = STILL_STEP * source.smallest_bound(bound)
     settings = first_settings(source, ath, bound, SegmentSample(source.positions(0), source.clip.frame_count))
     slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
-    rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * max(slack, 0.5 * source.smallest_bound(bound)))
+    settings = with_rest_slack(source, ath, settings, max(slack, 0.5 * source.smallest_bound(bound)))
     return replace(
         settings,
         step=qz.single(step),
-        rest_step=rest_step,
-        rest_slack=max(slack, 0.0),
-        lags=lags(source, rest_step),
         node_steps=np.full(len(settings.level_steps), STILL_STEP * source.seen.diagonal + step),
     )
+
+
+def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Settings:
+    """A rest pose that is off by as much, of the coarsest step that allows it."""
+    rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * slack)
+    return with_best_lags(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
 
 
 def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: LearnedModes | None) -> SegmentMotion:
@@ -257,6 +263,7 @@ class Search:
             self._with_basis,
             self._with_learned_modes,
             self._with_steps,
+            self._with_rest_slack,
         ]
         if self.effort == "fast":
             steps = [self._with_rotations]
@@ -355,6 +362,8 @@ class Search:
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
+        if found.rest_slack > 0:
+            settings = with_rest_slack(self.source, self.ath, settings, found.rest_slack)
         if search.required_saving is None:
             return settings
         return replace(settings, learned_pieces=self._pieces_for_learned_modes(settings, [search.required_saving])[0])
@@ -364,11 +373,10 @@ class Search:
         varied = (
             settings.step,
             settings.level_steps.tobytes(),
-            settings.rest_step,
+            *self._prelude_key(settings),
             settings.rotation_step_factors,
             settings.only_tips,
             settings.learned_bases,
-            settings.sheet.tobytes(),
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
         )
         if varied not in self._known:
@@ -475,7 +483,13 @@ class Search:
         return prelude
 
     def _prelude_key(self, settings: Settings) -> tuple:
-        return settings.rest_step, settings.sheet.tobytes()
+        return (
+            settings.rest_step,
+            settings.rest_slack,
+            settings.adaptive_rest,
+            settings.lags.tobytes(),
+            settings.sheet.tobytes(),
+        )
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
@@ -529,6 +543,15 @@ class Search:
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)
+
+    def _with_rest_slack(self, settings: Settings) -> Settings:
+        """A rest pose as far off as the motion leaves room for, where it is much of the file."""
+        if self.source.exact_rest or self._prelude_bytes(self.prelude(settings)) < REST_SHARE * self.cost(settings)[0]:
+            return settings
+        slacks = [part * float(np.min(settings.limit)) for part in qz.REST_SLACKS]
+        return self._cheapest(
+            [settings, *(with_rest_slack(self.source, self.ath, settings, slack) for slack in slacks)]
+        )
 
     def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
         """Walks step and rest step in turn to the cheapest on geometric grids."""

@@ -6,7 +6,6 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -174,12 +173,13 @@ class Settings:
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
     lags: np.ndarray  # (B,) int32, file order
+    adaptive_rest: bool
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
-    rest_slack: float = 0.0  # what the rest pose of a clip that stands still may be off by, to save bits
+    rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -190,7 +190,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     """(B,) of _native.BRANCH."""
     branches = np.zeros(hierarchy.branch_count, BRANCH)
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
-    branches["attach"] = hierarchy.attach
+    branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * settings.loose
     branches["lag"] = settings.lags
     return branches
@@ -208,47 +208,63 @@ class CodedPrelude:
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
+        self.rest_slack = settings.rest_slack
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
 
 
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
-    """REST, and the rest pose as decoded; the branches get the lags that make it smallest."""
+    """REST, and the rest pose as decoded."""
     head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
         head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
         return head, pose.astype(np.float64) - source.origin
-    tried = [
-        (own, _rest_within(own, settings, source.rest, adaptive)) for own, adaptive in _rest_variants(branches, source)
-    ]
-    best, coded = min(tried, key=lambda variant: len(variant[1].stream))
-    branches["lag"] = best["lag"]
+    coded = _rest_within(source.rest, branches, settings)
     head.step, head.stream, head.adaptive = coded.step, coded.stream, coded.adaptive
     return head, coded.decoded
 
 
-def _rest_within(branches: np.ndarray, settings: Settings, rest: np.ndarray, adaptive: bool) -> streams.CodedRest:
+def _rest_within(rest: np.ndarray, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
     """At the step of the settings, or the first finer one that keeps the bound."""
     step = settings.rest_step
     while True:
-        coded = streams.encode_rest(branches, step, rest, None, adaptive, settings.rest_slack)
+        coded = streams.encode_rest(branches, step, rest, None, settings.adaptive_rest, settings.rest_slack)
         if np.linalg.norm(coded.decoded - rest, axis=1).max() <= settings.bound:
             return coded
         step = qz.single(0.8 * step)
 
 
-def _rest_variants(branches: np.ndarray, source: Source) -> Iterator[tuple[np.ndarray, bool]]:
-    """Branches with lags to try, and whether adaptively: also all stems vertex by vertex, and short ones that are told
-    apart by nothing but their vertices' numbers; of a clip that stands still every lag that may suit."""
-    lag, count = branches["lag"], branches["count"]
-    lags = [lag, np.maximum(lag, 1), np.where(count <= qz.SHORT_STEM, count, np.maximum(lag, 1))]
+def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
+    """The lags, and adaptive or not, that make hierarchy and rest pose smallest at these steps."""
+    own = lags(source, settings.rest_step)
+    candidates = [replace(settings, lags=own, adaptive_rest=False)]
+    if not source.exact_rest:
+        candidates += _lag_candidates(source, settings, own)
+
+    def size(candidate: Settings) -> int:
+        hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, candidate)
+        stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+        return len(stream) + len(_rest_within(source.rest, branches, candidate).stream)
+
+    return candidates[0] if len(candidates) == 1 else min(candidates, key=size)
+
+
+def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list[Settings]:
+    """Beams or not, the lags of stems or one for all; short stems as such whose vertices differ by their numbers."""
+    count, no_beam, beams = source.hierarchy.stem_count, np.maximum(own, 1), np.minimum(own, 1)
+    steps = [np.zeros_like(own), beams]
+    adaptive = [own, beams, no_beam, np.ones_like(own), np.where(count <= qz.SHORT_STEM, count, no_beam)]
     if source.still:
-        lags += [np.full_like(lag, some) for some in (1, 3, 4)] + [np.minimum(2 * lag, 65535)]
-    yield branches, False
-    for own in {own.tobytes(): own for own in lags}.values():
-        changed = branches.copy()
-        changed["lag"] = own
-        yield changed, True
+        adaptive += [np.full_like(own, 3), np.full_like(own, 4), np.minimum(2 * no_beam, 65535)]
+    tried = {
+        (lag.astype(np.int32).tobytes(), is_adaptive)
+        for is_adaptive, some in ((False, steps), (True, adaptive))
+        for lag in some
+    }
+    return [
+        replace(settings, lags=np.frombuffer(lag, np.int32), adaptive_rest=is_adaptive)
+        for lag, is_adaptive in sorted(tried)
+    ]
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
