@@ -1,4 +1,4 @@
-"""Reference pose and rest pose: motion may be coded about another pose than the source's, which comes back all the same."""
+"""Motion may be coded about another pose than the source's rest pose, which comes back all the same."""
 
 from __future__ import annotations
 

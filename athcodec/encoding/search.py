@@ -275,8 +275,8 @@ class Search:
         self.report("search", min((len(self._known) + self._extra_trials) / self._trials, 0.99))
 
     def about_best_reference(self) -> Search:
-        """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose is
-        tried with the settings that are best about the rest pose, and goes on from there."""
+        """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
+        is tried with the settings that are best about the rest pose, and goes on from there."""
         if self.effort == "fast":
             return self
         other = self.about_mean_pose()
