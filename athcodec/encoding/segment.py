@@ -238,7 +238,7 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
     """The lags, and adaptive or not, that make hierarchy and rest pose smallest at these steps."""
     own = lags(source, settings.rest_step)
     candidates = [replace(settings, lags=own, adaptive_rest=False)]
-    if not source.exact_rest:
+    if not source.reference_is_exact:
         candidates += _lag_candidates(source, settings, own)
 
     def size(candidate: Settings) -> int:
