@@ -606,3 +606,9 @@ def _integers(name: str, values: Any) -> np.ndarray:
 
 def _point(point: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:g}" for value in point) + ")"
+
+
+def stands_still(clip: MotionClip) -> bool:
+    """Whether all frames are the rest pose."""
+    frames = (clip.block(frame, frame + 1)[0] for frame in range(clip.frame_count))
+    return all(np.array_equal(frame, clip.source_rest) for frame in frames)

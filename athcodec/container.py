@@ -270,11 +270,15 @@ class Rest:
     source_dtype: np.dtype
     stream: bytes = b""
     exact: bool = False
+    adaptive: bool = False
 
 
 def pack_rest(rest: Rest) -> bytes:
     is_float64 = rest.source_dtype == np.float64
-    return _REST.pack(int(rest.exact) | int(is_float64) << 1, *rest.origin, rest.step) + rest.stream
+    return (
+        _REST.pack(int(rest.exact) | int(is_float64) << 1 | int(rest.adaptive) << 3, *rest.origin, rest.step)
+        + rest.stream
+    )
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.atomic_files import new_file
-from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index
+from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.hierarchy import branch_orders, branches_from_edges
 
@@ -82,14 +82,18 @@ class Found:
 
 def candidates(clip: MotionClip) -> list[Found]:
     """What find_branches gives; and where that goes by motion, also patches of another size, patches without parents,
-    and one single branch: only a trial shows which of them makes the smallest file."""
+    and one single branch: only a trial shows which of them makes the smallest file. A clip that stands still has no
+    patches."""
     seen = _Seen(clip)
+    single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
+    if stands_still(clip):
+        found = _first_found(seen, METHODS[:-1], None)
+        return [single] if found is None else [single, found]
     found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
     if found.method != "motion":
         return [found]
-    single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if clip.vertex_count >= LARGE_MESH:
         return [single, found, _by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
     return [single, found, _by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]

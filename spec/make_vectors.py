@@ -628,6 +628,11 @@ def coded_rest(stems: list[Stem], script: list | Chance, **fields) -> bytes:
     return rest_chunk(write(rd.decode_rest, script, branches_of(stems), 1.0), **fields)
 
 
+def adaptive_rest(stems: list[Stem], script: list | Chance, step: float = 0.25, **fields) -> bytes:
+    stream = write(rd.decode_rest, script, branches_of(stems), step, None, True)
+    return rest_chunk(stream, step=step, reserved=rd.REST_ADAPTIVE >> 2, **fields)
+
+
 def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
     return Plant(stems, rest=rest, **fields)
 
@@ -665,6 +670,40 @@ valid(
             origin=(1e6, -0.5, 3.0),
         ),
     ),
+)
+ADAPTIVE = [  # every filter, phases within lags and across stems, rows of several vertices, a beam among them
+    Stem(-1, 30, lag=1),
+    Stem(0, 12, 3, lag=2),
+    Stem(0, 12, 4, lag=3),
+    Stem(2, 14, 5, SHEET, lag=4),
+    Stem(0, 40, 9, SHEET, lag=7),
+    Stem(-1, 9, lag=0),
+    Stem(5, 3, 2, lag=65535),
+]
+valid(
+    "rest-adaptive",
+    "an adaptive rest pose",
+    lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, Chance(33, large=6), rest_type=1)),
+)
+valid(
+    "rest-adaptive-phases",
+    "an adaptive rest pose of a lag of more vertices than there are phases",
+    lambda: with_rest([Stem(-1, 900, lag=300)], adaptive_rest([Stem(-1, 900, lag=300)], Chance(34, large=3))),
+)
+valid(
+    "rest-adaptive-still",
+    "an adaptive rest pose without bytes, which is a point",
+    lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])),
+)
+valid(
+    "rest-adaptive-vast",
+    "integers of 30 bits under the largest Rest_Step: weighted guesses are out of range",
+    lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, Chance(35, large=29), FLOAT_MAX)),
+)
+valid(
+    "rest-adaptive-tiny",
+    "a subnormal Rest_Step",
+    lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, Chance(36, large=9), FLOAT_TINY)),
 )
 valid(
     "rest-exact",
@@ -1581,6 +1620,16 @@ valid(
     "all that level 0 moves is shown exactly at level 1",
     rest_by_level([Stem(-1, 4, 0, WHOLE), Stem(0, 3, 2)], 43),
 )
+valid(
+    "layers-adaptive-rest",
+    "adaptive rest poses of all layers",
+    refinements(ADAPTIVE, 46, rest=adaptive_rest(ADAPTIVE, Chance(38, large=4), 1.0)),
+)
+valid(
+    "rest-of-level-1-adaptive",
+    "adaptive rest poses by level",
+    rest_by_level(BEAMS[:3], 47, rest=adaptive_rest(BEAMS[:3], Chance(39, large=4), 1.0)),
+)
 valid("rest-of-level-1-still", "the chunk has no bytes in its stream", layered(scripts={(rd.REFINED_REST, 1, 0): []}))
 
 # ---- invalid: the header -----------------------------------------------------------------------------------
@@ -2137,6 +2186,10 @@ invalid(
 )
 
 
+def adaptive_fork() -> bytes:
+    return adaptive_rest(FORK, Chance(37, large=4))
+
+
 def corrupted_rest(**fields) -> bytes:
     return rest_chunk(fork().content(rd.REST)[17:], **fields)
 
@@ -2148,10 +2201,18 @@ def exact_of_fork(numbers_: list, is_float64: bool, **fields) -> bytes:
 INFINITE_BITS = {False: (0xFF << 23, False), True: (0x7FF << 52, False)}  # how far infinity is from 0.0
 prelude("empty", rd.REST, "no bytes", b"")
 prelude("short", rd.REST, "16 bytes", lambda: corrupted_rest()[:16])
-for bit in range(6):
+for bit in (0, 2, 3, 4, 5):
     prelude(
         f"method-{bit}", rd.REST, f"bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit)
     )
+prelude(
+    "exact-and-adaptive",
+    rd.REST,
+    "Method has Is_Exact and Is_Adaptive",
+    lambda: exact_rest(FORK, [0.5] * 15, False, reserved=rd.REST_ADAPTIVE >> 2),
+)
+prelude("adaptive-zero-behind", rd.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
+prelude("adaptive-bytes-behind", rd.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
     prelude(
         f"origin-{what}", rd.REST, f"Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value))

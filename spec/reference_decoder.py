@@ -353,7 +353,11 @@ class NumberModel:
 
 
 def code_unsigned(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
-    size = model.size[number_class(expected)]
+    return code_in_class(coder, model, number_class(expected))
+
+
+def code_in_class(coder: RangeDecoder, model: NumberModel, c: int) -> int:
+    size = model.size[c]
     length = 0
     while length < LONGEST and coder.bit(size[length]):
         length += 1
@@ -372,7 +376,11 @@ def code_mantissa(coder: RangeDecoder, contexts: Contexts, length: int) -> int:
 
 
 def code_signed(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
-    magnitude = code_unsigned(coder, model, expected)
+    return code_signed_in_class(coder, model, number_class(expected))
+
+
+def code_signed_in_class(coder: RangeDecoder, model: NumberModel, c: int) -> int:
+    magnitude = code_in_class(coder, model, c)
     if magnitude == 0:
         return 0
     return -magnitude if coder.raw_bit() else magnitude
@@ -697,6 +705,8 @@ def measure_subtrees(branches: list[Branch]) -> None:
 # ---- rest pose ---------------------------------------------------------------------------------------------
 
 RUN_VERTICES = 32
+REST_EXACT, REST_FLOAT64, REST_ADAPTIVE = 1, 2, 8  # bits of Method
+Points = list[list[float]]  # three numbers for each vertex
 MOST_STEPS = 1073741823
 
 
@@ -709,7 +719,9 @@ class RestLayer:
     steps: list[list[int]]
 
 
-def decode_rest(stream: bytes, branches: list[Branch], step: float, before: RestLayer | None = None) -> RestLayer:
+def decode_rest(
+    stream: bytes, branches: list[Branch], step: float, before: RestLayer | None = None, is_adaptive: bool = False
+) -> RestLayer:
     """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex; of a refinement,
     about the rest pose of the layer before."""
     coder, rows = RangeDecoder(stream), RefinementModel() if before else CoefficientModel()
@@ -717,9 +729,15 @@ def decode_rest(stream: bytes, branches: list[Branch], step: float, before: Rest
     mean = [[64, 64, 64], [64, 64, 64]]
     rest: list[list[float]] = []
     all_steps: list[list[int]] = []
+    adaptive = AdaptiveRest()
     for branch in branches:
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
+            if is_adaptive:
+                point, steps = decode_adaptive_vertex(coder, adaptive, branch, i, 0.625 * step, rest, before)
+                rest.append(point)
+                all_steps.append(steps)
+                continue
             predicted = predict_rest(branch, rest, i)
             m, steps = mean[1 if i < 2 else 0], []
             for k in range(3):
@@ -795,6 +813,164 @@ def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
         return before
     start, end = on_stem(i - lag - 1), on_stem(i - lag)
     return [before[k] + (end[k] - start[k]) for k in range(3)]
+
+
+class RestFilter:
+    """Weights of the terms, by recursive least squares."""
+
+    def __init__(self) -> None:
+        self.weight = [1.0 if j == 3 else 0.0 for j in range(10)]
+        self.spread = [[1.0 if j == m else 0.0 for m in range(10)] for j in range(10)]
+        self.noise = 16.0
+
+
+class RestMemory:
+    """Mean squared errors of the guesses and mean magnitudes of the integers, axis by axis."""
+
+    def __init__(self) -> None:
+        self.error = [[16.0] * 3 for _ in range(9)]
+        self.mean = [64, 64, 64]
+
+
+class AdaptiveRest:
+    """What is learned of an adaptive rest pose: of all vertices, and by phase."""
+
+    def __init__(self) -> None:
+        self.models = [NumberModel() for _ in range(3)]  # first axis; others where that is even; where it is odd
+        self.filters = [RestFilter() for _ in range(6)]
+        self.all, self.phases = RestMemory(), [RestMemory() for _ in range(256)]
+        self.offsets = [[0.0] * 3 for _ in range(256)]  # of the last vertex of each phase, from the one before it
+
+
+def decode_adaptive_vertex(
+    coder: RangeDecoder, model: AdaptiveRest, branch: Branch, i: int, unit: float, rest: Points, before: RestLayer | None
+) -> tuple[list[float], list[int]]:
+    """Position and integers of vertex i of a stem."""
+    lag, per_unit = max(branch.lag, 1), 1.0 / unit
+    phase = 0 if i == 0 else 1 + i % lag % 255
+    own = model.phases[phase]
+    weights = model.filters[0 if i == 0 else 1 + i % lag if lag <= 4 else 5]
+    base, terms = rest_terms(branch, i, lag, model.offsets[phase], per_unit, rest, before)
+    guesses = rest_guesses(weights, terms)
+    offset = [expected_offset(model.all, own, guesses, k) for k in range(3)]
+    steps = decode_lattice_point(coder, model, own)
+    point = [(base[k] + offset[k] * unit) + float(steps[k]) * unit for k in range(3)]
+    offset = [(point[k] - base[k]) * per_unit for k in range(3)]
+    for memory, rate in (model.all, 0.06), (own, 0.1):
+        note_vertex(memory, guesses, offset, steps, rate)
+    learn_weights(weights, terms, guesses[5], offset)
+    model.offsets[phase] = offset
+    return point, steps
+
+
+def rest_terms(
+    branch: Branch, i: int, lag: int, last_offset: list[float], per_unit: float, rest: Points, before: RestLayer | None
+) -> tuple[list[float], Points]:
+    """The vertex before, and what guesses are made of, in units."""
+
+    def on_stem(j: int, pose: Points = rest) -> list[float] | None:
+        if j >= 0:
+            return pose[branch.first + j]
+        return pose[branch.attach] if j == -1 and branch.attach >= 0 else None
+
+    def way(start: list[float] | None, end: list[float] | None) -> list[float]:
+        if start is None or end is None:
+            return [0.0] * 3
+        return [(end[k] - start[k]) * per_unit for k in range(3)]
+
+    origin = [0.0] * 3
+    row = on_stem(i - lag) if i >= lag > 1 else None
+    base = on_stem(i - 1) or origin
+    terms = [way(on_stem(i - j - 2), on_stem(i - j - 1)) for j in range(3)]
+    terms.append(way(on_stem(i - lag - 1), row) if i >= lag else last_offset)
+    terms.append(way(row, on_stem(i - lag + 1) if row else None))
+    terms.append(way(base, row))
+    terms.append(way(on_stem(i - 2 * lag) if i >= 2 * lag else None, row))
+    terms.append(way(base, origin))
+    if before is not None:
+        known = on_stem(i, before.rest)
+        terms += [way(base, known), way(on_stem(i - 1, before.rest) or origin, known)]
+    return base, terms
+
+
+def rest_guesses(weights: RestFilter, terms: Points) -> Points:
+    """Of the offset from the vertex before, in units."""
+    weighted = []
+    for k in range(3):
+        total = 0.0
+        for j in range(len(terms)):
+            total = total + weights.weight[j] * terms[j][k]
+        weighted.append(total if -1e9 < total < 1e9 else 0.0)
+    beyond = [terms[5][k] + terms[6][k] for k in range(3)]
+    return [[0.0] * 3, terms[0], terms[3], terms[5], beyond, weighted] + terms[7:]
+
+
+def expected_offset(everywhere: RestMemory, own: RestMemory, guesses: Points, k: int) -> float:
+    error = [(everywhere.error[g][k] + 0.05) * (own.error[g][k] + 0.05) for g in range(len(guesses))]
+    least, total, weights = min(error), 0.0, 0.0
+    for g in range(len(guesses)):
+        weight = least / error[g]
+        weight = weight * weight
+        weight = weight * weight
+        total = total + weight * guesses[g][k]
+        weights = weights + weight
+    return total / weights
+
+
+def decode_lattice_point(coder: RangeDecoder, model: AdaptiveRest, own: RestMemory) -> list[int]:
+    steps: list[int] = []
+    for k in range(3):
+        classes = [number_class((m[k] + m[0] + m[1] + m[2]) // 4) for m in (model.all.mean, own.mean)]
+        both = (classes[0] + classes[1] + 1) // 2
+        half = max(both - 2, 0)
+        if k == 0:
+            steps.append(code_signed_in_class(coder, model.models[0], both))
+        elif steps[0] & 1 == 0:
+            steps.append(2 * code_signed_in_class(coder, model.models[1], half))
+        else:
+            negative = coder.raw_bit()
+            magnitude = 2 * code_in_class(coder, model.models[2], half) + 1
+            steps.append(-magnitude if negative else magnitude)
+    return steps
+
+
+def note_vertex(memory: RestMemory, guesses: Points, offset: list[float], steps: list[int], rate: float) -> None:
+    for k in range(3):
+        for g in range(len(guesses)):
+            error, mean = offset[k] - guesses[g][k], memory.error[g][k]
+            square, most = error * error, 4.0 * mean + 16.0
+            memory.error[g][k] = mean + ((square if square < most else most) - mean) * rate
+        memory.mean[k] = memory.mean[k] - (memory.mean[k] + 7) // 8 + clipped(steps[k]) * 2
+
+
+def learn_weights(weights: RestFilter, terms: Points, guess: list[float], offset: list[float]) -> None:
+    """A step of recursive least squares, which forgets only in the direction that it learns from."""
+    squares, n = 0.0, len(terms)
+    for k in range(3):
+        error = offset[k] - guess[k]
+        squares = squares + error * error
+    squares = squares / 3.0
+    usual = 0.3 + weights.noise
+    noise = usual + squares + 0.1 * squares * (squares / usual)
+    for k in range(3):
+        gain, known, error = [0.0] * n, 0.0, offset[k]
+        for j in range(n):
+            for m in range(n):
+                gain[j] = gain[j] + weights.spread[j][m] * terms[m][k]
+            known = known + gain[j] * terms[j][k]
+            error = error - weights.weight[j] * terms[j][k]
+        if not known > 0.0:
+            continue
+        step = error / (noise + known)
+        less = (known - noise / 2048.0) / (known * (noise + known))
+        for j in range(n):
+            part = gain[j] * less
+            weights.weight[j] = weights.weight[j] + gain[j] * step
+            for m in range(j + 1):
+                weights.spread[j][m] = weights.spread[j][m] - part * gain[m]
+                weights.spread[m][j] = weights.spread[j][m]
+    most = 8.0 * weights.noise + 4.0
+    weights.noise = weights.noise + ((squares if squares < most else most) - weights.noise) * 0.1
 
 
 # ---- exact numbers: rest poses and times bit for bit -------------------------------------------------------
@@ -2368,19 +2544,21 @@ class AthFile:
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 17, "REST is too short")
-        require(chunk[0] <= 3, "Method has reserved bits")
+        require(chunk[0] & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE) == 0, "Method has reserved bits")
+        require(chunk[0] & REST_EXACT == 0 or chunk[0] & REST_ADAPTIVE == 0, "a rest pose is exact and adaptive")
         self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
         step = f32(chunk, 13)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
-        self.rest_type = np.dtype("<f8" if chunk[0] & 2 else "<f4")
+        self.rest_type = np.dtype("<f8" if chunk[0] & REST_FLOAT64 else "<f4")
         self._rests: list[RestLayer] = []  # and those that refine it; none where it is exact
-        if chunk[0] & 1 == 0:
-            coded = decode_rest(chunk[17:], self.branches, step)
+        if chunk[0] & REST_EXACT == 0:
+            self._is_adaptive = chunk[0] & REST_ADAPTIVE != 0
+            coded = decode_rest(chunk[17:], self.branches, step, None, self._is_adaptive)
             self._rests = [coded]
             rest = np.array(coded.rest)
             shown = rest + self.origin
         else:
-            shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & 2)))
+            shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & REST_FLOAT64)))
             rest = shown - self.origin
         self.plan.rest = rest
         self._plans: list[Plan] = []  # of the layers, from level 1 on
@@ -2420,7 +2598,7 @@ class AthFile:
     def _refined_rest(self, chunk: bytes) -> np.ndarray:
         require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Rest_Step is out of range")
         require(self._rests != [], "a rest pose that is exact is refined")
-        self._rests.append(decode_rest(chunk[4:], self.branches, f32(chunk, 0), self._rests[-1]))
+        self._rests.append(decode_rest(chunk[4:], self.branches, f32(chunk, 0), self._rests[-1], self._is_adaptive))
         rest = np.array(self._rests[-1].rest)
         return rest
 

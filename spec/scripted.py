@@ -93,18 +93,18 @@ class ScriptedCoder(rd.RangeDecoder):
 
 
 def scripted_unsigned(original: Callable):
-    def code(coder, model, expected):
+    def code(coder, model, c):
         coder.decisions.extend(magnitude_bits(coder.script.answer("unsigned", 1 << 30), rd.LONGEST))
-        return original(coder, model, expected)
+        return original(coder, model, c)
 
     return code
 
 
 def scripted_signed(original_unsigned: Callable):
-    def code(coder, model, expected):
+    def code(coder, model, c):
         value = coder.script.answer("signed", 1 << 30)
         coder.decisions.extend(magnitude_bits(abs(value), rd.LONGEST))
-        if original_unsigned(coder, model, expected):
+        if original_unsigned(coder, model, c):
             coder.decisions.append(value < 0)
             coder.raw_bit()
         return value
@@ -147,8 +147,8 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
 
     replaced = {
         "RangeDecoder": coder,
-        "code_unsigned": scripted_unsigned(rd.code_unsigned),
-        "code_signed": scripted_signed(rd.code_unsigned),
+        "code_in_class": scripted_unsigned(rd.code_in_class),
+        "code_signed_in_class": scripted_signed(rd.code_in_class),
         "decode_count": scripted_count(rd.decode_count),
         "code_exact": scripted_exact(rd.code_exact),
     }
@@ -578,7 +578,8 @@ class Plant:
                 points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2))
                 self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3f", chunk, 1), float)
                 return []
-            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13))
+            self.is_adaptive = chunk[0] & rd.REST_ADAPTIVE != 0
+            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13), None, self.is_adaptive)
             self.plan.rest = np.array(coded.rest)
             return [coded]
 
@@ -610,8 +611,9 @@ class Plant:
 
     def _refined_rest(self, branches: list, level: int, step: float, rests: list[rd.RestLayer]) -> Entry:
         """The rest pose of a level, which is added to those before."""
-        stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), branches, step, rests[-1])
-        rests.append(rd.decode_rest(stream, branches, step, rests[-1]))
+        arguments = branches, step, rests[-1], self.is_adaptive
+        stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), *arguments)
+        rests.append(rd.decode_rest(stream, *arguments))
         return Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level)
 
     def _segment(self, s: int, frames: int) -> list[Entry]:

@@ -313,11 +313,15 @@ int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
     return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
 }
 
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_ADAPTIVE = 8 }; /* bits of Method */
+
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
-    if (chunk.size < 17 || chunk.bytes[0] > 3) return ATH_BAD_CHUNK;
-    head->exact = chunk.bytes[0] & 1;
-    head->is_float64 = chunk.bytes[0] >> 1;
+    if (chunk.size < 17 || chunk.bytes[0] & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE)) return ATH_BAD_CHUNK;
+    head->exact = (chunk.bytes[0] & REST_EXACT) != 0;
+    head->is_float64 = (chunk.bytes[0] & REST_FLOAT64) != 0;
+    head->adaptive = (chunk.bytes[0] & REST_ADAPTIVE) != 0;
+    if (head->exact && head->adaptive) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
     int valid = is_step(head->step);

@@ -49,7 +49,7 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, is_float64;
+    int32_t exact, is_float64, adaptive;
 } ath_rest_head;
 
 typedef struct {

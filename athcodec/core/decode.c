@@ -50,10 +50,11 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 }
 
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, const int32_t *coarse, const double *before, int32_t *steps, double *rest)
+                    double step, int adaptive, const int32_t *coarse, const double *before, int32_t *steps,
+                    double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps};
+    rest_layer layer = {coarse, before, steps, adaptive, 0.0};
     coder_start(&coder, bytes, size);
     return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
 }

@@ -12,7 +12,8 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source);
 /* coarse, before: integers and positions of the layer before, null for the first layer; steps: those of this one, null where none are wanted. */
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, const int32_t *coarse, const double *before, int32_t *steps, double *rest);
+                    double step, int adaptive, const int32_t *coarse, const double *before, int32_t *steps,
+                    double *rest);
 /* Positions as stored, floats or (is_float64) doubles, the origin not taken off. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, int is_float64, double *rest);

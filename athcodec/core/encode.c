@@ -55,11 +55,11 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, const int32_t *coarse, const double *before, int32_t *steps, const double *source,
-                        double *rest)
+                        double step, int adaptive, double slack, const int32_t *coarse, const double *before,
+                        int32_t *steps, const double *source, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps};
+    rest_layer layer = {coarse, before, steps, adaptive, slack};
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }

@@ -330,6 +330,7 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     if (result != ATH_OK) return result;
     memcpy(file->info.origin, head.origin, sizeof head.origin);
     file->info.rest_is_float64 = head.is_float64;
+    file->adaptive_rest = head.adaptive;
     if (head.exact) {
         result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
                                        (int32_t)header->branch_count, head.is_float64, file->stored_rest);
@@ -337,7 +338,7 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
         if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                 head.step, 0, 0, file->rest_steps, file->rest);
+                                 head.step, head.adaptive, 0, 0, file->rest_steps, file->rest);
         file->stored_rest = 0;
     }
     return result;
@@ -523,9 +524,9 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
-        result =
-            ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                            rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);
+        result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
+                                 file->adaptive_rest, rest_steps_before(file, q), plan_before(file, q)->rest,
+                                 layer->rest_steps, layer->rest);
     return result;
 }
 

@@ -34,8 +34,9 @@ struct ath_file {
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
-    void *scratch;                           /* of opening and building */
-    double *bases;                           /* null until ath_build */
+    void *scratch; /* of opening and building */
+    double *bases; /* null until ath_build */
+    int32_t adaptive_rest;
     int32_t *rest_steps;                     /* null where no layer refines the rest pose */
     ath_layer layers[ATH_LAYERS];            /* first_layer to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */

@@ -180,22 +180,22 @@ def _rests(
     if rest.exact or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
-    coded = _first_rests(prelude.plan, first_step, source.rest)
+    coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive)
     for step in steps:
-        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1]))
+        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1], rest.adaptive))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
     return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
 
 
-def _first_rests(plan: Plan, step: float, rest: np.ndarray) -> list[streams.CodedRest]:
+def _first_rests(plan: Plan, step: float, rest: np.ndarray, adaptive: bool) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    at_once = streams.encode_rest(plan.branches, step, rest)
+    at_once = streams.encode_rest(plan.branches, step, rest, None, adaptive)
     if not plan.level_0_stands_alone:
         return [at_once]
-    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest)
-    refined = streams.encode_rest(plan.branches, step, rest, level_0)
+    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, adaptive)
+    refined = streams.encode_rest(plan.branches, step, rest, level_0, adaptive)
     both = len(level_0.stream) + len(refined.stream)
     return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
 

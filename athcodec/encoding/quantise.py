@@ -23,6 +23,7 @@ SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of error
 LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
+LATTICE_REST_CAP = 3.2 / 5**0.5  # and for that to the lattice of adaptive rest poses
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)
 
@@ -79,13 +80,16 @@ def rest_step_ratio(relative_bound: float) -> float:
     return float(np.interp(np.log10(relative_bound), [-5, -4, -3], [0.7, 0.7, 0.45]))
 
 
-LONGEST_LAG = 40
+LONGEST_LAG, LONGEST_ROW = 40, 600  # of stems, and of those that may be whole meshes
+MESH = 1000  # vertices
+SHORT_STEM = 16  # vertices: stems that are likely to come in many alike, which a lag of all of them tells apart
 
 
 def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
     """The lag, 1 or more, that leaves the least of a stem's rest pose to code: see FORMAT.md, Lag. stem: (n, 3)."""
     chain = stem if attach is None else np.vstack([attach, stem])
-    steps = np.diff(chain[:1000], axis=0)  # a sample does for long stems
+    steps = np.diff(chain[: MESH if len(chain) <= MESH else 4 * MESH], axis=0)  # a sample does for long stems
+    longest = LONGEST_LAG if len(chain) <= MESH else LONGEST_ROW
     none = len(stem)  # no step is that many vertices ago
 
     def cost(lag: int) -> float:
@@ -93,4 +97,4 @@ def rest_lag(stem: np.ndarray, attach: np.ndarray | None, step: float) -> int:
         residual[lag:] -= steps[: max(0, len(steps) - lag)]
         return float(np.log2(1 + np.abs(residual) / step).sum())
 
-    return min([none, *range(1, min(len(steps), LONGEST_LAG))], key=cost)
+    return min([none, *range(1, min(len(steps), longest))], key=cost)

@@ -41,6 +41,7 @@ WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
 PRELUDES_KEPT = 6  # between trials
+STILL_STEP = 1024.0  # over what nothing is to be left of
 WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
 
 
@@ -97,6 +98,9 @@ def decide(
 ) -> tuple[list[Choice], CodedPrelude]:
     """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the
     last one's, 1 if that is the same layer."""
+    if source.still:
+        settings = still_settings(source, ath, bound)
+        return [Choice(settings, _coarser(settings, ratio), None)], CodedPrelude(source, ath, settings)
     search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1)
     first_layer, candidates = search.found(ratio)
     prelude = search.prelude(candidates[0])
@@ -125,6 +129,22 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         learned_bases=(False,) * levels,
         learned_pieces=None,
         node_steps=np.full(levels, step),
+    )
+
+
+def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
+    """Of a clip all of whose frames are the rest pose: no motion, a rest pose of the bound's precision."""
+    step = STILL_STEP * source.smallest_bound(bound)
+    settings = first_settings(source, ath, bound, SegmentSample(source.positions(0), source.clip.frame_count))
+    slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
+    rest_step = qz.single(0.9999 * qz.LATTICE_REST_CAP * max(slack, 0.5 * source.smallest_bound(bound)))
+    return replace(
+        settings,
+        step=qz.single(step),
+        rest_step=rest_step,
+        rest_slack=max(slack, 0.0),
+        lags=lags(source, rest_step),
+        node_steps=np.full(len(settings.level_steps), STILL_STEP * source.seen.diagonal + step),
     )
 
 

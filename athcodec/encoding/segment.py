@@ -6,6 +6,7 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,7 +15,7 @@ import numpy as np
 from athcodec import container as ct
 from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE
 from athcodec.ath import Ath, Survey
-from athcodec.clip import MotionClip
+from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
@@ -73,6 +74,16 @@ class Source:
     def clip_range_starts(self) -> list[int]:
         """The first segment of each clip of the file."""
         return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
+
+    @cached_property
+    def still(self) -> bool:
+        """Whether all frames are the rest pose."""
+        return stands_still(self.clip)
+
+    @property
+    def largest_number(self) -> np.floating:
+        """Of the coordinates, in the source's type."""
+        return np.abs([self.seen.low, self.seen.high]).max().astype(self.clip.dtype)
 
     @property
     def extent(self) -> float:
@@ -143,6 +154,7 @@ class Settings:
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
+    rest_slack: float = 0.0  # what the rest pose of a clip that stands still may be off by, to save bits
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -166,25 +178,51 @@ class CodedPrelude:
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
-        self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool)
-        self.rest_chunk = self._code_rest(source, branches, settings)
+        self.rest_chunk, rest = _coded_rest(source, branches, settings)
+        self.plan.set_rest(rest)
+        self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
 
-    def _code_rest(self, source: Source, branches: np.ndarray, settings: Settings) -> ct.Rest:
-        head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
-        if source.exact_rest:
-            pose = source.clip.source_rest[source.hierarchy.vertex_source]
-            head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
-            self.plan.set_rest(pose.astype(np.float64) - source.origin)
-        else:
-            coded = streams.encode_rest(branches, head.step, source.rest)
-            while np.linalg.norm(coded.decoded - source.rest, axis=1).max() > settings.bound:
-                head.step = qz.single(0.8 * head.step)
-                coded = streams.encode_rest(branches, head.step, source.rest)
-            head.stream = coded.stream
-            self.plan.set_rest(coded.decoded)
-        return head
+
+def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
+    """REST, and the rest pose as decoded; the branches get the lags that make it smallest."""
+    head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
+    if source.exact_rest:
+        pose = source.clip.source_rest[source.hierarchy.vertex_source]
+        head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
+        return head, pose.astype(np.float64) - source.origin
+    tried = [
+        (own, _rest_within(own, settings, source.rest, adaptive)) for own, adaptive in _rest_variants(branches, source)
+    ]
+    best, coded = min(tried, key=lambda variant: len(variant[1].stream))
+    branches["lag"] = best["lag"]
+    head.step, head.stream, head.adaptive = coded.step, coded.stream, coded.adaptive
+    return head, coded.decoded
+
+
+def _rest_within(branches: np.ndarray, settings: Settings, rest: np.ndarray, adaptive: bool) -> streams.CodedRest:
+    """At the step of the settings, or the first finer one that keeps the bound."""
+    step = settings.rest_step
+    while True:
+        coded = streams.encode_rest(branches, step, rest, None, adaptive, settings.rest_slack)
+        if np.linalg.norm(coded.decoded - rest, axis=1).max() <= settings.bound:
+            return coded
+        step = qz.single(0.8 * step)
+
+
+def _rest_variants(branches: np.ndarray, source: Source) -> Iterator[tuple[np.ndarray, bool]]:
+    """Branches with lags to try, and whether adaptively: also all stems vertex by vertex, and short ones that are told
+    apart by nothing but their vertices' numbers; of a clip that stands still every lag that may suit."""
+    lag, count = branches["lag"], branches["count"]
+    lags = [lag, np.maximum(lag, 1), np.where(count <= qz.SHORT_STEM, count, np.maximum(lag, 1))]
+    if source.still:
+        lags += [np.full_like(lag, some) for some in (1, 3, 4)] + [np.minimum(2 * lag, 65535)]
+    yield branches, False
+    for own in {own.tobytes(): own for own in lags}.values():
+        changed = branches.copy()
+        changed["lag"] = own
+        yield changed, True
 
 
 def lags(source: Source, step: float) -> np.ndarray:

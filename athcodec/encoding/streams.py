@@ -37,10 +37,21 @@ class CodedRest:
     stream: bytes
     decoded: np.ndarray
     steps: np.ndarray
+    adaptive: bool = False
 
 
-def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray, coarse: CodedRest | None = None) -> CodedRest:
-    """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one."""
+def encode_rest(
+    branches: np.ndarray,
+    step: float,
+    rest: np.ndarray,
+    coarse: CodedRest | None = None,
+    adaptive: bool = False,
+    slack: float = 0.0,
+) -> CodedRest:
+    """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one.
+
+    slack: how far from its place a vertex may be put to save bits, where `adaptive`.
+    """
     decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
     data = encode_stream(
         "ath_encode_rest",
@@ -48,13 +59,15 @@ def encode_rest(branches: np.ndarray, step: float, rest: np.ndarray, coarse: Cod
         address(branches, BRANCH, 1),
         len(branches),
         step,
+        adaptive,
+        slack,
         None if coarse is None else address(coarse.steps, np.int32, rest.size),
         None if coarse is None else address(coarse.decoded, np.float64, rest.size),
         address(steps, np.int32, rest.size),
         address(rest, np.float64, rest.size),
         address(decoded, np.float64, rest.size),
     )
-    return CodedRest(step, data, decoded, steps)
+    return CodedRest(step, data, decoded, steps, adaptive)
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
