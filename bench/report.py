@@ -108,7 +108,7 @@ def _section(result: dict[str, Any], pictures: dict[str, list[Path]], missing: s
     commands = dict.fromkeys(row["command"] for rows in contents.values() for row in rows)
     content = result | rd.summary(contents, clips, None, _is_odd(result)) | {"command": "`, `".join(commands)}
     above = {rd.title(clip): "\n".join([*_image_links(files), ""]) for clip, files in pictures.items()}
-    return f"{head}\n{missing or PICTURES}\n\n{as_text(content, above)}\n"
+    return f"{head}\n{missing or (PICTURES if pictures else '')}\n\n{as_text(content, above)}\n"
 
 
 def _image_links(files: list[Path]) -> list[str]:

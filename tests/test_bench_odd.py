@@ -78,7 +78,7 @@ def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
     assert {name: (clips[name].frame_count, clips[name].vertex_count) for name in SHAPES} == SHAPES
     assert {name for name, clip in clips.items() if not clip.has_branches} == {
         *("grass_unnamed", "grass_interleaved", "grass_shuffled"),
-        *("still", "one_frame", "morph", "noise", "vertex", "cube"),
+        *("still", "one_frame", "morph", "morph_narrow", "noise", "vertex", "cube"),
     }
     assert set(data.SUITES["odd"]) == set(odd.CLIPS) < set(data.RECIPES)
 
@@ -228,8 +228,9 @@ def test_the_noise_of_a_capture_is_as_large_as_asked_for():
     assert np.abs(np.diff(same.positions, n=2, axis=0)).max() < 2e-3 * diagonal, "smooth without it"
 
 
-def test_few_of_the_shapes_are_mixed_at_a_time_in_straight_lines(clips):
-    clip = clips["morph"]
+@pytest.mark.parametrize("name", ("morph", "morph_narrow"))
+def test_few_of_the_shapes_are_mixed_at_a_time_in_straight_lines(clips, name):
+    clip = clips[name]
     bent = np.linalg.norm(np.diff(clip.positions.astype(np.float64), n=2, axis=0), axis=-1).max(axis=1)
     assert set(np.flatnonzero(bent > 1e-5) + 1) <= set(range(15, 225, 15))
     motion = (clip.positions - clip.positions[0]).reshape(225, -1).astype(np.float64)

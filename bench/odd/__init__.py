@@ -61,6 +61,11 @@ def _odd(maker: str, text: str, plant: bool = True, seed: int = 1, **options: An
     return Odd(maker, text, seed, options, plant)
 
 
+def _morph(text: str, reach: tuple[float, float]) -> Odd:
+    options = {"frames": 225, "points": 1528, "targets": 20, "active": 3, "key": 15, "reach": reach}
+    return _odd("morph_targets", text, plant=False, **options)
+
+
 CLIPS: dict[str, Odd] = {
     "growth": _odd("growth", "branches grow one after the other", frames=120, vertices=1001),
     "growth_eased": _odd("growth", "as growth, eased", seed=2, frames=120, vertices=1001, eased=True),
@@ -84,9 +89,8 @@ CLIPS: dict[str, Odd] = {
     "far": _odd("far_tree", "1e5 cm from the origin", seed=3, frames=60, vertices=300, distance=1e5),
     "still": _odd("still_mesh", "60 frames alike of a mesh", frames=60, nodes=1000, leaves=420),
     "one_frame": _odd("still_mesh", "the mesh alone", frames=1, nodes=1000, leaves=420),
-    "morph": _odd(
-        "morph_targets", "20 shapes, 3 at a time", plant=False, frames=225, points=1528, targets=20, active=3, key=15
-    ),
+    "morph": _morph("20 bumps, 3 at a time", (0.2, 0.5)),
+    "morph_narrow": _morph("the same of few vertices", (0.05, 0.2)),
     "noise": _odd("white_noise", "another place in every frame", plant=False, frames=100, points=100),
     "vertex": _odd("one_vertex", "one vertex", plant=False, frames=100),
     "cube": _odd("tumbling_cube", "thrown cube, rigid", plant=False, frames=127),

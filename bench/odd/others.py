@@ -41,14 +41,17 @@ def still_mesh(seed: int, frames: int, nodes: int, leaves: int) -> MotionClip:
     return _unnamed(np.repeat(mesh.rest[None], frames, axis=0), faces=mesh.faces)
 
 
-def morph_targets(seed: int, frames: int, points: int, targets: int, active: int, key: int) -> MotionClip:
-    """A surface mixed of shapes, few at a time, by weights that are straight between keys `key` frames apart."""
+def morph_targets(
+    seed: int, frames: int, points: int, targets: int, active: int, key: int, reach: tuple[float, float]
+) -> MotionClip:
+    """A ball of radius 1 with bumps of such reach, few of them at a time, by weights that are straight between keys
+    `key` frames apart.
+    """
     rng = np.random.default_rng(seed)
     base = _ball(points)
     centre = base[rng.integers(0, points, targets)]
     distance = np.linalg.norm(base - centre[:, None], axis=-1)
-    reach = rng.uniform(0.2, 0.5, (targets, 1))
-    bump = np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
+    bump = np.maximum(1.0 - (distance / rng.uniform(*reach, (targets, 1))) ** 2, 0.0) ** 2
     shapes = bump[..., None] * rng.normal(0, 0.2, (targets, 1, 3))
     keys = -(-frames // key) + 1
     weights = np.zeros((keys, targets))
