@@ -69,6 +69,11 @@ def _print_facts(facts: dict[str, Any]) -> None:
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    if facts["host_mesh"]:
+        print(
+            f"Rest pose: the host's mesh of {counted(facts['vertices'], 'vertex', 'vertices')}, checksum "
+            f"{facts['host_mesh']['checksum']}; not in the file."
+        )
     if len(facts["levels"]) < facts["full_level_count"]:
         print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
@@ -148,7 +153,8 @@ def print_verdict(result: dict[str, Any]) -> None:
     if result["ok"]:
         sources = ", ".join(clip["against"] for clip in result["clips"])
         more = f"; every level is as close to {sources} as the file says" if sources else ""
-        print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
+        decodes = "every level decodes" if result["decoded"] else "nothing was decoded, which takes --host-mesh"
+        print(f"{result['file']}: whole, all checksums match, {decodes}{more}")
 
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:

@@ -293,6 +293,8 @@ const ath_chunk *ath_find_chunk(const ath_chunk *chunks, uint32_t chunk_count, i
 
 /* ---- heads of chunks ---- */
 
+enum { IS_HOST = 4 }; /* of Method of REST, alone */
+
 static ath_bytes rest_of(ath_bytes chunk, size_t head)
 {
     ath_bytes rest;
@@ -315,12 +317,14 @@ int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
-    if (chunk.size < 17 || chunk.bytes[0] > 3) return ATH_BAD_CHUNK;
+    if (chunk.size < 17 || chunk.bytes[0] > IS_HOST) return ATH_BAD_CHUNK;
     head->exact = chunk.bytes[0] & 1;
-    head->is_float64 = chunk.bytes[0] >> 1;
+    head->is_float64 = chunk.bytes[0] >> 1 & 1;
+    head->is_host = chunk.bytes[0] == IS_HOST;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
-    int valid = is_step(head->step);
+    int valid = is_step(head->step) && (!head->is_host || body->size == sizeof head->host_checksum);
+    for (size_t k = 0; valid && head->is_host && k < 2; k++) head->host_checksum[k] = u32_at(body->bytes + 4 * k);
     for (int32_t k = 0; k < 3; k++) {
         head->origin[k] = (double)f32_at(chunk.bytes + 1 + 4 * k);
         valid = valid && ath_is_finite(head->origin[k]);

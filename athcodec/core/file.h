@@ -30,7 +30,7 @@ struct ath_file {
     int32_t *branch_source, *vertex_source;
     double *times;
     double *rest;        /* relative to the origin */
-    double *stored_rest; /* as stored, where the file holds it exactly, else null */
+    double *stored_rest; /* the source's very numbers, where the file or its host holds these, else null */
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
@@ -40,6 +40,7 @@ struct ath_file {
     ath_layer layers[ATH_LAYERS];            /* first_layer to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
+    int32_t rest_known;                 /* 0 until the host gives it */
     int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
     int32_t longest;                    /* frames of the longest segment */
     uint32_t stems_levels;              /* bit d: level d has STEMS */

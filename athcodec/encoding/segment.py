@@ -45,9 +45,10 @@ class Source:
     hierarchy: Hierarchy
     seen: Survey
     segment_frames: int
-    exact_rest: bool
+    exact_rest: bool  # the decoder has the very numbers of the rest pose
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     pool: ThreadPool = SERIAL
+    host_rest: bool = False  # these are a mesh of the host's
     rest: np.ndarray = field(init=False)  # (N, 3) float64
     origin: np.ndarray = field(init=False)  # (3,) float64
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
@@ -173,7 +174,10 @@ class CodedPrelude:
 
     def _code_rest(self, source: Source, branches: np.ndarray, settings: Settings) -> ct.Rest:
         head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
-        if source.exact_rest:
+        if source.host_rest:
+            head.is_host, head.step, head.stream = True, 1.0, ct.mesh_checksum(source.clip.source_rest)
+            self.plan.set_rest(source.rest)
+        elif source.exact_rest:
             pose = source.clip.source_rest[source.hierarchy.vertex_source]
             head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
             self.plan.set_rest(pose.astype(np.float64) - source.origin)
@@ -191,7 +195,7 @@ def lags(source: Source, step: float) -> np.ndarray:
     """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(source.sheet_like):
+    for b in np.flatnonzero(source.sheet_like & (not source.host_rest)):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)

@@ -9,6 +9,13 @@ import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometr
 
 let files = 0;
 
+// The positions of a mesh for setHostMesh(), three numbers per vertex.
+function numbersOf(mesh) {
+  const position = mesh?.isBufferGeometry ? mesh.getAttribute("position") : null;
+  if (!position) return mesh;
+  return Float32Array.from({ length: 3 * position.count }, (_, i) => position.getComponent(Math.floor(i / 3), i % 3));
+}
+
 /** A file that is open in a worker: what the page knows of it, and the way there. */
 class Channel {
   views = new Map();
@@ -261,6 +268,7 @@ export class ATHLoader extends Loader {
     this.workerURL = null;
     this.mode = "matrices";
     this.clip = null;
+    this.hostMesh = null;
   }
 
   /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
@@ -284,6 +292,15 @@ export class ATHLoader extends Loader {
   /** The name of the clip to begin with, of which alone more than the first bytes are fetched; null: the file's first. */
   setClip(name) {
     this.clip = name;
+    return this;
+  }
+
+  /** The mesh that is the rest pose of files that do not hold one: a Float32Array of three numbers per vertex, in the
+   * order that the file was made from, or a BufferGeometry whose positions are these. Other files pass it over. */
+  setHostMesh(mesh) {
+    if (mesh !== null && !(mesh instanceof Float32Array) && !mesh?.isBufferGeometry)
+      throw new TypeError("mesh: got something else, expected a Float32Array or a BufferGeometry");
+    this.hostMesh = mesh;
     return this;
   }
 
@@ -324,7 +341,7 @@ export class ATHLoader extends Loader {
     const worker = this.#worker();
     const channel = new Channel(worker, () => { worker.files--; });
     worker.files++;
-    channel.send({ type: "open", clip: this.clip, ...message }, transfer);
+    channel.send({ type: "open", clip: this.clip, hostMesh: numbersOf(this.hostMesh), ...message }, transfer);
     try {
       await channel.opened;
     } catch (error) {
