@@ -614,6 +614,7 @@ class AthFile:
             "complete": self.complete,
             "full_level_count": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}",
+            "rest_bytes": sum(chunk.length for kind in (ct.REST, ct.REFINED_REST) for chunk in self._chunks_of(kind)),
             "host_mesh": None if self.host_checksum is None else {"checksum": self.host_checksum},
             "ath": self.table1(),
             "clips": [
