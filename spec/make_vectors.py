@@ -3016,6 +3016,16 @@ invalid(
     "host-mesh-long", "WRONG_HOST_MESH", 0, "a mesh with one vertex more", hosted, np.append(MESH, MESH[:1], axis=0)
 )
 invalid("host-mesh-in-file-order", "WRONG_HOST_MESH", 0, "the mesh in file order", hosted, MESH[ORDER])
+for name, value in (("nan", NAN), ("infinite", -INFINITY)):
+    INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
+    invalid(
+        f"host-mesh-{name}",
+        "WRONG_HOST_MESH",
+        0,
+        f"the file's own mesh has {value}",
+        lambda mesh=INFINITE_MESH: hosted().draft().change(rd.REST, content=host_rest_chunk(mesh)),
+        INFINITE_MESH,
+    )
 for at, which in ((17, "first"), (21, "second")):
     invalid(
         f"host-mesh-{which}-checksum",

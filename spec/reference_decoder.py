@@ -2399,6 +2399,9 @@ class AthFile:
         require(len(mesh) == 12 * len(self.vertex_source), "the mesh has other vertices", "WRONG_HOST_MESH")
         bits = np.frombuffer(mesh, "<u4").reshape(-1, 3)
         bits = np.where(bits == 1 << 31, 0, bits).astype("<u4")  # 0.0 for -0.0
+        require(
+            bool(np.isfinite(bits.view("<f4")).all()), "the mesh has numbers that are not finite", "WRONG_HOST_MESH"
+        )
         data = bits.tobytes()
         checksums = crc32c(data), crc32c(data[::-1])
         require(checksums == self.mesh_checksums, "the mesh has other checksums", "WRONG_HOST_MESH")

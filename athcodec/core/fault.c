@@ -177,6 +177,7 @@ static const char *const sentences[] = {
     "%p: got content that does not decode; expected a valid stream",
     "host mesh: got none; expected the mesh that the file was made for, of %m vertices, checksum %c",
     "host mesh: got %f vertices%a",
+    "host mesh: got vertex %f with a number that is not finite; expected finite ones",
     "host mesh: got checksum %f%a",
 };
 

@@ -497,6 +497,18 @@ static void mesh_checksums(const uint8_t *xyz, size_t stride, size_t count, uint
     }
 }
 
+/* The first vertex with a number that is infinite or NaN; count: none. */
+static size_t first_not_finite(const uint8_t *xyz, size_t stride, size_t count)
+{
+    for (size_t v = 0; v < count; v++) {
+        uint32_t bits[3];
+        mesh_bits(xyz + v * stride, bits);
+        for (int k = 0; k < 3; k++)
+            if ((bits[k] & 0x7f800000) == 0x7f800000) return v;
+    }
+    return count;
+}
+
 static void copy_mesh(ath_file *file, const uint8_t *xyz, size_t stride)
 {
     for (size_t v = 0; v < file->header.vertex_count; v++) {
@@ -519,6 +531,9 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
     if (vertex_count != info->vertex_count)
         return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_VERTEX_COUNT, vertex_count, info->vertex_count,
                           info->vertex_count);
+    size_t bad = first_not_finite(bytes, stride, (size_t)vertex_count);
+    if (bad < (size_t)vertex_count)
+        return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_VERTEX, (double)bad, 0, 0);
     mesh_checksums(bytes, stride, (size_t)vertex_count, found);
     for (int k = 0; k < 2; k++)
         if (found[k] != info->host_checksum[k])
