@@ -104,10 +104,11 @@ def with_sources(
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
+    rest = getattr(args, "rest", "auto")
     return athcodec.read(
         path,
         args.source_format,
-        rest="auto" if (rest := getattr(args, "rest", "auto")) == HOST else rest,
+        rest="auto" if rest == HOST else rest,
         fps=args.fps,
         mesh=args.mesh,
         field=args.field,

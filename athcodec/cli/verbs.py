@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from contextlib import ExitStack, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -200,11 +201,10 @@ def info(args: argparse.Namespace) -> int:
 def verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
-        mesh = args.host_mesh or next(iter(args.against or ()), None)
-        with (
-            open_file(args.file, args.stats, strict=True, clip=args.clip, host_mesh=mesh) as decoder,
-            ExitStack() as opened,
-        ):
+        how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh}
+        with open_file(args.file, args.stats, **how) as decoder, ExitStack() as opened:
+            if decoder.file.needs_host_mesh and args.against:
+                decoder.file.set_host_mesh(opened.enter_context(read_clip(args, args.against[0])))
             result["decoded"] = not decoder.file.needs_host_mesh
             decoder.file.check(result["decoded"])
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
@@ -284,7 +284,7 @@ def view(args: argparse.Namespace) -> int:
             size = view.export_page(args.file, args.export, args.clip, args.host_mesh)
             print(f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
-        ready = lambda address: _say_where(address, args.no_browser)  # noqa: E731
+        ready = partial(_say_where, no_browser=args.no_browser)
         view.serve(args.file, args.port, ready, args.clip, args.host_mesh)
     return 0
 

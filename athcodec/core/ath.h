@@ -210,8 +210,8 @@ ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, si
  * that -0.0 counts as 0.0: as they were loaded, not scaled or turned. The file copies them.
  *     Without it a file opens, says what it holds, and is fed; what needs the rest pose is ATH_NEEDS_HOST_MESH: ath_build,
  * ath_refine_size, ath_refine, ath_rest, ath_level_rest, and all that prepares. ATH_WRONG_HOST_MESH: another number of
- * vertices, numbers that are not finite, or another checksum than the file names; nothing has changed then. A file that holds its rest pose passes the
- * mesh over: ATH_OK. */
+ * vertices, numbers that are not finite, or another checksum than the file names; nothing has changed then. A file that
+ * holds its rest pose passes the mesh over: ATH_OK. */
 ATH_API int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t vertex_count,
                               ath_fault_info *fault);
 

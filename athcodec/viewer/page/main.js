@@ -53,7 +53,7 @@ function bytesOf(element) {
 
 // The mesh of a file that does not hold its rest pose: binary32, as it was in the file's source.
 async function fetchMesh(url) {
-  const answer = await fetch(url);
+  const answer = await fetch(url).catch(({ message }) => ({ ok: false, status: message }));
   if (!answer.ok) throw Object.assign(new Error(`${url}: got status ${answer.status}`), { codeName: "HTTP" });
   loader.setHostMesh(new Float32Array(await answer.arrayBuffer()));
 }

@@ -9,10 +9,11 @@ import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometr
 
 let files = 0;
 
-// The positions of a mesh for setHostMesh(), three numbers per vertex.
+// The positions of a mesh, three numbers per vertex.
 function numbersOf(mesh) {
+  if (mesh === null || (mesh instanceof Float32Array && mesh.length % 3 === 0)) return mesh;
   const position = mesh?.isBufferGeometry ? mesh.getAttribute("position") : null;
-  if (!position) return mesh;
+  if (!position) throw new TypeError("mesh: got something else, expected three numbers per vertex or a BufferGeometry");
   return Float32Array.from({ length: 3 * position.count }, (_, i) => position.getComponent(Math.floor(i / 3), i % 3));
 }
 
@@ -298,9 +299,7 @@ export class ATHLoader extends Loader {
   /** The mesh that is the rest pose of files that do not hold one: a Float32Array of three numbers per vertex, in the
    * order that the file was made from, or a BufferGeometry whose positions are these. Other files pass it over. */
   setHostMesh(mesh) {
-    if (mesh !== null && !(mesh instanceof Float32Array) && !mesh?.isBufferGeometry)
-      throw new TypeError("mesh: got something else, expected a Float32Array or a BufferGeometry");
-    this.hostMesh = mesh;
+    this.hostMesh = numbersOf(mesh);
     return this;
   }
 
@@ -341,7 +340,7 @@ export class ATHLoader extends Loader {
     const worker = this.#worker();
     const channel = new Channel(worker, () => { worker.files--; });
     worker.files++;
-    channel.send({ type: "open", clip: this.clip, hostMesh: numbersOf(this.hostMesh), ...message }, transfer);
+    channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, ...message }, transfer);
     try {
       await channel.opened;
     } catch (error) {
