@@ -37,6 +37,7 @@ from athcodec.errors import (
     error_class,
 )
 from athcodec.hierarchy import Hierarchy, derived_edges
+from athcodec.host_mesh import HostMesh, mesh_positions
 
 INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
@@ -124,6 +125,8 @@ class AthFile:
         Read all of the file now; a damaged level hides itself and those after it instead of raising.
     limits : Limits, optional
         What the file may ask for; by default those of FORMAT.md.
+    host_mesh : array, MotionClip, str or path-like, optional
+        The mesh that is the rest pose, for files that do not hold one: see `set_host_mesh`.
 
     Attributes
     ----------
@@ -151,6 +154,7 @@ class AthFile:
         strict: bool = False,
         allow_partial: bool = False,
         limits: Limits | None = None,
+        host_mesh: HostMesh | None = None,
     ):
         self.limits = limits or Limits()
         self.bytes_read = 0
@@ -164,6 +168,8 @@ class AthFile:
             self._check_length(strict)
             self._set_tables()
             self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
+            if host_mesh is not None:
+                self.set_host_mesh(host_mesh)
         except BaseException:
             self.close()
             raise
@@ -608,6 +614,8 @@ class AthFile:
             "complete": self.complete,
             "full_level_count": self.full_level_count,
             "format": f"{ct.MAJOR}.{ct.MINOR}",
+            "rest_bytes": sum(chunk.length for kind in (ct.REST, ct.REFINED_REST) for chunk in self._chunks_of(kind)),
+            "host_mesh": None if self.host_checksum is None else {"checksum": self.host_checksum},
             "ath": self.table1(),
             "clips": [
                 {
@@ -781,6 +789,45 @@ class AthFile:
         weights = array.reshape(-1).astype(np.float64)
         return weights if np.isfinite(weights).all() and weights.min() > 0 else None
 
+    # ---- the host's mesh ----
+
+    @property
+    def host_checksum(self) -> str | None:
+        """The checksum, 16 hexadecimal digits, of the mesh that is the rest pose where the file does not hold one; else
+        None."""
+        info = self.core.info
+        return "{:08x}{:08x}".format(*info.host_checksum) if info.rest_is_host else None
+
+    @property
+    def needs_host_mesh(self) -> bool:
+        """Whether the rest pose is a mesh of the host's that has not been given: nothing can be decoded then."""
+        return not self.core.has_rest
+
+    def set_host_mesh(self, mesh: HostMesh) -> None:
+        """Gives the mesh that the file was made for, where it does not hold the rest pose; other files pass it over.
+
+        Parameters
+        ----------
+        mesh : (N, 3) array, MotionClip, str or path-like
+            Positions in the source's order, scene units and axes, which are used as float32, bit for bit; a clip that
+            has them as its rest pose; or a file of any format that `read` knows, of which the rest pose, or else the
+            first frame, is brought to the unit and axes of this file.
+
+        Raises
+        ------
+        WrongHostMesh
+            Where it is another one, by its number of vertices or its checksum.
+        ClipError, OSError
+            Where the mesh cannot be read, or is none.
+        """
+        if self.needs_host_mesh:
+            positions = mesh_positions(mesh, self.metadata)
+            try:
+                with self._lock:
+                    self.core.set_host_mesh(positions)
+            except core_file.CoreError as error:
+                raise self._refusal(error) from None
+
     # ---- segments ----
 
     @cached_property
@@ -868,8 +915,13 @@ class AthFile:
             for offset, size in ranges:
                 self.core.drop(offset, size)
 
-    def check(self) -> None:
+    def check(self, decode: bool = True) -> None:
         """Reads every chunk and decodes every level.
+
+        Parameters
+        ----------
+        decode : bool
+            False: compare checksums and read static data, which takes no mesh of the host's, and decode nothing.
 
         Raises
         ------
@@ -887,7 +939,7 @@ class AthFile:
         except ClipError as error:
             raise BadChunk(f"static data: {error}") from None
         ready = None
-        for segment in range(self.segment_count):
+        for segment in range(self.segment_count if decode else 0):
             for level in range(self.level_count):
                 ready = self.prepare(segment, level, ready)
 

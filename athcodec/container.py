@@ -29,6 +29,7 @@ MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR = 0, 7
 NO_LEVEL = 255
 ONLY_TIPS = 8  # of Rotation
+IS_HOST = 4  # Method of REST
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
@@ -235,6 +236,7 @@ class ChunkStore:
 _HIERARCHY = struct.Struct("<HHHH")
 _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
+_MESH_CHECKSUM = struct.Struct("<II")
 _TIME = struct.Struct("<B")
 _STEADY = struct.Struct("<dd")
 _RATE = struct.Struct("<H")
@@ -265,8 +267,8 @@ def pack_hierarchy(thresholds, stream: bytes) -> bytes:
 
 @dataclass
 class Rest:
-    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps. Origin and
-    step are numbers of float32."""
+    """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps; where the rest
+    pose `is_host`, a mesh of the host's, its checksum. Origin and step are numbers of float32."""
 
     origin: np.ndarray
     step: float
@@ -274,14 +276,12 @@ class Rest:
     stream: bytes = b""
     exact: bool = False
     adaptive: bool = False
+    is_host: bool = False
 
 
 def pack_rest(rest: Rest) -> bytes:
-    is_float64 = rest.source_dtype == np.float64
-    return (
-        _REST.pack(int(rest.exact) | int(is_float64) << 1 | int(rest.adaptive) << 3, *rest.origin, rest.step)
-        + rest.stream
-    )
+    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.adaptive) << 3
+    return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
 
 
 def pack_source_rest(step: float, stream: bytes) -> bytes:
@@ -290,6 +290,12 @@ def pack_source_rest(step: float, stream: bytes) -> bytes:
 
 def pack_exact_source_rest(stream: bytes) -> bytes:
     return b"\1" + stream
+
+
+def mesh_checksum(mesh: np.ndarray) -> bytes:
+    """By which a file knows the mesh of a host, (N, 3) in source order."""
+    data = (mesh.astype("<f4") + np.float32(0)).tobytes()  # -0.0 is 0.0
+    return _MESH_CHECKSUM.pack(crc32c(data), crc32c(data[::-1]))
 
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:

@@ -80,6 +80,8 @@ class Info(Structure):
         ("eta", c_uint32),
         ("lam", c_uint32),
         ("rest_is_float64", c_int32),
+        ("rest_is_host", c_int32),
+        ("host_checksum", c_uint32 * 2),
     ]
 
 
@@ -192,9 +194,10 @@ class File:
         )
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
+        self.has_rest = not self.info.rest_is_host
         self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
-        self._refined = 0  # levels up to this one have what their segments share
+        self._refined = -1  # levels up to this one have what their segments share
         self._building = threading.Lock()
 
     @staticmethod
@@ -202,6 +205,14 @@ class File:
         if result not in (OK, HELD):
             raise CoreError(result, fault)
         return result
+
+    def set_host_mesh(self, mesh: np.ndarray) -> None:
+        """The rest pose of a file that does not hold it, (N, 3) float32 in source order."""
+        fault = Fault()
+        with self._building:
+            result = lib.ath_set_host_mesh(self._file, mesh.ctypes.data, mesh.strides[0], len(mesh), byref(fault))
+            self._check(result, fault)
+            self.has_rest = True
 
     def build(self) -> None:
         """Computes the bases that all segments share, unless that is done."""

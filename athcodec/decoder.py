@@ -23,6 +23,7 @@ from athcodec.ath import stem_maps
 from athcodec.ath_file import AthFile, Clip, Level, median_rate
 from athcodec.container import Limits
 from athcodec.errors import BadChunk, LevelUnavailable
+from athcodec.host_mesh import HostMesh
 from athcodec.joining import metadata_of
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))
@@ -61,6 +62,7 @@ def open(
     strict: bool = False,
     allow_partial: bool = False,
     limits: Limits | None = None,
+    host_mesh: HostMesh | None = None,
 ) -> Decoder:
     """Opens an .ath file for playing one of its clips.
 
@@ -77,6 +79,9 @@ def open(
         Read all of the file now; a damaged level hides itself and those after it instead of raising.
     limits : Limits, optional
         What the file may ask for; by default those of FORMAT.md.
+    host_mesh : (N, 3) array, MotionClip, str or path-like, optional
+        The mesh that is the rest pose, for files that do not hold one (`encode`, host_rest): positions in the source's
+        order, or what has them; see AthFile.set_host_mesh. Without it such a file opens, and says what it holds.
 
     Returns
     -------
@@ -92,7 +97,7 @@ def open(
     RemoteError, OSError
         Where it cannot be read.
     """
-    file = AthFile(path, strict=strict, allow_partial=allow_partial, limits=limits)
+    file = AthFile(path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=host_mesh)
     try:
         return Decoder(file, clip, closes_file=True)
     except BaseException:

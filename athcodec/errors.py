@@ -98,6 +98,18 @@ class TrailingBytes(FormatError):
     code, name = 11, "TRAILING_BYTES"
 
 
+class NeedsHostMesh(FormatError):
+    """The rest pose is not in the file: it is a mesh that whoever plays it has, and that was not given."""
+
+    code, name = 12, "NEEDS_HOST_MESH"
+
+
+class WrongHostMesh(FormatError):
+    """The mesh that was given is not the one that the file was made for."""
+
+    code, name = 13, "WRONG_HOST_MESH"
+
+
 class LevelUnavailable(AthError, LookupError):
     """A level or frame was asked for that the file, or what is there of it, does not hold."""
 

@@ -17,11 +17,13 @@ import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote, urlsplit
 
 from athcodec.atomic_files import is_url, new_file
 from athcodec.decoder import open as open_ath
 from athcodec.errors import AthError, MissingExtra
+from athcodec.host_mesh import HostMesh
 
 WEB = Path(__file__).parent / "viewer" / "web"
 PAGE = WEB / "index.html"
@@ -35,7 +37,12 @@ _POLICY = (
 )
 
 
-def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip: str | None = None) -> int:
+def export_page(
+    path: str | os.PathLike[str],
+    page: str | os.PathLike[str],
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
+) -> int:
     """Writes one page that plays an .ath file without any other file or server.
 
     Parameters
@@ -46,6 +53,8 @@ def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip
         The HTML file to write; it appears when it is complete.
     clip : str, optional
         The name of the clip to begin with; by default the first.
+    host_mesh : array, MotionClip, str or path-like, optional
+        The mesh that is the rest pose, for a file that does not hold one: see AthFile.set_host_mesh.
 
     Returns
     -------
@@ -55,17 +64,23 @@ def export_page(path: str | os.PathLike[str], page: str | os.PathLike[str], clip
     Raises
     ------
     AthError
-        Where `path` is no .ath file, or has no such clip.
+        Where `path` is no .ath file, has no such clip, or needs another mesh.
     OSError
         Where a file cannot be read or written.
     """
     data = _read(path)
-    with open_ath(io.BytesIO(data), clip=clip):
-        pass
-    text = self_contained(data, file_name(path), clip).encode()
+    mesh = _checked(io.BytesIO(data), clip, host_mesh)
+    text = self_contained(data, file_name(path), clip, mesh).encode()
     with new_file(page) as out:
         out.write(text)
     return len(text)
+
+
+def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None) -> bytes | None:
+    """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one.
+    Raises AthError, OSError."""
+    with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
+        return None if decoder.file.host_checksum is None else decoder.level_rest(0).astype("<f4").tobytes()
 
 
 def _read(path: str | os.PathLike[str]) -> bytes:
@@ -77,7 +92,7 @@ def _read(path: str | os.PathLike[str]) -> bytes:
         return file.read()
 
 
-def self_contained(data: bytes, name: str, clip: str | None = None) -> str:
+def self_contained(data: bytes, name: str, clip: str | None = None, mesh: bytes | None = None) -> str:
     """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
     text = PAGE.read_text("utf-8")
     modules = json.loads(_MAP.search(text)[1])["imports"]
@@ -89,6 +104,8 @@ def self_contained(data: bytes, name: str, clip: str | None = None) -> str:
         f'<script type="text/plain" id="ath-file" data-name="{html.escape(name)}"{first}>'
         f"{base64.b64encode(data).decode()}</script>"
     )
+    if mesh is not None:
+        file += f'\n<script type="text/plain" id="ath-mesh">{base64.b64encode(mesh).decode()}</script>'
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
         (r'<link rel="modulepreload"[^>]*>\n', ""),
@@ -120,7 +137,11 @@ def file_name(path: str | os.PathLike[str]) -> str:
 
 
 def serve(
-    path: str | os.PathLike[str], port: int = 0, ready: Callable[[str], None] = print, clip: str | None = None
+    path: str | os.PathLike[str],
+    port: int = 0,
+    ready: Callable[[str], None] = print,
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
 ) -> None:
     """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
 
@@ -134,6 +155,8 @@ def serve(
         Called with the page's address when it can be opened.
     clip : str, optional
         The name of the clip to begin with; by default the first.
+    host_mesh : array, MotionClip, str or path-like, optional
+        As `export_page`.
 
     Raises
     ------
@@ -142,20 +165,24 @@ def serve(
     AthError, OSError
         As `export_page`.
     """
-    _check(path, clip)
+    _check_server(path)
+    mesh = _checked(path, clip, host_mesh)
     import asyncio
 
     from aiohttp import web
 
     async def run() -> None:
         place = f"file/{secrets.token_urlsafe(12)}/{file_name(path)}"
-        runner = web.AppRunner(application(path, place), access_log=None)
+        runner = web.AppRunner(application(path, place, mesh), access_log=None)
         await runner.setup()
         try:
             site = web.TCPSite(runner, "127.0.0.1", port)
             await site.start()
             address = f"http://127.0.0.1:{site._server.sockets[0].getsockname()[1]}"
-            ready(f"{address}/?file={quote(place)}" + ("" if clip is None else f"&clip={quote(clip, safe='')}"))
+            more = ("" if clip is None else f"&clip={quote(clip, safe='')}") + (
+                "" if mesh is None else f"&mesh={quote(place)}.mesh"
+            )
+            ready(f"{address}/?file={quote(place)}{more}")
             await asyncio.Event().wait()
         finally:
             await runner.cleanup()
@@ -163,14 +190,12 @@ def serve(
     asyncio.run(run())
 
 
-def _check(path: str | os.PathLike[str], clip: str | None) -> None:
+def _check_server(path: str | os.PathLike[str]) -> None:
     try:
         import aiohttp  # noqa: F401
     except ImportError:
         raise MissingExtra(f"athcodec view: needs aiohttp: {INSTALL}; --export PAGE works without") from None
     _refuse_other_urls(path)
-    with open_ath(path, clip=clip):
-        pass
 
 
 def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
@@ -180,12 +205,16 @@ def _refuse_other_urls(path: str | os.PathLike[str]) -> None:
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
-def application(path: str | os.PathLike[str], place: str):
-    """The aiohttp application: the page, and the file at `place`, which only the page's address tells."""
+def application(path: str | os.PathLike[str], place: str, mesh: bytes | None = None):
+    """The aiohttp application: the page, and the file at `place`, which only the page's address tells; beside that the
+    host's mesh, for a file that needs one."""
     from aiohttp import ClientSession, web
 
     async def page(request):
         return web.FileResponse(PAGE)
+
+    async def host_mesh(request):
+        return web.Response(body=mesh, content_type="application/octet-stream")
 
     async def local(request):
         return web.FileResponse(path, headers={"Content-Type": "application/octet-stream", "Cache-Control": "no-cache"})
@@ -211,6 +240,8 @@ def application(path: str | os.PathLike[str], place: str):
     if is_url(path):
         app.cleanup_ctx.append(client)
     app.router.add_get(f"/{quote(place)}", remote if is_url(path) else local)
+    if mesh is not None:
+        app.router.add_get(f"/{quote(place)}.mesh", host_mesh)
     app.router.add_static("/", WEB)
     return app
 

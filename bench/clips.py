@@ -78,12 +78,15 @@ def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> Non
 
 
 @contextmanager
-def encoded(path: Path, rel_error: float, effort: str = "default", ladder: Sequence[float] = ()) -> Iterator[Encoded]:
+def encoded(
+    path: Path, rel_error: float, effort: str = "default", ladder: Sequence[float] = (), host_rest: bool = False
+) -> Iterator[Encoded]:
     """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
         file = Path(folder) / "clip.ath"
-        summary = athcodec.encode(clip, file, rel_error=rel_error, attributes="none", effort=effort, ladder=ladder)
-        with athcodec.open(file, strict=True) as decoder:
+        settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
+        summary = athcodec.encode(clip, file, rel_error=rel_error, **settings)
+        with athcodec.open(file, strict=True, host_mesh=clip) as decoder:
             yield Encoded(clip, summary, decoder)
 
 

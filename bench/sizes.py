@@ -22,7 +22,7 @@ REL_ERRORS = (1e-3, 1e-4, 1e-5)
 SIZES_NOTE = """
 Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames.
 Ratio: float32 positions over the whole file. RMS over the diagonal; KG in per cent; motion: RMS error over
-the RMS distance from the rest pose.
+the RMS distance from the rest pose. Rest host: bytes of the whole file where the host has the rest pose (--rest host).
 """
 
 CHUNKS_NOTE = """
@@ -56,7 +56,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 case = {"clip": path.stem, "bound": f"{rel_error:g}", "effort": effort, "ladder": ladder}
                 with encoded(path, rel_error, effort, LADDERS[ladder]) as result:
                     meter = measure(result.clip, result.decoder)
-                sizes.append(case | _size_row(result, meter, rel_error))
+                with encoded(path, rel_error, effort, LADDERS[ladder], host_rest=True) as hosted:
+                    host_bytes = hosted.summary.bytes
+                sizes.append(case | _size_row(result, meter, rel_error) | {"rest host": host_bytes})
                 chunks.append(case | _chunk_row(result.summary.chunk_bytes))
                 choices.append(case | result.summary.choices)
                 if not sizes[-1]["kept"]:

@@ -3,9 +3,11 @@
     python -m spec.conformance DECODER-COMMAND...          any program
     python -m spec.conformance --own c|wasm|reference      those of this repository
 
-A program is called as `DECODER-COMMAND... FILE ITEM` for every item of every vector. It has to write the
-answer, raw, to its standard output and exit with 0; or, where the file is to be refused, the error's name
-(FORMAT.md, "Errors") as the first word of its standard error, and exit with another status. The items:
+A program is called as `DECODER-COMMAND... FILE ITEM` for every item of every vector, and with one argument more,
+`MESH`, where a file of the vector's name ends in .mesh: the positions of the host's mesh, binary32, little-endian, in
+source order, to be given to the decoder before it is asked for `rest` or a level. It has to write the answer, raw,
+to its standard output and exit with 0; or, where the file is to be refused, the error's name (FORMAT.md,
+"Errors") as the first word of its standard error, and exit with another status. The items:
 
     strict      opens strictly; no answer
     open        opens for streaming, as all that follow; no answer
@@ -57,6 +59,8 @@ ERRORS = (
     "BAD_CHUNK",
     "LIMIT_EXCEEDED",
     "TRAILING_BYTES",
+    "NEEDS_HOST_MESH",
+    "WRONG_HOST_MESH",
 )
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
@@ -82,6 +86,16 @@ class Vector:
     @property
     def path(self) -> Path:
         return FOLDER / self.name
+
+    @property
+    def mesh_path(self) -> Path | None:
+        """Of the host's mesh, where there is one."""
+        path = self.path.with_suffix(".mesh")
+        return path if path.exists() else None
+
+    @property
+    def mesh(self) -> bytes | None:
+        return self.mesh_path and self.mesh_path.read_bytes()
 
     @property
     def valid(self) -> bool:
@@ -163,10 +177,10 @@ def items(data: bytes) -> list[str]:
     return [*NO_ANSWER, *map(str, range(file.header.level_count)), "rest", "time", "clips", "static"]
 
 
-def result(ask: Callable[[bytes, str], bytes], data: bytes, item: str) -> str:
+def result(ask: Callable[..., bytes], data: bytes, item: str, mesh: bytes | None = None) -> str:
     """RESULT of one item, by a function that raises Refused."""
     try:
-        return checksum_of(data, item, ask(data, item))
+        return checksum_of(data, item, ask(data, item, mesh))
     except Refused as error:
         return str(error)
 
@@ -179,14 +193,14 @@ def command(words: list[str]) -> Decoder:
 
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
-            yield ask_command(words, vector.path, item)
+            yield ask_command([*words, str(vector.path), item, *filter(None, [vector.mesh_path])])
 
     return decoder
 
 
-def ask_command(words: list[str], path: Path, item: str) -> bytes | Exception:
+def ask_command(words: list[str | Path]) -> bytes | Exception:
     try:
-        done = subprocess.run([*words, str(path), item], capture_output=True, timeout=SECONDS)
+        done = subprocess.run(words, capture_output=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
         return OSError(f"no answer within {SECONDS} s")
     if done.returncode == 0:
@@ -197,38 +211,47 @@ def ask_command(words: list[str], path: Path, item: str) -> bytes | Exception:
     return Refused(first)
 
 
-def one_by_one(ask: Callable[[bytes, str], bytes]) -> Decoder:
-    """A function that takes a file's bytes and an item, and may raise Refused."""
+def one_by_one(ask: Callable[[bytes, str, bytes | None], bytes]) -> Decoder:
+    """A function that takes a file's bytes, an item and the host's mesh, and may raise Refused."""
 
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
             try:
-                yield ask(vector.path.read_bytes(), item)
+                yield ask(vector.path.read_bytes(), item, vector.mesh)
             except Refused as error:
                 yield error
 
     return decoder
 
 
+def needs_rest(item: str) -> bool:
+    return item == "rest" or item.isdecimal()
+
+
 @lru_cache(maxsize=1)
-def opened(data: bytes, strict: bool) -> rd.AthFile:
-    return rd.AthFile(data, strict=strict)
+def opened(data: bytes, strict: bool, mesh: bytes | None) -> rd.AthFile:
+    file = rd.AthFile(data, strict=strict)
+    if mesh is not None:
+        file.set_host_mesh(mesh)
+    return file
 
 
-def reference(data: bytes, item: str) -> bytes:
+def reference(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
     try:
-        return rd.raw(opened(data, item == "strict"), item)
+        return rd.raw(opened(data, item == "strict", mesh if needs_rest(item) else None), item)
     except rd.AthError as error:
         raise Refused(error.name) from None
 
 
-def package(data: bytes, item: str) -> bytes:
+def package(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
     """The C core through Python, and the package's reader of static data."""
     import athcodec
     from athcodec.errors import FormatError, LevelUnavailable
 
     try:
         with athcodec.open(BytesIO(data), strict=item == "strict") as decoder:
+            if mesh is not None and needs_rest(item):
+                decoder.file.set_host_mesh(np.frombuffer(mesh, "<f4").reshape(-1, 3))
             return ask_package(decoder, item)
     except FormatError as error:
         raise Refused(error.name) from None
@@ -297,8 +320,9 @@ const positions = (file, level) => {
   }
   return all;
 };
-const answer = ({ path, item }) => {
+const answer = ({ path, item, mesh }) => {
   const file = AthFile.open(new Uint8Array(readFileSync(path)));
+  if (mesh) file.setHostMesh(new Float32Array(new Uint8Array(readFileSync(mesh)).buffer));
   const array = items[item] ? items[item](file) : positions(file, Number(item));
   const bytes = Buffer.from(array.buffer, array.byteOffset, array.byteLength).toString("base64");
   file.dispose();
@@ -320,7 +344,12 @@ def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
     node = shutil.which("node")
     if node is None:
         raise OSError("node: got none on PATH; expected Node.js 18 or newer")
-    request = {"module": DECODER_MODULE.as_uri(), "jobs": [{"path": str(v.path), "item": item} for v, item in jobs]}
+    asked = [
+        {"path": str(vector.path), "item": item}
+        | ({"mesh": str(vector.mesh_path)} if vector.mesh_path and needs_rest(item) else {})
+        for vector, item in jobs
+    ]
+    request = {"module": DECODER_MODULE.as_uri(), "jobs": asked}
     done = subprocess.run(
         [node, "--input-type=module", "-e", NODE_SCRIPT],
         input=json.dumps(request),

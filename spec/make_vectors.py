@@ -40,6 +40,7 @@ from spec.scripted import (
     grown,
     hierarchy_chunk,
     hierarchy_script,
+    host_rest_chunk,
     refined_rest_chunk,
     refined_row,
     rest_chunk,
@@ -69,6 +70,7 @@ class Vector:
     error: str = ""
     item: str = ""
     scripted: bool = True
+    mesh: bytes | None = None  # of the host, which is given to the decoder
 
     @property
     def path(self) -> str:
@@ -78,12 +80,24 @@ class Vector:
 VECTORS: list[Vector] = []
 
 
-def valid(name: str, reason: str, make: Plant | Draft | bytes | Callable, scripted: bool = True) -> None:
-    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted))
+def valid(
+    name: str,
+    reason: str,
+    make: Plant | Draft | bytes | Callable,
+    scripted: bool = True,
+    mesh: np.ndarray | None = None,
+) -> None:
+    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), scripted=scripted, mesh=mesh_bytes(mesh)))
 
 
-def invalid(name: str, error: str, item: str | int, reason: str, make: Draft | bytes | Callable) -> None:
-    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), error, str(item)))
+def invalid(
+    name: str, error: str, item: str | int, reason: str, make: Draft | bytes | Callable, mesh: np.ndarray | None = None
+) -> None:
+    VECTORS.append(Vector(name, reason, lambda: bytes_of(make), error, str(item), mesh=mesh_bytes(mesh)))
+
+
+def mesh_bytes(mesh: np.ndarray | None) -> bytes | None:
+    return None if mesh is None else mesh.tobytes()
 
 
 def bytes_of(made: Plant | Draft | bytes | Callable) -> bytes:
@@ -3136,6 +3150,100 @@ def refined_run(count: int) -> bytes:
     return write(rd.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
 
 
+# ---- the host's mesh ---------------------------------------------------------------------------------------
+
+MESH = np.array(grown(FORK, 5), "<f4") / 4 + np.float32(0.1)
+ORDER = [3, 0, 4, 1, 2]  # of the fork's vertices in the source
+
+
+def hosted(mesh: np.ndarray = MESH, **fields) -> Plant:
+    """The fork, whose rest pose is the host's mesh; its vertices stand in another order in the source."""
+    return forked(**{"mesh": mesh, "vertex_source": ORDER} | fields)
+
+
+valid("host-mesh", "the rest pose is the host's mesh, in source order", hosted, mesh=MESH)
+valid(
+    "host-mesh-far",
+    "a mesh far from 0, less an origin",
+    lambda: hosted(MESH * np.float32(1e5), origin=(2e5, -1e5, 0.1)),
+    mesh=MESH * np.float32(1e5),
+)
+AWKWARD_MESH = np.array([*AWKWARD_FLOATS, 0.0, -0.0, 0.0, 1.0, -2.0, -0.5], "<f4").reshape(5, 3)
+valid(
+    "host-mesh-awkward",
+    "-0.0, which counts as 0.0, subnormal and largest numbers in the host's mesh",
+    lambda: hosted(AWKWARD_MESH),
+    mesh=AWKWARD_MESH,
+)
+valid("host-mesh-wide", "binary64 positions about a mesh of binary32", lambda: hosted(is_float64=True), mesh=MESH)
+NO_REFINED_REST = [(rd.REFINED_REST, 3, 0), (rd.REFINED_REST, 4, 0)]
+valid(
+    "host-mesh-layers",
+    "three layers about the host's mesh, which none refines",
+    lambda: layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER),
+    mesh=MESH,
+)
+HOSTED_STEMS = [Stem(-1, 70), Stem(0, 9, 60, SHEET), Stem(1, 4, 8)]
+HOSTED_MESH = np.array(grown(HOSTED_STEMS, 6), "<f4")
+valid(
+    "host-mesh-sheets",
+    "sheets and long stems of the host's mesh",
+    lambda: moving(HOSTED_STEMS, 71, frames=3, mesh=HOSTED_MESH, heads=HEADS),
+    mesh=HOSTED_MESH,
+)
+invalid("host-mesh-none", "NEEDS_HOST_MESH", 0, "no mesh is given", hosted)
+invalid("host-mesh-short", "WRONG_HOST_MESH", 0, "a mesh with one vertex less", hosted, MESH[:-1])
+invalid(
+    "host-mesh-long", "WRONG_HOST_MESH", 0, "a mesh with one vertex more", hosted, np.append(MESH, MESH[:1], axis=0)
+)
+invalid("host-mesh-in-file-order", "WRONG_HOST_MESH", 0, "the mesh in file order", hosted, MESH[ORDER])
+for name, value in (("nan", NAN), ("infinite", -INFINITY)):
+    INFINITE_MESH = np.append(MESH[:-1], [[0.0, np.float32(value), 0.0]], axis=0).astype("<f4")
+    invalid(
+        f"host-mesh-{name}",
+        "WRONG_HOST_MESH",
+        0,
+        f"the file's own mesh has {value}",
+        lambda mesh=INFINITE_MESH: hosted().draft().change(rd.REST, content=host_rest_chunk(mesh)),
+        INFINITE_MESH,
+    )
+for at, which in ((17, "first"), (21, "second")):
+    invalid(
+        f"host-mesh-{which}-checksum",
+        "WRONG_HOST_MESH",
+        0,
+        f"a mesh that differs by the {which} checksum alone",
+        lambda at=at: hosted().draft().change(rd.REST, content=flipped(host_rest_chunk(MESH), at)),
+        MESH,
+    )
+for name, why, bits in (("exact", "Is_Exact", {"exact": 1}), ("float64", "Rest_Is_Float64", {"rest_type": 1})):
+    prelude(f"host-{name}", rd.REST, f"{why} beside Is_Host in Method", lambda bits=bits: host_rest_chunk(MESH, **bits))
+for name, why, change in (
+    ("no-checksum", "Is_Host without checksums", lambda chunk: chunk[:17]),
+    ("checksum-short", "Is_Host with 7 bytes of checksums", lambda chunk: chunk[:-1]),
+    ("checksum-long", "Is_Host with a byte behind the checksums", lambda chunk: chunk + b"\0"),
+):
+    prelude(f"host-{name}", rd.REST, why, lambda change=change: change(host_rest_chunk(MESH)))
+prelude(
+    "step-of-host",
+    rd.REST,
+    "Rest_Step is 0 with Is_Host, where it has no meaning",
+    lambda: host_rest_chunk(MESH, step=0.0),
+)
+invalid(
+    "refined-rest-of-host",
+    "BAD_CHUNK",
+    3,
+    "REFINED_REST of the host's mesh",
+    lambda: (
+        layered(3, *NO_REFINED_REST, mesh=MESH, vertex_source=ORDER)
+        .draft()
+        .add(Entry(rd.REFINED_REST, refined_rest_chunk(b""), 3))
+    ),
+    MESH,
+)
+
+
 # ---- invalid: static data ----------------------------------------------------------------------------------
 
 
@@ -3424,14 +3532,14 @@ zstd_frame(
 # ---- making them -------------------------------------------------------------------------------------------
 
 
-def results(data: bytes) -> dict[str, str]:
+def results(data: bytes, mesh: bytes | None = None) -> dict[str, str]:
     """The reference decoder's result for every item of a file."""
-    return {item: conformance.result(conformance.reference, data, item) for item in conformance.items(data)}
+    return {item: conformance.result(conformance.reference, data, item, mesh) for item in conformance.items(data)}
 
 
 def line_of(vector: Vector, data: bytes) -> str:
     """The line in expected.txt. Raises ValueError if the reference decoder's result is not the vector's."""
-    found = results(data)
+    found = results(data, vector.mesh)
     wrong = {item: result for item, result in found.items() if result in conformance.ERRORS}
     if (vector.error and found.get(vector.item) != vector.error) or (not vector.error and wrong):
         raise ValueError(f"{vector.path}: got {found}; expected {vector.error or 'no error'} {vector.item}")
@@ -3456,6 +3564,8 @@ def make(every: bool = False, folder: Path = conformance.FOLDER) -> int:
         data = vector.make()
         lines.append(line_of(vector, data))
         (folder / vector.path).write_bytes(data)
+        if vector.mesh is not None:
+            (folder / vector.path).with_suffix(".mesh").write_bytes(vector.mesh)
         made += 1
     if not lines or not lines[0].startswith("#"):
         lines = [f"# {text}" if text else "#" for text in conformance.LISTING.splitlines()] + lines

@@ -98,6 +98,7 @@ SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255
 
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
+IS_HOST = 4  # of REST's Method
 METADATA, FACES, EDGES, CLIPS, SOURCE_REST = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7, 8
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
 ATTRIBUTE = OPTIONAL | 32
@@ -2557,7 +2558,8 @@ class AthFile:
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
             self._read_rest(self.content(REST))
-            self.rest()
+            if self.find(SOURCE_REST):
+                self.rest()
             self.times = frame_times(self.content(TIME), self.clips)
 
     def _check_length(self, strict: bool) -> None:
@@ -2634,25 +2636,48 @@ class AthFile:
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 17, "REST is too short")
-        require(chunk[0] & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE) == 0, "Method has reserved bits")
+        known = REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE
+        require(chunk[0] == IS_HOST or chunk[0] & ~known == 0, "Method has reserved bits, or others beside Is_Host")
         require(chunk[0] & REST_EXACT == 0 or chunk[0] & REST_ADAPTIVE == 0, "a rest pose is exact and adaptive")
         self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
         step = f32(chunk, 13)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
         self.rest_type = np.dtype("<f8" if chunk[0] & REST_FLOAT64 else "<f4")
+        self._shown_rest: np.ndarray | None = None
         self._rests: list[RestLayer] = []  # and those that refine it; none where it is exact
+        self._plans: list[Plan] = []  # of the layers, from level 1 on
+        if chunk[0] == IS_HOST:
+            require(len(chunk) == 17 + 8, "Rest_Body is not two checksums")
+            self.mesh_checksums = u32(chunk, 17), u32(chunk, 21)
+            return  # until there is a mesh
         if chunk[0] & REST_EXACT == 0:
             self._is_adaptive = chunk[0] & REST_ADAPTIVE != 0
             coded = decode_rest(chunk[17:], self.branches, step, None, self._is_adaptive)
             self._rests = [coded]
             rest = np.array(coded.rest)
-            shown = rest + self.origin
+            self._set_rest(rest, rest + self.origin)
         else:
             shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & REST_FLOAT64)))
-            rest = shown - self.origin
+            self._set_rest(shown - self.origin, shown)
+
+    def _set_rest(self, rest: np.ndarray, shown: np.ndarray) -> None:
         self.plan.rest = rest
-        self._plans: list[Plan] = []  # of the layers, from level 1 on
         self._shown_rest = shown.astype(self.rest_type)
+
+    def set_host_mesh(self, mesh: bytes) -> None:
+        """Of a file whose rest pose is the host's mesh: its positions, binary32 in source order."""
+        require(len(mesh) == 12 * len(self.vertex_source), "the mesh has other vertices", "WRONG_HOST_MESH")
+        bits = np.frombuffer(mesh, "<u4").reshape(-1, 3)
+        bits = np.where(bits == 1 << 31, 0, bits).astype("<u4")  # 0.0 for -0.0
+        require(
+            bool(np.isfinite(bits.view("<f4")).all()), "the mesh has numbers that are not finite", "WRONG_HOST_MESH"
+        )
+        data = bits.tobytes()
+        checksums = crc32c(data), crc32c(data[::-1])
+        require(checksums == self.mesh_checksums, "the mesh has other checksums", "WRONG_HOST_MESH")
+        shown = bits.view("<f4")[self.vertex_source].astype(np.float64)
+        with np.errstate(all="ignore"):
+            self._set_rest(shown - self.origin, shown)
 
     # Layers: level h + 1 + q is that of layer q, those below are of layer 0 as well.
 
@@ -2674,6 +2699,7 @@ class AthFile:
 
     def _plan_of(self, level: int, q: int) -> Plan:
         """That of a layer, on its own rest pose, as it serves to show a level."""
+        require(self._shown_rest is not None, "no mesh of the host has been given", "NEEDS_HOST_MESH")
         if level == 0:
             return self.plan
         for layer in range(len(self._plans), q + 1):
@@ -2878,23 +2904,32 @@ class AthFile:
 # ---- command -----------------------------------------------------------------------------------------------
 
 
-def raw(file: AthFile, what: str) -> bytes:
+def raw(file: AthFile, what: str, mesh: bytes | None = None) -> bytes:
     """The answer to an item of conformance.py."""
     if what in ("strict", "open"):
         return b""
     if what == "static":
         return file.static_bytes()
-    if what == "rest":
-        return file.rest().tobytes()
     if what == "time":
         return np.concatenate(file.times).astype("<f8").tobytes()
     if what == "clips":
         return b"".join(clip.entry() for clip in file.clips)
-    return file.positions(int(what)).tobytes()
+    if mesh is not None:
+        file.set_host_mesh(mesh)
+    return (file.rest() if what == "rest" else file.positions(int(what))).tobytes()
+
+
+def mesh_in(path: str | None) -> bytes | None:
+    if path is None:
+        return None
+    with open(path, "rb") as source:
+        return source.read()
 
 
 def show(options: argparse.Namespace, data: bytes) -> None:
     file = AthFile(data, strict=options.strict)
+    if options.host_mesh:
+        file.set_host_mesh(mesh_in(options.host_mesh))
     level = file.deepest if options.level is None else options.level
     positions = file.positions(level)
     frames, vertices, _ = positions.shape
@@ -2911,18 +2946,20 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Decodes a level of an .ath file as FORMAT.md says.")
     parser.add_argument("file")
     parser.add_argument("what", nargs="?", help=argparse.SUPPRESS)
+    parser.add_argument("mesh", nargs="?", help=argparse.SUPPRESS)
     parser.add_argument("--level", type=int, help="by default the deepest complete one")
     parser.add_argument("--strict", action="store_true", help="the file has to be as long as it says")
     parser.add_argument("--out", help="write the positions, (frames, vertices, 3), to this .npy file")
     parser.add_argument("--checksum", action="store_true", help="print their CRC-32C, little-endian, source order")
-    parser.add_argument("--raw", action="store_true", help="answer as spec/conformance.py asks: FILE WHAT")
+    parser.add_argument("--host-mesh", help="positions of the mesh that is the rest pose: binary32, little-endian")
+    parser.add_argument("--raw", action="store_true", help="answer as spec/conformance.py asks: FILE WHAT [MESH]")
     options = parser.parse_args(words)
     try:
         with open(options.file, "rb") as source:
             data = source.read()
         if options.raw:
             what = options.what or "open"
-            sys.stdout.buffer.write(raw(AthFile(data, strict=what == "strict"), what))
+            sys.stdout.buffer.write(raw(AthFile(data, strict=what == "strict"), what, mesh_in(options.mesh)))
         else:
             show(options, data)
     except (AthError, OSError, ValueError) as error:

@@ -422,6 +422,12 @@ def rest_chunk(
     return struct.pack("<B3ff", exact | rest_type << 1 | reserved << 2, *origin, step) + stream
 
 
+def host_rest_chunk(mesh: np.ndarray, origin=(0.0, 0.0, 0.0), **fields) -> bytes:
+    data = (mesh + np.float32(0)).tobytes()  # 0.0 for -0.0
+    checksums = struct.pack("<II", rd.crc32c(data), rd.crc32c(data[::-1]))
+    return rest_chunk(checksums, **{"origin": origin, "step": 1.0, "reserved": rd.IS_HOST >> 2} | fields)
+
+
 def refined_rest_chunk(stream: bytes, step: float = 0.0625) -> bytes:
     return struct.pack("<f", step) + stream
 
@@ -494,6 +500,7 @@ class Plant:
     points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
     source_rest: bytes | None = None  # SOURCE_REST
+    mesh: np.ndarray | None = None  # of the host, in source order, in place of a rest pose
     time: bytes | None = None  # TIME
     branch_source: list | None = None
     vertex_source: list | None = None
@@ -515,10 +522,10 @@ class Plant:
             len(self.stems),
             vertices,
         )
-        branches, *_ = rd.decode_hierarchy(stream, len(self.stems), vertices)
+        branches, _, vertex_source = rd.decode_hierarchy(stream, len(self.stems), vertices)
         rest = self._rest(branches)
         self.plan = self.level_0 = rd.Plan(branches)
-        rests = self._set_rest(branches, rest)
+        rests = self._set_rest(branches, rest, vertex_source)
         clips = self.clips or (rd.Clip(self.frames, self.segments),)
         entries = [
             Entry(rd.HIERARCHY, hierarchy_chunk(stream)),
@@ -567,6 +574,8 @@ class Plant:
         return self.draft().file()
 
     def _rest(self, branches: list) -> bytes:
+        if self.mesh is not None:
+            return host_rest_chunk(self.mesh, self.origin)
         if self.rest is not None:
             return self.rest
         points = grown(self.stems) if self.points is None else self.points
@@ -578,9 +587,14 @@ class Plant:
             rest_type=int(self.is_float64),
         )
 
-    def _set_rest(self, branches: list, chunk: bytes) -> list[rd.RestLayer]:
-        """The rest pose of REST, for those that refine it; none where it is exact."""
+    def _set_rest(self, branches: list, chunk: bytes, vertex_source: list) -> list[rd.RestLayer]:
+        """The rest pose of REST, for those that refine it; none where it is exact or the host's."""
         with np.errstate(all="ignore"):
+            if self.mesh is not None:
+                self.plan.rest = (self.mesh[vertex_source] + np.float32(0)).astype(float) - np.float32(
+                    self.origin
+                ).astype(float)
+                return []
             if chunk[0] & 1:
                 points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2))
                 self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3f", chunk, 1), float)

@@ -67,6 +67,8 @@ class Info(ctypes.Structure):
         ("eta", c_uint32),
         ("lambda_", c_uint32),
         ("rest_is_float64", c_int32),
+        ("rest_is_host", c_int32),
+        ("host_checksum", c_uint32 * 2),
     ]
 
 
@@ -132,6 +134,7 @@ _SIGNATURES = {
     "ath_front": (c_int, [c_void_p, c_size_t, POINTER(Limits), POINTER(c_size_t), POINTER(c_size_t), POINTER(Fault)]),
     "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(Limits), POINTER(Fault)]),
     "ath_fault_text": (c_size_t, [POINTER(Fault), c_char_p, c_size_t]),
+    "ath_set_host_mesh": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, POINTER(Fault)]),
     "ath_build_size": (c_size_t, [c_void_p]),
     "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
     "ath_refine_size": (c_int, [c_void_p, c_int32, POINTER(c_size_t), POINTER(Fault)]),
@@ -142,7 +145,7 @@ _SIGNATURES = {
     "ath_clips": (POINTER(Clip), [c_void_p]),
     "ath_clip_named": (c_int32, [c_void_p, c_char_p]),
     "ath_seam_error": (c_double, [c_void_p, c_int32, c_int32]),
-    "ath_rest": (None, [c_void_p, c_int, c_void_p, c_size_t]),
+    "ath_rest": (c_int, [c_void_p, c_int, c_void_p, c_size_t]),
     "ath_level_rest": (c_int, [c_void_p, c_int32, c_int, c_void_p, c_size_t]),
     "ath_level_error": (c_double, [c_void_p, c_int32, c_int32, c_int32, c_int]),
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
@@ -435,7 +438,7 @@ def test_results_have_the_names_and_numbers_of_the_format():
     names = [core.ath_result_name(code).decode() for code in range(64, 70)]
     assert names == ["MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"]
     assert core.ath_result_name(0) == b"OK"
-    assert {core.ath_result_name(code) for code in (-1, 12, 63, 70, 2**31 - 1, -(2**31))} == {b"UNKNOWN"}
+    assert {core.ath_result_name(code) for code in (-1, 14, 63, 70, 2**31 - 1, -(2**31))} == {b"UNKNOWN"}
 
 
 def too_little(size: int) -> list[tuple[int, int]]:

@@ -48,7 +48,7 @@ def test_every_seed_is_a_valid_file_and_small():
     for data in files.values():
         assert len(data) <= seeds.LARGEST
         with athcodec.open(BytesIO(data), strict=True) as decoder:
-            decoder.file.check()
+            decoder.file.check(decode=not decoder.file.needs_host_mesh)
 
 
 @pytest.mark.slow

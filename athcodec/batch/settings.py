@@ -27,6 +27,7 @@ from athcodec.atomic_files import is_url
 from athcodec.encoding.layers import ladder_of
 from athcodec.encoding.search import EFFORTS
 from athcodec.errors import ClipError
+from athcodec.host_mesh import HOST
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.sources import FORMATS, format_named
 from athcodec.units import parse_length, parse_size
@@ -133,6 +134,8 @@ def loop_frames(settings: Settings) -> int | None:
 def reading_options(settings: Settings) -> dict[str, Any]:
     """Keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
+    if options.get("rest") == HOST:  # how it is stored
+        del options["rest"]
     if "source_format" in options:
         options["format"] = options.pop("source_format")
     return options
@@ -141,6 +144,8 @@ def reading_options(settings: Settings) -> dict[str, Any]:
 def coding_options(settings: Settings, unit: Any) -> dict[str, Any]:
     """Keywords of athcodec.encode, for a clip whose metadata says `unit`. Raises BoundError."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
+    if settings.get("rest") == HOST:
+        options["host_rest"] = True
     if "max_error" in options:
         options["max_error"] = _length(options["max_error"], unit)
     if "target_size" in options:
@@ -252,7 +257,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "effort": _one_of(*EFFORTS),
     "ladder": lambda value: list(ladder_of(value)),
     "source_format": _format,
-    "rest": _one_of("auto", "first", "mean"),
+    "rest": _one_of("auto", "first", "mean", HOST),
     "fps": _rate,
     "mesh": _path,
     "field": _TEXT,

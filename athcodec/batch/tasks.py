@@ -79,7 +79,7 @@ def _begin(
         options = coding_options(item.settings, clip.metadata.get("unit"))
         if _segment_count(clip, options) <= split:
             summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)
-            return _done(item, source, summary, verify, start)
+            return _done(item, source, summary, clip if verify else None, start)
         draft = encoding.draft(clip, jobs=1, progress=report, **options)
     _pickle(path, [(draft, source, time.perf_counter() - start)])
     return {"draft": draft.segment_count}
@@ -101,12 +101,16 @@ def _finish(item: Item, folder: str, parts: Sequence[Result], verify: bool, repo
     draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
         summary = encoding.write(clip, draft, _coded(parts), _target(item, folder), progress=report)
-    return _done(item, source, summary, verify, start - seconds - sum(part["seconds"] for part in parts))
+        start -= seconds + sum(part["seconds"] for part in parts)
+        return _done(item, source, summary, clip if verify else None, start)
 
 
-def _done(item: Item, source: dict[str, Any], summary: encoding.Summary, verify: bool, start: float) -> Result:
-    if verify:
-        with athcodec.open(summary.path, strict=True) as decoder:
+def _done(
+    item: Item, source: dict[str, Any], summary: encoding.Summary, verified: MotionClip | None, start: float
+) -> Result:
+    """verified: the clip, where the file is to be decoded before it counts as done."""
+    if verified is not None:
+        with athcodec.open(summary.path, strict=True, host_mesh=verified) as decoder:
             decoder.file.check()
     stored = {"stored": upload(str(summary.path), item.output)} if is_url(item.output) else {}
     last = summary.levels[-1]
@@ -122,7 +126,7 @@ def _done(item: Item, source: dict[str, Any], summary: encoding.Summary, verify:
             "rms_error": last.rms_error,
             "levels": len(summary.levels),
             "sha256": sha256(summary.path),
-            "verified": verify,
+            "verified": verified is not None,
             "seconds": round(time.perf_counter() - start, 3),
         }
     }

@@ -13,6 +13,7 @@ from athcodec import discovery
 from athcodec.cli import verbs
 from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
 from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
+from athcodec.host_mesh import HOST
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.sources import SAMPLES
 from athcodec.units import METRES, Length, parse_length, parse_size
@@ -290,10 +291,11 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument(
         "--rest",
-        choices=("auto", "first", "mean"),
+        choices=("auto", "first", "mean", HOST),
         default="auto",
         help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all, which "
-        "are not stored (default auto)",
+        "are not stored; host: as auto, but left out, because whoever plays the file has the mesh: see decode "
+        "--host-mesh (default auto)",
     )
 
 
@@ -339,6 +341,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the clip to decode; without it glTF holds all of a file that has several, as animations of their names",
     )
+    _host_mesh_argument(verb)
     _stats_argument(verb)
     shown = verb.add_mutually_exclusive_group()
     shown.add_argument(
@@ -373,6 +376,15 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--allow-partial",
         action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",
+    )
+
+
+def _host_mesh_argument(verb: argparse.ArgumentParser, more: str = "") -> None:
+    verb.add_argument(
+        "--host-mesh",
+        metavar="FILE",
+        help="the mesh that the file was made for, of a file without a rest pose (encode --rest host): its source, or "
+        f"a file of any format that is read, with the same vertices in their order{more}",
     )
 
 
@@ -416,6 +428,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
         help="the source: measure the error of every level; of several clips all, in the file's order",
     )
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
+    _host_mesh_argument(verb, " (default: the first SOURCE; without any, only checksums are compared)")
     _source_arguments(verb)
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -445,6 +458,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
         "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
     )
     verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
+    _host_mesh_argument(verb)
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     verb.add_argument(
         "--export", metavar="PAGE.html", help="write one page with the file and the viewer inside, and serve nothing"

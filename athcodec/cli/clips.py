@@ -18,7 +18,8 @@ from athcodec.cli.printing import counted, progress, say
 from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder
-from athcodec.errors import AthError, ClipError, LevelUnavailable, RemoteError
+from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
+from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, compare_clips
 from athcodec.units import Length
@@ -39,7 +40,7 @@ def clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip
         loops = _checked_names(names, len(parts), args)
         clips: dict[str, MotionClip] = {}
         for name, (_, _, clip) in zip(names, parts):
-            if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
+            if args.rest not in ("auto", HOST) and clips:  # one that was made: the first clip's is as good for all
                 clip = clip.replace(rest=next(iter(clips.values())).source_rest, rest_given=False)
             clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
@@ -103,10 +104,11 @@ def with_sources(
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
     """The clip in `path`, read as the options of _source_arguments say."""
+    rest = getattr(args, "rest", "auto")
     return athcodec.read(
         path,
         args.source_format,
-        rest=getattr(args, "rest", "auto"),
+        rest="auto" if rest == HOST else rest,
         fps=args.fps,
         mesh=args.mesh,
         field=args.field,
@@ -135,7 +137,8 @@ def naming(path: str | Path) -> Iterator[None]:
     except AthError as error:
         if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise
-        raise type(error)(f"{path}: {error}") from error
+        hint = "; --host-mesh names it" if isinstance(error, NeedsHostMesh) else ""
+        raise type(error)(f"{path}: {error}{hint}") from error
 
 
 def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:

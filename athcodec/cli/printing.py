@@ -69,6 +69,7 @@ def _print_facts(facts: dict[str, Any]) -> None:
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     print(f"Error bound: {facts['max_error_bound']:.4g}{unit}. {_size(facts)}")
+    print(f"Rest pose: {_rest(facts)}.")
     if len(facts["levels"]) < facts["full_level_count"]:
         print(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
@@ -76,6 +77,14 @@ def _print_facts(facts: dict[str, Any]) -> None:
     if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or facts["clips"][0]["loop"]:
         _print_clips(facts)
     _print_levels(facts)
+
+
+def _rest(facts: dict[str, Any]) -> str:
+    """Where it is, and what it takes."""
+    if facts["host_mesh"]:
+        vertices = counted(facts["vertices"], "vertex", "vertices")
+        return f"a mesh of {vertices} that the host has, checksum {facts['host_mesh']['checksum']}"
+    return f"{facts['rest_bytes']:,} bytes of these"
 
 
 def _print_clips(facts: dict[str, Any]) -> None:
@@ -148,7 +157,8 @@ def print_verdict(result: dict[str, Any]) -> None:
     if result["ok"]:
         sources = ", ".join(clip["against"] for clip in result["clips"])
         more = f"; every level is as close to {sources} as the file says" if sources else ""
-        print(f"{result['file']}: whole, all checksums match, every level decodes{more}")
+        decodes = "every level decodes" if result["decoded"] else "nothing was decoded, which takes --host-mesh"
+        print(f"{result['file']}: whole, all checksums match, {decodes}{more}")
 
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:

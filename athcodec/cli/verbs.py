@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from contextlib import ExitStack, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,7 @@ from athcodec.encoding import DEFAULT_REL_ERROR
 from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
+from athcodec.host_mesh import HOST
 
 DEMO_PAGE = "athcodec_demo.html"
 
@@ -65,6 +67,7 @@ def encode(args: argparse.Namespace) -> int:
             segment_frames=args.segment_frames,
             tam=thresholds(args.tam, unit),
             exact_rest=args.exact_rest,
+            host_rest=args.rest == HOST,
             lossless=args.lossless,
             weights=args.weights,
             attributes=args.attributes,
@@ -174,7 +177,8 @@ def hierarchy(args: argparse.Namespace) -> int:
 
 def decode(args: argparse.Namespace) -> int:
     check_output(args.output, args.input)
-    with open_file(args.input, args.stats, clip=args.clip, allow_partial=args.allow_partial) as decoder:
+    how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
+    with open_file(args.input, args.stats, **how) as decoder:
         motion = view_to_decode(decoder, args)
         with progress() as report:
             athcodec.write(motion, args.output, args.format, progress=report, gzip=args.gzip, animation=args.animation)
@@ -197,8 +201,12 @@ def info(args: argparse.Namespace) -> int:
 def verify(args: argparse.Namespace) -> int:
     result: dict[str, Any] = {"file": args.file, "ok": False, "clips": []}
     try:
-        with open_file(args.file, args.stats, strict=True, clip=args.clip) as decoder, ExitStack() as opened:
-            decoder.file.check()
+        how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh}
+        with open_file(args.file, args.stats, **how) as decoder, ExitStack() as opened:
+            if decoder.file.needs_host_mesh and args.against:
+                decoder.file.set_host_mesh(opened.enter_context(read_clip(args, args.against[0])))
+            result["decoded"] = not decoder.file.needs_host_mesh
+            decoder.file.check(result["decoded"])
             result |= {"max_error_bound": decoder.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
                 measured = {"name": played.clip.name, "against": source}
@@ -273,9 +281,11 @@ def view(args: argparse.Namespace) -> int:
     with naming(args.file):
         if args.export:
             check_output(args.export, args.file)
-            print(f"{args.export}: {view.export_page(args.file, args.export, args.clip):,} bytes, opens in any browser")
+            size = view.export_page(args.file, args.export, args.clip, args.host_mesh)
+            print(f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
-        view.serve(args.file, args.port, lambda address: _say_where(address, args.no_browser), args.clip)
+        ready = partial(_say_where, no_browser=args.no_browser)
+        view.serve(args.file, args.port, ready, args.clip, args.host_mesh)
     return 0
 
 

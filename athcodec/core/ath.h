@@ -1,6 +1,7 @@
 /* athcodec: plays .ath files. This header is the whole public C API; FORMAT.md describes the files.
  *
  *     ath_front -> ath_open -> ath_build        once per file: header, hierarchy, rest pose
+ *     ath_set_host_mesh                         before ath_build, where the rest pose is a mesh that the host has
  *     ath_fault_text                            why a file is refused, in a sentence
  *     ath_refine                                once per level above 0
  *     ath_ranges, ath_feed                      which bytes a level needs; here they are
@@ -16,7 +17,7 @@
  * Threads. Functions that take a const object may run in parallel on it. One ath_work serves one thread at a time; any
  * number of them may prepare segments of one ath_file while others play. ath_feed, ath_drop, ath_refine_size and
  * ath_refine run alone among those that look at bytes: preparations and the functions on chunks and ranges; playing may
- * go on.
+ * go on. ath_set_host_mesh and ath_build run alone.
  *
  * Hostile input. Functions that read a file's bytes never read or write out of bounds, whatever the bytes are, need no
  * more memory than they said, and end in time linear in it. Counts, levels and pointers that the caller hands over are
@@ -69,6 +70,8 @@ typedef enum ath_result {
     ATH_BAD_CHUNK = 9,
     ATH_LIMIT_EXCEEDED = 10,
     ATH_TRAILING_BYTES = 11,
+    ATH_NEEDS_HOST_MESH = 12,
+    ATH_WRONG_HOST_MESH = 13,
     ATH_MORE = 64,         /* not an error: there is more to do, call again */
     ATH_HELD = 65,         /* not an error: the frame to blend with is not prepared, the nearer one is shown */
     ATH_MISSING = 66,      /* bytes that this needs have not been fed */
@@ -148,7 +151,11 @@ typedef enum ath_field {
     ATH_FIELD_UNEXPECTED_CHUNK,
     ATH_FIELD_CHUNK_CHECKSUM,
     ATH_FIELD_HIERARCHY_DEPTH,
-    ATH_FIELD_CONTENT
+    ATH_FIELD_CONTENT,
+    ATH_FIELD_HOST_MESH, /* none was given: `least` is the first checksum of the one wanted, `most` its vertices */
+    ATH_FIELD_HOST_VERTEX_COUNT, /* of the mesh that was given */
+    ATH_FIELD_HOST_VERTEX,       /* of that mesh, which has a number that is not finite */
+    ATH_FIELD_HOST_CHECKSUM      /* of the mesh that was given: of its two the one that differs, or the first */
 } ath_field;
 
 /* Why a file was refused, or what is missing of it (ATH_MISSING). */
@@ -198,8 +205,19 @@ ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *
 ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
                      const ath_limits *limits, ath_fault_info *fault);
 
-/* Computes the bases that all segments share, in memory of their own, whose size depends on the plant. Once, before
- * anything is prepared. ATH_NO_MEMORY. */
+/* The rest pose of a file whose info.rest_is_host is 1: the mesh that it was made for, which the engine has anyway.
+ * `vertex_count` positions of three floats, the first at `xyz`, each `stride` bytes behind the one before, at any
+ * alignment: a vertex buffer will do. They are the numbers of the source in its order, scene units and axes, bit for bit but
+ * that -0.0 counts as 0.0: as they were loaded, not scaled or turned. The file copies them.
+ *     Without it a file opens, says what it holds, and is fed; what needs the rest pose is ATH_NEEDS_HOST_MESH: ath_build,
+ * ath_refine_size, ath_refine, ath_rest, ath_level_rest, and all that prepares. ATH_WRONG_HOST_MESH: another number of
+ * vertices, numbers that are not finite, or another checksum than the file names; nothing has changed then. A file that
+ * holds its rest pose passes the mesh over: ATH_OK. */
+ATH_API int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t vertex_count,
+                              ath_fault_info *fault);
+
+/* Computes the bases that all segments share, in memory of their own, whose size depends on the plant and its rest pose.
+ * Once, before anything is prepared. ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH. */
 ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
@@ -208,7 +226,7 @@ ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
  * prepared, what the segments share at it is built, once ath_build has run, in memory that stays as long as the file's:
  *     ath_refine_size reads the rest poses up to the level's from their REFINED_REST chunks, which ath_ranges names until
  * they are read, and says how much memory ath_refine needs, which may be none. ATH_MISSING, ATH_BAD_CHECKSUM,
- * ATH_BAD_CHUNK, ATH_BAD_ARGUMENT.
+ * ATH_BAD_CHUNK, ATH_BAD_ARGUMENT, ATH_NEEDS_HOST_MESH.
  *     ath_refine builds what is not built yet. The same, ATH_NO_MEMORY.
  * Level 0, and what is built already, need neither, but allow both. */
 ATH_API int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault);
@@ -231,7 +249,9 @@ typedef struct ath_info {
     int32_t is_float64; /* 1: positions are double in the file's own arithmetic, else float */
     float epsilon, xi;  /* the thresholds by which nodes were accepted */
     uint32_t eta, lambda;
-    int32_t rest_is_float64; /* 1: the rest pose is double, else float */
+    int32_t rest_is_float64;   /* 1: the rest pose is double, else float */
+    int32_t rest_is_host;      /* 1: the rest pose is a mesh of the host's, for ath_set_host_mesh */
+    uint32_t host_checksum[2]; /* of that mesh: CRC-32C of its floats as bytes, little-endian, and of these backwards */
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);
@@ -280,12 +300,12 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 /* The rest pose of the source, for binding, normals and the like: vertex_count positions, `stride` bytes apart. Where
  * the source gave none it is the finest reference pose, see below, that ath_refine_size has read;
  * with each of these a rest pose that is coded about it comes out closer to the source's. Where info.rest_is_float64 is
- * 0 the source's numbers were floats: what the file's arithmetic has as doubles is rounded to them. */
-ATH_API void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
-ATH_API void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
+ * 0 the source's numbers were floats: what the file's arithmetic has as doubles is rounded to them. ATH_NEEDS_HOST_MESH. */
+ATH_API int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
+ATH_API int ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
 /* The reference pose of a level, which it moves and which its matrices apply to: the rest pose of the source, or another
  * that the motion is closer to, such as its mean. The same for all levels with nodes above level 0. ATH_BAD_ARGUMENT for
- * no level of the file, and where ath_refine_size has not read it. */
+ * no level of the file, and where ath_refine_size has not read it; ATH_NEEDS_HOST_MESH. */
 ATH_API int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride);
 
 /* How errors of all vertices in all frames are made one number: the largest; what at most a hundredth of them exceeds,
@@ -370,7 +390,7 @@ ATH_API size_t ath_segment_size(const ath_file *file, int32_t level);
 
 /* Begins to prepare a segment at a level, once ath_build has run; the ath_work and the ath_segment are their memories.
  * Only bytes of this segment and of levels up to this one are read. ATH_OK, ATH_MISSING, ATH_NO_MEMORY,
- * ATH_BAD_ARGUMENT. */
+ * ATH_BAD_ARGUMENT, ATH_NEEDS_HOST_MESH. */
 ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
                               void *memory, size_t memory_bytes);
 /* Goes on for `steps` steps, each a bounded piece of work: at most 64 vertices, or one matrix, over the segment's

@@ -313,18 +313,22 @@ int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
     return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_ADAPTIVE = 8 }; /* bits of Method */
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8 }; /* bits of Method */
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
-    if (chunk.size < 17 || chunk.bytes[0] & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE)) return ATH_BAD_CHUNK;
-    head->exact = (chunk.bytes[0] & REST_EXACT) != 0;
-    head->is_float64 = (chunk.bytes[0] & REST_FLOAT64) != 0;
-    head->adaptive = (chunk.bytes[0] & REST_ADAPTIVE) != 0;
+    if (chunk.size < 17) return ATH_BAD_CHUNK;
+    int32_t method = chunk.bytes[0];
+    head->exact = (method & REST_EXACT) != 0;
+    head->is_float64 = (method & REST_FLOAT64) != 0;
+    head->adaptive = (method & REST_ADAPTIVE) != 0;
+    head->is_host = method == REST_HOST;
+    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE)) return ATH_BAD_CHUNK;
     if (head->exact && head->adaptive) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
-    int valid = is_step(head->step);
+    int valid = is_step(head->step) && (!head->is_host || body->size == sizeof head->host_checksum);
+    for (size_t k = 0; valid && head->is_host && k < 2; k++) head->host_checksum[k] = u32_at(body->bytes + 4 * k);
     for (int32_t k = 0; k < 3; k++) {
         head->origin[k] = (double)f32_at(chunk.bytes + 1 + 4 * k);
         valid = valid && ath_is_finite(head->origin[k]);

@@ -49,7 +49,8 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, is_float64, adaptive;
+    int32_t exact, is_float64, adaptive, is_host;
+    uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
 } ath_rest_head;
 
 typedef struct {

@@ -3,9 +3,20 @@
 
 const char *ath_result_name(int result)
 {
-    static const char *const errors[] = {
-        "OK",         "INVALID",         "NOT_AN_ATH_FILE", "UNSUPPORTED_VERSION", "TRUNCATED",      "BAD_CHECKSUM",
-        "BAD_HEADER", "BAD_CHUNK_TABLE", "UNKNOWN_CHUNK",   "BAD_CHUNK",           "LIMIT_EXCEEDED", "TRAILING_BYTES"};
+    static const char *const errors[] = {"OK",
+                                         "INVALID",
+                                         "NOT_AN_ATH_FILE",
+                                         "UNSUPPORTED_VERSION",
+                                         "TRUNCATED",
+                                         "BAD_CHECKSUM",
+                                         "BAD_HEADER",
+                                         "BAD_CHUNK_TABLE",
+                                         "UNKNOWN_CHUNK",
+                                         "BAD_CHUNK",
+                                         "LIMIT_EXCEEDED",
+                                         "TRAILING_BYTES",
+                                         "NEEDS_HOST_MESH",
+                                         "WRONG_HOST_MESH"};
     static const char *const calls[] = {"MORE", "HELD", "MISSING", "NOT_PREPARED", "NO_MEMORY", "BAD_ARGUMENT"};
     if (result >= 0 && result < (int)(sizeof errors / sizeof *errors)) return errors[result];
     int call = result - ATH_MORE;
@@ -131,7 +142,7 @@ static void put_number(writer *out, double value)
 /* ---- sentences ---- */
 
 /* By field. %f: the value found; %a: the values allowed; %p: the chunk and its place; %k: kind, level and segment;
- * %l: level and segment. */
+ * %l: level and segment; %m: the most that is allowed, and %c: the least, as a checksum. */
 static const char *const sentences[] = {
     0,
     "file: got first bytes %f%a",
@@ -165,6 +176,10 @@ static const char *const sentences[] = {
     "%p: got checksum %f%a",
     "%p: got branches %f deep%a",
     "%p: got content that does not decode; expected a valid stream",
+    "host mesh: got none; expected the mesh that the file was made for, of %m vertices, checksum %c",
+    "host mesh: got %f vertices%a",
+    "host mesh: got vertex %f with a number that is not finite; expected finite ones",
+    "host mesh: got checksum %f%a",
 };
 
 static void put_value(writer *out, int32_t field, double value)
@@ -173,7 +188,8 @@ static void put_value(writer *out, int32_t field, double value)
         put_integer(out, (uint64_t)value >> 16);
         put_character(out, '.');
         put_integer(out, (uint64_t)value & 0xffff);
-    } else if (field == ATH_FIELD_MAGIC || field == ATH_FIELD_FRONT_CHECKSUM || field == ATH_FIELD_CHUNK_CHECKSUM) {
+    } else if (field == ATH_FIELD_MAGIC || field == ATH_FIELD_FRONT_CHECKSUM || field == ATH_FIELD_CHUNK_CHECKSUM
+               || field == ATH_FIELD_HOST_CHECKSUM) {
         put_hex(out, (uint32_t)value, 8);
     } else {
         put_number(out, value);
@@ -228,6 +244,8 @@ static void put_sentence(writer *out, const ath_fault_info *fault, const char *s
         case 'a': put_allowed(out, fault); break;
         case 'p': put_place(out, fault); break;
         case 'k': put_kind(out, fault); break;
+        case 'm': put_value(out, fault->field, fault->most); break;
+        case 'c': put_hex(out, (uint32_t)fault->least, 8); break;
         default: put_level(out, fault);
         }
     }

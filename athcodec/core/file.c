@@ -328,10 +328,17 @@ static int has_source_rest(const ath_file *file)
     return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0) != 0;
 }
 
+/* The rest pose from the source's very numbers. */
+static void take_numbers(ath_file *file)
+{
+    size_t numbers = 3 * (size_t)file->header.vertex_count;
+    for (size_t i = 0; i < numbers; i++) file->rest[i] = file->source_rest[i] - file->info.origin[i % 3];
+    if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
+}
+
 static int read_rest(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
-    size_t numbers = 3 * (size_t)header->vertex_count;
     ath_bytes chunk, body;
     ath_rest_head head;
     int result = load(file, ATH_REST, &chunk, fault);
@@ -340,17 +347,19 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     memcpy(file->info.origin, head.origin, sizeof head.origin);
     file->info.rest_is_float64 = head.is_float64;
     file->adaptive_rest = head.adaptive;
-    if (head.exact) {
+    file->info.rest_is_host = head.is_host;
+    file->rest_is_exact = head.exact || head.is_host;
+    if (head.is_host) {
+        memcpy(file->info.host_checksum, head.host_checksum, sizeof head.host_checksum);
+    } else if (head.exact) {
         result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
                                        (int32_t)header->branch_count, head.is_float64, file->source_rest);
-        for (size_t i = 0; i < numbers; i++) file->rest[i] = file->source_rest[i] - head.origin[i % 3];
-        if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
+        take_numbers(file);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
                                  head.step, head.adaptive, 0, 0, file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
-    file->rest_is_exact = head.exact;
     return result;
 }
 
@@ -372,6 +381,17 @@ static int read_source_rest(ath_file *file, const double *reference, ath_fault_i
     for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
         file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];
     return result;
+}
+
+/* What follows from the rest pose. */
+static void know_rest(ath_file *file)
+{
+    file->rest_known = 1;
+    file->plan.rest = file->rest;
+    if (file->first_layer > 0)
+        file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
+                                                       (int32_t *)file->scratch);
+    ath_plan_nodes(&file->plan, file->nodes);
 }
 
 static int time_clip(const ath_file *file, int32_t index, ath_time_method method, ath_bytes body)
@@ -444,11 +464,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
     if ((result = read_source_rest(file, file->rest, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
-    file->plan.rest = file->rest;
-    if (file->first_layer > 0)
-        file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
-                                                       (int32_t *)file->scratch);
-    ath_plan_nodes(&file->plan, file->nodes);
+    if (!file->info.rest_is_host) know_rest(file);
     return ATH_OK;
 }
 
@@ -485,6 +501,83 @@ int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t ava
     return result;
 }
 
+/* ---- the host's mesh ---- */
+
+/* The bits of a vertex's numbers, of which -0.0 counts as 0.0. */
+static void mesh_bits(const uint8_t *xyz, uint32_t bits[3])
+{
+    memcpy(bits, xyz, 3 * sizeof *bits);
+    for (int k = 0; k < 3; k++)
+        if (bits[k] == 0x80000000) bits[k] = 0;
+}
+
+/* FORMAT.md, "REST": of the bytes from the first to the last, and from the last to the first. */
+static void mesh_checksums(const uint8_t *xyz, size_t stride, size_t count, uint32_t checksum[2])
+{
+    checksum[0] = checksum[1] = 0;
+    for (size_t v = 0; v < count; v++) {
+        uint8_t forwards[12], backwards[12];
+        uint32_t bits[3], last_bits[3];
+        mesh_bits(xyz + v * stride, bits);
+        mesh_bits(xyz + (count - 1 - v) * stride, last_bits);
+        for (size_t i = 0; i < 12; i++) {
+            forwards[i] = (uint8_t)(bits[i / 4] >> 8 * (i % 4));
+            backwards[11 - i] = (uint8_t)(last_bits[i / 4] >> 8 * (i % 4));
+        }
+        checksum[0] = ath_crc32c(checksum[0], forwards, sizeof forwards);
+        checksum[1] = ath_crc32c(checksum[1], backwards, sizeof backwards);
+    }
+}
+
+/* The first vertex with a number that is infinite or NaN; count: none. */
+static size_t first_not_finite(const uint8_t *xyz, size_t stride, size_t count)
+{
+    for (size_t v = 0; v < count; v++) {
+        uint32_t bits[3];
+        mesh_bits(xyz + v * stride, bits);
+        for (int k = 0; k < 3; k++)
+            if ((bits[k] & 0x7f800000) == 0x7f800000) return v;
+    }
+    return count;
+}
+
+static void copy_mesh(ath_file *file, const uint8_t *xyz, size_t stride)
+{
+    for (size_t v = 0; v < file->header.vertex_count; v++) {
+        uint32_t bits[3];
+        float numbers[3];
+        mesh_bits(xyz + (size_t)file->vertex_source[v] * stride, bits);
+        memcpy(numbers, bits, sizeof numbers);
+        for (size_t k = 0; k < 3; k++) file->source_rest[3 * v + k] = (double)numbers[k];
+    }
+}
+
+int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t vertex_count, ath_fault_info *fault)
+{
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    const uint8_t *bytes = (const uint8_t *)xyz;
+    const ath_info *info = &file->info;
+    uint32_t found[2];
+    why->code = ATH_OK;
+    if (!info->rest_is_host) return ATH_OK;
+    if (vertex_count != info->vertex_count)
+        return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_VERTEX_COUNT, vertex_count, info->vertex_count,
+                          info->vertex_count);
+    size_t bad = first_not_finite(bytes, stride, (size_t)vertex_count);
+    if (bad < (size_t)vertex_count)
+        return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_VERTEX, (double)bad, 0, 0);
+    mesh_checksums(bytes, stride, (size_t)vertex_count, found);
+    for (int k = 0; k < 2; k++)
+        if (found[k] != info->host_checksum[k])
+            return ath_refuse(why, ATH_WRONG_HOST_MESH, ATH_FIELD_HOST_CHECKSUM, found[k], info->host_checksum[k],
+                              info->host_checksum[k]);
+    if (file->rest_known) return ATH_OK; /* it is this one */
+    copy_mesh(file, bytes, stride);
+    take_numbers(file);
+    know_rest(file);
+    return ATH_OK;
+}
+
 /* ---- building ---- */
 
 /* The segments of a clip have as many frames as each other, or one more. */
@@ -517,6 +610,7 @@ size_t ath_build_size(const ath_file *file)
 int ath_build(ath_file *file, void *memory, size_t memory_bytes)
 {
     ath_file counted = *file;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
     carve_build(file, (uint8_t *)memory);
     if (file->bases_count > 0) { /* laid out again: the gaps may be a layer's since */
@@ -595,6 +689,9 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
     *memory_bytes = 0;
     why->code = ATH_OK;
     if (level < 0 || level >= file->info.level_count) return ath_refuse(why, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
+    if (!file->rest_known)
+        return ath_refuse(why, ATH_NEEDS_HOST_MESH, ATH_FIELD_HOST_MESH, 0, file->info.host_checksum[0],
+                          file->info.vertex_count);
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
@@ -638,9 +735,11 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
 int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double *xyz, size_t stride)
 {
     if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     int32_t layer = ath_layer_of(file, level);
     const ath_plan *plan = ath_level_plan(file, level);
     if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
         for (size_t k = 0; k < 3; k++)
@@ -691,22 +790,26 @@ static double rest_number(const ath_file *file, const double *reference, size_t 
     return file->source_rest ? file->source_rest[i] : reference[i] + file->info.origin[i % 3];
 }
 
-void ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
+int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
 {
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         float *out = (float *)(void *)((char *)xyz + place_of(file, order, v) * stride);
         for (size_t k = 0; k < 3; k++) out[k] = (float)rest_number(file, reference, 3 * v + k);
     }
+    return ATH_OK;
 }
 
-void ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
+int ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
 {
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
         for (size_t k = 0; k < 3; k++) out[k] = rest_number(file, reference, 3 * v + k);
     }
+    return ATH_OK;
 }
 
 /* Of segments together: what at most a hundredth of each exceeds, at most a hundredth of all does; squares are weighted

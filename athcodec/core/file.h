@@ -30,7 +30,7 @@ struct ath_file {
     int32_t *branch_source, *vertex_source;
     double *times;
     double *rest;        /* the reference pose, relative to the origin */
-    double *source_rest; /* the rest pose, where it is another or exact numbers, else null */
+    double *source_rest; /* the rest pose, where it is another or exact numbers, the file's or the host's, else null */
     ath_piece *pieces;
     ath_node *nodes;
     uint8_t *gaps;
@@ -41,6 +41,7 @@ struct ath_file {
     ath_layer layers[ATH_LAYERS];            /* first_layer to layer_count - 1 */
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
+    int32_t rest_known;                 /* 0 until the host gives it */
     int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
     int32_t rest_is_exact;              /* the reference pose is in the very numbers of source_rest */
     int32_t longest;                    /* frames of the longest segment */

@@ -393,6 +393,7 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     ath_segment *segment = (ath_segment *)segment_memory;
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;

@@ -23,12 +23,12 @@ from athcodec.segmentation import DEFAULT_SEGMENT
 TRIAL_FRAMES = 64
 
 
-def best_branches(clip: MotionClip, option: BoundOption, report: Progress) -> Found:
+def best_branches(clip: MotionClip, option: BoundOption, report: Progress, host_rest: bool = False) -> Found:
     """The candidate that makes the smallest file of a few frames at the bound that is asked for."""
     found = candidates(clip)
     if len(found) == 1:
         return found[0]
-    trial = _Trial(clip, option)
+    trial = _Trial(clip, option, host_rest)
     sizes = []
     for branches in found:
         sizes.append(trial.size(branches))
@@ -43,19 +43,26 @@ def best_branches(clip: MotionClip, option: BoundOption, report: Progress) -> Fo
 class _Trial:
     """Frames from the middle of a clip, coded on different branches; sizes are extrapolated to the whole clip."""
 
-    def __init__(self, clip: MotionClip, option: BoundOption):
+    def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool):
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
         self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
-        self._option = option
+        self._option, self._host_rest = option, host_rest
 
     def size(self, branches: Found) -> float:
         """Bytes of the whole clip's file on these branches; infinite where the bound cannot be kept."""
-        clip, lossless = with_branches(self._clip, branches), self._option.lossless
+        clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_of(clip)
-        source = Source(clip, hierarchy, survey(clip, hierarchy), DEFAULT_SEGMENT, exact_rest=lossless)
+        source = Source(
+            clip,
+            hierarchy,
+            survey(clip, hierarchy),
+            DEFAULT_SEGMENT,
+            exact_rest=lossless or host_rest,
+            host_rest=host_rest,
+        )
         job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless))
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)

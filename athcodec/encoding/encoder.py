@@ -38,6 +38,7 @@ def encode(
     segment_frames: int | None = None,
     tam: Thresholds | None = None,
     exact_rest: bool = False,
+    host_rest: bool = False,
     lossless: bool = False,
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
@@ -72,6 +73,9 @@ def encode(
     exact_rest : bool
         Keep the rest pose bit for bit. Else one that the clip was given comes back within the bound, or within 0.3 % of
         the diagonal where motion is coded about another pose; one that was made is not stored.
+    host_rest : bool
+        Leave the rest pose out: whoever plays the file has the mesh, and hands it over (`open`, host_mesh). It is the
+        clip's rest pose, the first frame where it has none of its own, as float32; the file holds its checksum.
     lossless : bool
         One more level holds the positions bit for bit, and the rest pose is kept likewise; the bound is that of the
         level before.
@@ -113,6 +117,7 @@ def encode(
         segment_frames=segment_frames,
         tam=tam,
         exact_rest=exact_rest,
+        host_rest=host_rest,
         lossless=lossless,
         weights=weights,
         attributes=attributes,
@@ -227,7 +232,7 @@ def _begin(
     found = None
     if not clip.has_branches:
         report("branches", 0.0)
-        found = best_branches(clip, option, report)
+        found = best_branches(clip, option, report, options.host_rest)
     job = EncodingJob.begin(clip, found, options, report)
     attempts = itertools.count(1)
 

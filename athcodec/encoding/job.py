@@ -60,6 +60,7 @@ class EncodingOptions:
     segment_frames: int | None = None  # as split_segments has it
     tam: Thresholds | None = None
     exact_rest: bool = False
+    host_rest: bool = False
     lossless: bool = False
     weights: str | np.ndarray | None = None
     attributes: str = "all"
@@ -75,6 +76,8 @@ class EncodingOptions:
     def __post_init__(self) -> None:
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
+        if self.exact_rest and self.host_rest:
+            raise ValueError("host_rest: got exact_rest too; expected one of them")
         if self.attributes not in ("all", "none"):
             raise ValueError(f"attributes: got {self.attributes!r}; expected 'all' or 'none'")
         if self.jobs is not None and self.jobs < 1:
@@ -121,13 +124,14 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _completed(
-    clip: MotionClip, found: Found | None, weights: str | np.ndarray | None
-) -> tuple[MotionClip, np.ndarray | None]:
-    """The clip on branches that were found for it, and its weights, which it then names."""
+def _completed(clip: MotionClip, found: Found | None, options: EncodingOptions) -> tuple[MotionClip, np.ndarray | None]:
+    """The clip on branches that were found for it, with the rest pose as a host has it; its weights, which it then
+    names."""
     if found is not None:
         clip = with_branches(clip, found)
-    return (clip, None) if weights is None else _weighted(clip, weights)
+    if options.host_rest:
+        clip = clip.replace(rest=clip.rest.astype(np.float32) + np.float32(0))  # -0.0 is 0.0
+    return (clip, None) if options.weights is None else _weighted(clip, options.weights)
 
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
@@ -191,7 +195,7 @@ class EncodingJob:
     @classmethod
     def begin(cls, clip: MotionClip, found: Found | None, options: EncodingOptions, report: Progress) -> EncodingJob:
         """Reads all frames. found: branches for a clip without."""
-        clip, factors = _completed(clip, found, options.weights)
+        clip, factors = _completed(clip, found, options)
         hierarchy = hierarchy_of(clip)
         _check_limits(clip, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
@@ -207,7 +211,7 @@ class EncodingJob:
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
-        clip, factors = _completed(clip, draft.found, options.weights)
+        clip, factors = _completed(clip, draft.found, options)
         source = cls._source(clip, seen, factors, options, ThreadPool(jobs or default_jobs()))
         return cls(source, options, report, draft.found)
 
@@ -220,9 +224,10 @@ class EncodingJob:
             seen.hierarchy,
             seen,
             options.segment_frames,
-            options.exact_rest or (options.lossless and clip.rest_given),
+            options.exact_rest or options.host_rest or (options.lossless and clip.rest_given),
             None if factors is None else factors[seen.hierarchy.vertex_source],
             pool,
+            options.host_rest,
         )
 
     @property
@@ -313,7 +318,8 @@ class EncodingJob:
         result = self.fill(ct.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
-            with open_ath(out, strict=True) as decoder:
+            mesh = self.clip.source_rest if self.options.host_rest else None
+            with open_ath(out, strict=True, host_mesh=mesh) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)

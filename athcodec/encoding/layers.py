@@ -181,7 +181,7 @@ def _rests(
     """The content of REST; what it decodes to, where the first layer refines that; of each layer the decoded pose and
     what refines one."""
     rest = prelude.rest_chunk
-    if rest.exact or len(ratios) == 1:
+    if source.exact_rest or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive)

@@ -304,7 +304,7 @@ class Search:
     def about_best_reference(self) -> Search:
         """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
         is tried with the settings that are best about the rest pose, and goes on from there."""
-        if self.effort == "fast":
+        if self.effort == "fast" or self.source.host_rest:
             return self
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other

@@ -52,6 +52,7 @@ class Source:
     exact_rest: bool
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     pool: ThreadPool = SERIAL
+    host_rest: bool = False
     reference: np.ndarray | None = None
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
     rest: np.ndarray = field(init=False)  # likewise: the reference pose
@@ -215,6 +216,9 @@ class CodedPrelude:
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
     """REST, and the rest pose as decoded."""
     head = ct.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
+    if source.host_rest:
+        head.is_host, head.step, head.stream = True, 1.0, ct.mesh_checksum(source.clip.source_rest)
+        return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
         head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
@@ -287,7 +291,7 @@ def lags(source: Source, step: float) -> np.ndarray:
     """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(source.sheet_like):
+    for b in np.flatnonzero(source.sheet_like & (not source.host_rest)):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)

@@ -38,6 +38,7 @@ NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
 ANIMATION = "animation:"
 _BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
+REST_ROUNDING = 1e-6  # of the largest coordinate, by which joints may miss the mesh that they leave as it is
 SAME = 1e-5  # of the size: how far off the end of a loop may be from its beginning
 
 
@@ -94,7 +95,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
     still = all(len(timing.times) == 1 for timing in timings.values())
     attributes, branches = _attributes(file, nodes, options.skip, motion, keep_normals=still)
     faces, edges = _connections(file, nodes)
-    rest = motion.read(None)[0] if options.rest == "auto" else None
+    rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
     clips = {}
     for name, timing in timings.items():
         clips[name] = MotionClip(
@@ -118,6 +119,19 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
         clips[name].rest_given = options.rest == "auto"
         rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]
+
+
+def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
+    """(N, 3) the scene without animation. Where joints leave a mesh as it is stored, these are its very numbers, which
+    others who read the file have too: products of matrices round."""
+    rest = motion.read(None)[0]
+    for node in nodes:
+        placed = rest[node.vertices]
+        with np.errstate(all="ignore"):
+            off, size = np.abs(placed - node.base).max(initial=0.0), np.abs(node.base).max(initial=0.0)
+        if off <= REST_ROUNDING * size:
+            placed[:] = node.base
+    return rest
 
 
 def _positions(motion: _Motion, times: np.ndarray) -> Frames:

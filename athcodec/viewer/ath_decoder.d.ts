@@ -85,6 +85,10 @@ export interface AthInfo {
   readonly isFloat64: boolean;
   /** The same of the rest pose. */
   readonly restIsFloat64: boolean;
+  /** Whether the rest pose is a mesh that the host has, for setHostMesh(); of that mesh the checksum, 16 hexadecimal
+   * digits, else null. */
+  readonly restIsHost: boolean;
+  readonly hostChecksum: string | null;
   /** Thresholds by which nodes were accepted. */
   readonly epsilon: number;
   readonly xi: number;
@@ -202,8 +206,16 @@ export class AthFile {
   static front(bytes: Uint8Array): { ready: boolean; needed: number };
 
   /** Opens a file from its front; what follows the prelude is fed. Copies what it keeps. Throws AthError,
-   * "MISSING" with `needed` where the front is too short. */
-  static open(bytes: Uint8Array): AthFile;
+   * "MISSING" with `needed` where the front is too short. hostMesh: for setHostMesh(). */
+  static open(bytes: Uint8Array, options?: { hostMesh?: Float32Array | null }): AthFile;
+
+  /** Gives the mesh that is the rest pose of a file that does not hold one (info.restIsHost): three numbers per vertex as
+   * they were in the source, bit for bit and in its order. Copies them; other files pass it over. Throws AthError,
+   * "WRONG_HOST_MESH". Without it all that takes the rest pose, which is rest(), preparing and playing, throws
+   * "NEEDS_HOST_MESH". */
+  setHostMesh(mesh: Float32Array): void;
+  /** Whether it is still to be given. */
+  readonly needsHostMesh: boolean;
 
   readonly info: AthInfo;
   /** At least one. Where a function takes a clip it takes its number here, or its name. */

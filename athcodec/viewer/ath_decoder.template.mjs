@@ -17,8 +17,9 @@ const INFO = {
   vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
   levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
   chunkCount: "i32", isFloat64: "i32", epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
+  restIsHost: "i32", meshForwards: "u32", meshBackwards: "u32",
 };
-const INFO_SIZE = 120;
+const INFO_SIZE = 128;
 const CLIP = {
   name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
   loop: "i32",
@@ -310,6 +311,7 @@ export class AthFile {
   info = null;
   clips = [];
   held = false;
+  needsHostMesh = true;   // until the rest pose is known
   #own = null;            // the Core, until dispose()
   #at = 0;                // the ath_file
   #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
@@ -327,9 +329,10 @@ export class AthFile {
     return { ready: !front.error, needed: front.needed };
   }
 
-  static open(bytes) {
+  static open(bytes, { hostMesh = null } = {}) {
     const file = new AthFile();
     file.#open(asBytes(bytes));
+    if (hostMesh) file.setHostMesh(hostMesh);
     return file;
   }
 
@@ -343,9 +346,28 @@ export class AthFile {
     this.info = this.#info();
     this.#chunks = this.#chunkTable();
     this.clips = this.#clipTable();
-    const size = c.ath_build_size(this.#at) >>> 0;
-    this.#check(c.ath_build(this.#at, core.take(size), size), `the bases of the motion, ${size} bytes`);
+    if (!this.info.restIsHost) this.#build();
     this.feed(bytes, 0);
+  }
+
+  #build() {
+    const c = this.#c, size = c.ath_build_size(this.#at) >>> 0;
+    this.#check(c.ath_build(this.#at, this.#core.take(size), size), `the bases of the motion, ${size} bytes`);
+    this.needsHostMesh = false;
+  }
+
+  setHostMesh(mesh) {
+    const c = this.#c;
+    if (!(mesh instanceof Float32Array) || mesh.length % 3 !== 0)
+      throw new TypeError("mesh: got something else, expected a Float32Array of three numbers per vertex");
+    if (!this.needsHostMesh) return;
+    const at = this.#core.put(mesh);
+    try {
+      this.#checkFault((fault) => c.ath_set_host_mesh(this.#at, at, 12, mesh.length / 3, fault));
+    } finally {
+      this.#core.give(at);
+    }
+    this.#build();
   }
 
   #info() {
@@ -353,9 +375,10 @@ export class AthFile {
       this.#core.c.ath_get_info(this.#at, at);
       return this.#core.struct(INFO, at);
     });
-    const { originX, originY, originZ, isFloat64, restIsFloat64, ...rest } = info;
-    const origin = [originX, originY, originZ];
-    return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0 });
+    const { originX, originY, originZ, isFloat64, restIsFloat64, restIsHost, meshForwards, meshBackwards, ...rest } = info;
+    const origin = [originX, originY, originZ], hex = (number) => number.toString(16).padStart(8, "0");
+    return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0,
+      restIsHost: restIsHost !== 0, hostChecksum: restIsHost ? hex(meshForwards) + hex(meshBackwards) : null });
   }
 
   #clipTable() {

@@ -34,11 +34,12 @@ void fuzz_put_u32(uint8_t *at, uint32_t value);
 /* Where the first chunk begins; 0: the front does not fit. */
 size_t fuzz_chunks_at(const uint8_t *file, size_t size);
 
-/* Magic, version, length of the front and checksums that fit whatever the rest says. */
+/* Magic, version, length of the front and checksums that fit whatever the rest says; that of the host's mesh, too. */
 void fuzz_repair(uint8_t *file, size_t size);
 
-/* The chunks of a file whose front is valid but for what fuzz_repair changes, *count of them, to be freed; null: none. */
-ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count);
+/* The chunks of a file whose front is valid but for what fuzz_repair changes, *count of them, to be freed, and the
+ * number of vertices; null: none. */
+ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count, uint32_t *vertices);
 
 /* Limits small enough for a fuzzer, and for the memory of all its objects to be bounded by. */
 ath_limits fuzz_limits(uint64_t memory_bytes);
@@ -52,7 +53,7 @@ typedef struct {
     size_t memory; /* bytes of file and bases */
 } fuzz_file;
 
-/* Opens and builds; 0 and nothing to close where the file is refused. `available` may be less than the file. */
+/* Opens, gives the host's mesh where one is asked for, and builds; 0 and nothing to close where the file is refused. `available` may be less than the file. */
 int fuzz_open(fuzz_file *opened, const uint8_t *bytes, size_t available, const ath_limits *limits, int fill);
 void fuzz_close(fuzz_file *opened);
 

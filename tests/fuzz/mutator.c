@@ -7,8 +7,8 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned
 
 static void mutate_chunk(uint8_t *data, size_t size, uint32_t which)
 {
-    uint32_t count = 0;
-    ath_chunk *chunks = fuzz_chunks(data, size, &count);
+    uint32_t count = 0, vertices = 0;
+    ath_chunk *chunks = fuzz_chunks(data, size, &count, &vertices);
     const ath_chunk *chunk = chunks && count > 0 ? chunks + which % count : NULL;
     if (chunk && chunk->length > 0 && chunk->offset + chunk->length <= size)
         LLVMFuzzerMutate(data + chunk->offset, chunk->length, chunk->length);

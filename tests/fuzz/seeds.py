@@ -51,6 +51,7 @@ def _point() -> MotionClip:
 _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
     "full": (full_clip, {"rel_error": 1e-3, "segment_frames": 16}),
     "exact_rest": (lambda: plant(seed=2, branches=4, frames=9), {"rel_error": 1e-2, "exact_rest": True}),
+    "host_rest": (lambda: plant(seed=2, branches=4, frames=9), {"rel_error": 1e-2, "host_rest": True}),
     "wide": (lambda: plant(seed=3, branches=4, frames=17, dtype=np.float64), {"rel_error": 1e-6}),
     "wide_exact_rest": (
         lambda: plant(seed=4, branches=3, frames=5, dtype=np.float64),
@@ -83,6 +84,7 @@ _ENCODED: dict[str, tuple[Callable[[], MotionClip], dict]] = {
         lambda: plant(seed=4, branches=3, frames=5, dtype=np.float64),
         LAYERED | {"exact_rest": True},
     ),
+    "layers_host_rest": (lambda: plant(seed=4, branches=3, frames=5), LAYERED | {"host_rest": True}),
     "frames_256": (lambda: plant(seed=10, branches=2, longest=3, frames=257), {"rel_error": 1e-1}),
 }
 

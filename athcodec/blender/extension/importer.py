@@ -57,6 +57,12 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         description="Level of detail: 0 is the coarsest, -1 the deepest in the file",
     )
     clip: StringProperty(name="Clip", description="The motion to play, of a file that has several: else the first")
+    host_mesh: StringProperty(
+        name="Mesh",
+        subtype="FILE_PATH",
+        description="The mesh that the file was made for, of a file that does not hold its rest pose: any format that "
+        "athcodec reads, with the same vertices. The object keeps it",
+    )
     loop: BoolProperty(name="Loop", default=False, description="Begin again after the last frame")
     set_scene: BoolProperty(
         name="Set Scene", default=True, description="Give the scene the frame rate and the frames of the motion"
@@ -72,7 +78,9 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
         for path in paths:
             try:
-                obj = add_object(context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip)
+                obj = add_object(
+                    context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip, self.host_mesh
+                )
             except Exception as error:  # of the file, reported in one line
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
                 return {"CANCELLED"}
@@ -104,10 +112,13 @@ def add_object(
     set_scene: bool = True,
     use_relative: bool = True,
     clip: str = "",
+    host_mesh: str = "",
 ):
     """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
     path = os.path.normpath(bpy.path.abspath(path))
     decoder = player.decoder_of(path, clip)
+    if host_mesh:
+        decoder.file.set_host_mesh(bpy.path.abspath(host_mesh))
     name = os.path.splitext(os.path.basename(path))[0]
     obj = bpy.data.objects.new(name, _mesh(name, decoder))
     context.collection.objects.link(obj)
@@ -154,6 +165,9 @@ def _mesh(name: str, decoder):
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(decoder.vertex_count)
     mesh.vertices.foreach_set("co", np.ascontiguousarray(decoder.rest, np.float32).reshape(-1))
+    if decoder.file.host_checksum is not None:
+        layer = mesh.attributes.new(player.HOST_MESH, "FLOAT_VECTOR", "POINT")
+        layer.data.foreach_set("vector", np.ascontiguousarray(decoder.rest, np.float32).reshape(-1))
     found = polygons(decoder.faces, decoder.attributes)
     if found is not None:
         _add_faces(mesh, *found)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+HOST_MESH = "ath_rest"  # attribute of a mesh: its rest pose in the file's axes, of files that do not hold one
 DEEPEST = -1  # the level of an object that shows the deepest one in its file
 _decoders: dict = {}  # path: (its size and time, the decoder, decoders of its clips by name)
 _problems: dict = {}  # name of an object: the error that keeps it from playing
@@ -37,7 +38,12 @@ def decoder_of(path: str, clip: str = ""):
 
 def decoder_for(obj):
     """The decoder of what an object plays. Raises OSError, athcodec's errors."""
-    return decoder_of(path_of(obj), obj.ath.clip)
+    decoder, rest = decoder_of(path_of(obj), obj.ath.clip), obj.data.attributes.get(HOST_MESH)
+    if decoder.file.needs_host_mesh and rest is not None:
+        positions = np.empty(3 * len(rest.data), np.float32)
+        rest.data.foreach_get("vector", positions)
+        decoder.file.set_host_mesh(positions.reshape(-1, 3))
+    return decoder
 
 
 def clip_names(obj) -> list[str]:

@@ -22,6 +22,7 @@ let plants = [], opened = [], last = 0;
 
 const words = { NOT_AN_ATH_FILE: "This is not an .ath file", UNSUPPORTED_VERSION: "This file is of another version of the format",
   HTTP: "The file cannot be fetched", NETWORK: "The file cannot be fetched", MISSING: "The file is cut off too early", TRUNCATED: "The file is cut off too early",
+  NEEDS_HOST_MESH: "This file needs the mesh that it was made for", WRONG_HOST_MESH: "The mesh is not the one that this file was made for",
   CLIP: "The file has no such clip", CHANGED: "The file has changed", WORKER: "The decoder cannot be started" };
 
 begin(); // the file is on its way while the stage is set up, which takes longer
@@ -40,9 +41,21 @@ function embedded() {
   const worker = $("ath-worker"), file = $("ath-file");
   if (worker) loader.setDecoderPath(URL.createObjectURL(new Blob([worker.textContent], { type: "text/javascript" })));
   if (!file) return false;
-  const bytes = Uint8Array.from(atob(file.textContent.trim()), (character) => character.charCodeAt(0));
-  openFirst({ bytes: bytes.buffer }, file.dataset.name, file.dataset.clip);
+  const mesh = $("ath-mesh");
+  if (mesh) loader.setHostMesh(new Float32Array(bytesOf(mesh)));
+  openFirst({ bytes: bytesOf(file) }, file.dataset.name, file.dataset.clip);
   return true;
+}
+
+function bytesOf(element) {
+  return Uint8Array.from(atob(element.textContent.trim()), (character) => character.charCodeAt(0)).buffer;
+}
+
+// The mesh of a file that does not hold its rest pose: binary32, as it was in the file's source.
+async function fetchMesh(url) {
+  const answer = await fetch(url).catch(({ message }) => ({ ok: false, status: message }));
+  if (!answer.ok) throw Object.assign(new Error(`${url}: got status ${answer.status}`), { codeName: "HTTP" });
+  loader.setHostMesh(new Float32Array(await answer.arrayBuffer()));
 }
 
 // With one of its clips.
@@ -56,8 +69,10 @@ function openFirst(source, name, clip = null) {
 function begin() {
   if (embedded()) return;
   const wanted = new URLSearchParams(location.search), url = wanted.get("file"), second = wanted.get("compare");
+  const mesh = wanted.get("mesh"), ready = mesh ? fetchMesh(mesh) : null;
   const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
-  if (url) openFirst(url, nameOf(url), wanted.get("clip")).then(() => second && opened.length && open(second, nameOf(second), true));
+  const first = () => openFirst(url, nameOf(url), wanted.get("clip"));
+  if (url) (ready?.then(first, refuse) ?? first()).then(() => second && opened.length && open(second, nameOf(second), true));
   else refuse({ message: "Drop an .ath file here, or open one. It stays on this computer.", codeName: "none" });
   if (!url) $("message").querySelector("h2").textContent = "No file yet";
 }

@@ -9,6 +9,14 @@ import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometr
 
 let files = 0;
 
+// The positions of a mesh, three numbers per vertex.
+function numbersOf(mesh) {
+  if (mesh === null || (mesh instanceof Float32Array && mesh.length % 3 === 0)) return mesh;
+  const position = mesh?.isBufferGeometry ? mesh.getAttribute("position") : null;
+  if (!position) throw new TypeError("mesh: got something else, expected three numbers per vertex or a BufferGeometry");
+  return Float32Array.from({ length: 3 * position.count }, (_, i) => position.getComponent(Math.floor(i / 3), i % 3));
+}
+
 /** A file that is open in a worker: what the page knows of it, and the way there. */
 class Channel {
   views = new Map();
@@ -261,6 +269,7 @@ export class ATHLoader extends Loader {
     this.workerURL = null;
     this.mode = "matrices";
     this.clip = null;
+    this.hostMesh = null;
   }
 
   /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
@@ -284,6 +293,13 @@ export class ATHLoader extends Loader {
   /** The name of the clip to begin with, of which alone more than the first bytes are fetched; null: the file's first. */
   setClip(name) {
     this.clip = name;
+    return this;
+  }
+
+  /** The mesh that is the rest pose of files that do not hold one: a Float32Array of three numbers per vertex, in the
+   * order that the file was made from, or a BufferGeometry whose positions are these. Other files pass it over. */
+  setHostMesh(mesh) {
+    this.hostMesh = numbersOf(mesh);
     return this;
   }
 
@@ -324,7 +340,7 @@ export class ATHLoader extends Loader {
     const worker = this.#worker();
     const channel = new Channel(worker, () => { worker.files--; });
     worker.files++;
-    channel.send({ type: "open", clip: this.clip, ...message }, transfer);
+    channel.send({ type: "open", clip: this.clip, hostMesh: this.hostMesh, ...message }, transfer);
     try {
       await channel.opened;
     } catch (error) {

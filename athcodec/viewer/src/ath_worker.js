@@ -7,10 +7,10 @@ import { HttpSource, MemorySource } from "./source.js";
 
 const sessions = new Map();
 
-function open({ file, url, options, bytes, clip }) {
+function open({ file, url, options, bytes, clip, hostMesh }) {
   const post = (message, transfer = []) => self.postMessage({ ...message, file }, transfer);
   const source = bytes ? new MemorySource(new Uint8Array(bytes)) : new HttpSource(url, options);
-  const session = new Session(source, post, clip);
+  const session = new Session(source, post, clip, hostMesh);
   sessions.set(file, session);
   ready.then(() => session.run(), (error) => post({ type: "failed", ...describe(error) }));
 }

@@ -47,11 +47,13 @@ export class Session {
   #faces = null;
   #first = 0;             // the clip to begin with
 
-  /** clip: the name of the one to begin with, null: the file's first. */
-  constructor(source, post, clip = null) {
+  /** clip: the name of the one to begin with, null: the file's first. hostMesh: of a file that does not hold its rest
+   * pose, a Float32Array. */
+  constructor(source, post, clip = null, hostMesh = null) {
     this.source = source;
     this.post = post;
     this.clip = clip;
+    this.hostMesh = hostMesh;
   }
 
   // ---- opening ----
@@ -158,7 +160,7 @@ export class Session {
     front.set(bytes.subarray(skip), this.#front.length);
     this.#front = front;
     if (!AthFile.front(front).ready) return;
-    this.#file = AthFile.open(front);
+    this.#file = AthFile.open(front, { hostMesh: this.hostMesh });
     this.#front = new Uint8Array(0);
     this.#hasFront();
   }
