@@ -1,8 +1,8 @@
 """The branch hierarchy of a clip that names none: labels for its vertices, a tree over the labels, an order along each.
 
 Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
-components of a render mesh, or from motion: patches of a mesh that move rigidly. All but edge graphs are then arranged
-alike: a branch hangs where it stays closest to a larger one in a few frames, and its vertices are put in order of their
+components of a render mesh, or from motion: runs of points that keep their distance (point_runs.py), or patches of a
+mesh that move rigidly. All but edge graphs and runs, which are made into edges, are then arranged alike: a branch hangs where it stays closest to a larger one in a few frames, and its vertices are put in order of their
 distance over the mesh from there. It looks at no more than a few frames, and knows no file format but that of its own
 results (`save`, `load`).
 """
@@ -24,8 +24,9 @@ from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.point_runs import base_points, run_links
 
-METHODS = ("attributes", "skeleton", "edges", "components", "motion")
+METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 
@@ -36,6 +37,7 @@ QUERY = 1 << 21  # neighbours in one query
 STAYING = 300.0  # weight of how constant the distance of two branches is, against how small it is
 ALIKE = 4.0  # further cost of two branches of the same size: no leaf grows on a leaf
 ROOT_SIZE = 0.25  # of the diagonal of the largest branch: smaller ones are no roots
+LONE_POINTS = 0.1  # of the vertices, up to which runs are tried against no patches
 WELD = 1e-6  # of the diagonal: vertices that stay closer than this are one vertex of a mesh that was split
 COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no branches but loose points
 IN_ORDER = 0.7  # rank correlation of the source's order with the distance from the base from which on it is kept
@@ -62,7 +64,7 @@ class Found:
     stem_index : (N,) int32 array or None
         The place of each vertex on its stem, as in MotionClip.
     method : str
-        How they were found: "attributes", "skeleton", "edges", "components", "motion", or "file".
+        How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
     """
 
     vertex_branch: np.ndarray
@@ -81,18 +83,26 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives; and where that goes by motion, also patches of another size, patches without parents,
-    and one single branch: only a trial shows which of them makes the smallest file."""
+    """What find_branches gives; and where that goes by motion, or by runs that leave many points alone, also patches of
+    other sizes, patches without parents, and one single branch: only a trial shows which of them makes the smallest
+    file."""
     seen = _Seen(clip)
     found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
-    if found.method != "motion":
+    lone = np.count_nonzero(np.bincount(found.vertex_branch) == 1)
+    if found.method != "motion" and not (found.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
         return [found]
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
-    if clip.vertex_count >= LARGE_MESH:
-        return [single, found, _by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
-    return [single, found, _by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
+    patches = [found] if found.method == "motion" else [found, _by_motion(seen, None)]
+    return [single, *patches, *_more_patches(seen)]
+
+
+def _more_patches(seen: _Seen) -> list[Found]:
+    """Patches of another size than usual, and such without parents."""
+    if seen.clip.vertex_count >= LARGE_MESH:
+        return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
+    return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
@@ -103,8 +113,9 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     clip : MotionClip
     method : str, optional
         "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
-        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "motion": patches
-        that move rigidly. "auto": the first of these that the clip has the data for.
+        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "runs": points
+        without faces or edges, linked to those that keep their distance: blades, needles, strands, centre lines.
+        "motion": patches that move rigidly. "auto": the first of these that the clip has the data for.
     root : int, optional
         A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
 
@@ -356,6 +367,18 @@ def _by_components(seen: _Seen, root: int | None) -> Found | None:
     return _arranged(seen, label, root, "components")
 
 
+def _by_runs(seen: _Seen, root: int | None) -> Found | None:
+    """Points that nothing joins, linked to those that keep their distance: blades, needles, strands, centre lines."""
+    if len(seen.mesh):
+        return None
+    frames = seen.frames[1:]  # the rest pose may have links of other lengths
+    links = run_links(frames)
+    if links is None:
+        return None
+    bases = base_points(frames, links, root)
+    return Found(*branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist()), "runs")
+
+
 def _by_motion(seen: _Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
     """Patches that move rigidly, each on one that it touches."""
     return _arranged(seen, _patches(seen, patch_vertices), root, "motion")
@@ -378,6 +401,7 @@ _FINDERS: dict[str, Callable[[_Seen, int | None], Found | None]] = {
     "skeleton": _by_skeleton,
     "edges": _by_edges,
     "components": _by_components,
+    "runs": _by_runs,
     "motion": _by_motion,
 }
 _EXPECTED = {
@@ -385,6 +409,7 @@ _EXPECTED = {
     "skeleton": "joints with weights",
     "edges": "edges without cycles and no faces",
     "components": "faces or edges in several separate pieces",
+    "runs": "points without faces or edges, of which neighbours keep their distance",
     "motion": "vertices",
     "auto": "vertices",
 }
