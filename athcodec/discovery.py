@@ -2,15 +2,14 @@
 
 Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
 components of a render mesh, or from motion: runs of points that keep their distance (point_runs.py), or patches of a
-mesh that move rigidly. All but edge graphs and runs, which are made into edges, are then arranged alike: a branch hangs where it stays closest to a larger one in a few frames, and its vertices are put in order of their
-distance over the mesh from there. It looks at no more than a few frames, and knows no file format but that of its own
-results (`save`, `load`).
+mesh that move rigidly. All but runs and edge graphs are then arranged alike: a branch hangs where it stays closest to a
+larger one in a few frames, and its vertices are put in order of their distance over the mesh from there. It looks at no
+more than a few frames, and knows no file format but that of its own results (`save`, `load`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -22,9 +21,9 @@ import numpy as np
 
 from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index
-from athcodec.errors import ClipError, MissingExtra
+from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
-from athcodec.point_runs import base_points, run_links
+from athcodec.point_runs import base_points, run_links, scipy_module
 
 METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
@@ -338,7 +337,7 @@ def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
 
 
 def _nearest_label(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    tree = _scipy("spatial").cKDTree(rest[label >= 0])
+    tree = scipy_module("spatial").cKDTree(rest[label >= 0])
     return np.where(label >= 0, label, label[label >= 0][tree.query(rest)[1]])
 
 
@@ -467,9 +466,9 @@ def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
 
 def _components(links: np.ndarray, vertex_count: int) -> np.ndarray:
     """(N,) labels of the parts that links join, numbered by their first vertices."""
-    sparse = _scipy("sparse")
+    sparse = scipy_module("sparse")
     graph = sparse.coo_matrix((np.ones(len(links), np.int8), links.T), (vertex_count, vertex_count))
-    label = _scipy("sparse.csgraph").connected_components(graph, directed=False)[1]
+    label = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
     return _numbered(label)
 
 
@@ -501,7 +500,7 @@ def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: in
     """A tree of branches of the least cost in all, from a root outwards: of each part that no contact joins one."""
     count = int(label.max()) + 1
     own, other = label[contacts.vertices].T
-    sparse, graphs = _scipy("sparse"), _scipy("sparse.csgraph")
+    sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
     least = contacts.cost.max(initial=1e-30) * 1e-9  # a cost of nothing would be no contact
     graph = sparse.coo_matrix((contacts.cost + least, (own, other)), (count, count)).tocsr()
     tree = graphs.minimum_spanning_tree(graph)
@@ -533,7 +532,7 @@ def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: 
     for branch in np.flatnonzero(parent >= 0).tolist():
         above = int(parent[branch])
         if above not in tree_of:
-            tree_of[above] = _scipy("spatial").cKDTree(rest[order[bounds[above] : bounds[above + 1]]])
+            tree_of[above] = scipy_module("spatial").cKDTree(rest[order[bounds[above] : bounds[above + 1]]])
         vertices = order[bounds[branch] : bounds[branch + 1]]
         base[branch] = vertices[tree_of[above].query(rest[vertices])[0].argmin()]
     return _Joints(parent, base)
@@ -587,7 +586,7 @@ def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
 
 def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     """(C, 2) vertices and the nearest one to each on every branch that is near it."""
-    cKDTree, count = _scipy("spatial").cKDTree, int(label.max()) + 1
+    cKDTree, count = scipy_module("spatial").cKDTree, int(label.max()) + 1
     found = [np.zeros((0, 2), np.int64), *_others_nearby(cKDTree(rest), rest, label, min(NEIGHBOURS, len(rest)))]
     part = _components(np.concatenate([label[pairs] for pairs in found]), count)
     sizes = np.bincount(part, np.bincount(label, minlength=count))
@@ -636,9 +635,9 @@ def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarra
     """(N,) distances from the base of each vertex's branch over the links within it; straight where none lead there."""
     inner = links[label[links[:, 0]] == label[links[:, 1]]]
     length = np.linalg.norm(rest[inner[:, 0]] - rest[inner[:, 1]], axis=1)
-    graph = _scipy("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
+    graph = scipy_module("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
     graph.data = np.maximum(graph.data, 1e-30)  # a distance of nothing would be no link
-    way: np.ndarray = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
+    way: np.ndarray = scipy_module("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
     return np.where(np.isfinite(way), way, np.linalg.norm(rest - rest[joints.base][label], axis=1))
 
 
@@ -651,15 +650,10 @@ def _rank_correlation(label: np.ndarray, first: np.ndarray, second: np.ndarray) 
 
 def _near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
     """(L, 2) pairs of points and their nearest others."""
-    near = _scipy("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
+    near = (
+        scipy_module("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
+    )
     return np.stack([np.repeat(np.arange(len(points)), near.shape[1] - 1), near[:, 1:].reshape(-1)], axis=1)
-
-
-def _scipy(module: str) -> Any:
-    try:
-        return importlib.import_module(f"scipy.{module}")
-    except ImportError:
-        raise MissingExtra('finding branches: needs scipy: pip install "athcodec[hierarchy]"') from None
 
 
 # ---- patches that move rigidly ----
@@ -687,8 +681,8 @@ def _rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) -
 def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
     """(N,) labels: the nearest, over the links, of `count` seeds that are far from each other; every part has one."""
     length = np.maximum(np.linalg.norm(rest[links[:, 0]] - rest[links[:, 1]], axis=1), 1e-30)
-    graph = _scipy("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
-    dijkstra = _scipy("sparse.csgraph").dijkstra
+    graph = scipy_module("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
+    dijkstra = scipy_module("sparse.csgraph").dijkstra
     seeds = np.unique(_components(links, len(rest)), return_index=True)[1].tolist()
     way = dijkstra(graph, indices=seeds, min_only=True)
     while len(seeds) < count and way.max() > 0:

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.errors import MissingExtra
+
 NEAR = (16, 96)  # points around each one, at least and at most, among which its neighbours are looked for
 PAIRS = 1 << 19  # in all, where that is more than the least
 ROUNDS = 6  # of looking for those of loose ends, among ever fewer points and so ever further away
@@ -21,8 +23,8 @@ STEADY = 0.05  # change of a link's length over how much its ends move against e
 PLIANT = 3.0  # times that quantile: of links that are steadier the shorter one is the better
 UNSTEADY, UNLIKE = 0.2, 4.0  # likewise, at most, where all others are UNLIKE times as unsteady
 OFF_LINE = 0.5  # of a link's length: how far off its line a still point behind it may be
-CROWD = 1.4  # of the length of the links at a point: what else is steady within that is no neighbour on a run
-CROWDED = 0.3  # of such pairs for each point: they are a sheet or a body
+CROWD = 1.5  # of the length of the links at a point: what else is steady within that is no neighbour on a run
+CROWDED = 0.25  # of such pairs for each point: they are a sheet or a body
 JOINED = 0.5  # of the points, at least, that are on runs
 PAIRS_AT_ONCE = 1 << 13
 
@@ -115,7 +117,7 @@ class _Steady:
 
     def tree(self) -> np.ndarray:
         """(L, 2) of them those that join the same points at the least cost in all."""
-        sparse, graphs = _scipy("sparse"), _scipy("sparse.csgraph")
+        sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
         cost = np.maximum(self._length, self.precision) * np.hypot(self._change, PLIANT * self._usual)
         graph = sparse.coo_matrix((cost, self._pairs.T), (self._count, self._count)).tocsr()
         tree = graphs.minimum_spanning_tree(graph).tocoo()
@@ -135,7 +137,7 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
     """The links, and those to points that do not move, where they stand behind an end that does not move either."""
     count = frames.shape[1]
     still = np.sqrt(((frames - frames[0]) ** 2).sum(axis=2)).max(axis=0) <= 4 * precision
-    cKDTree = _scipy("spatial").cKDTree
+    cKDTree = scipy_module("spatial").cKDTree
     for _ in range(ROUNDS):
         degree = _degrees(links, count)
         inner, end = np.concatenate([links, links[:, ::-1]]).T
@@ -160,7 +162,7 @@ def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
     if len(names) < 2:
         return np.zeros((0, 2), np.int64)
     count = min(len(names), 1 + int(np.clip(PAIRS // len(names), *NEAR)))
-    near = names[_scipy("spatial").cKDTree(points).query(points, k=count)[1].reshape(-1)]
+    near = names[scipy_module("spatial").cKDTree(points).query(points, k=count)[1].reshape(-1)]
     pairs = np.sort(np.stack([np.repeat(names, count), near], axis=1), axis=1)
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     size = int(names.max()) + 1
@@ -176,10 +178,14 @@ def _degrees(links: np.ndarray, count: int) -> np.ndarray:
 
 def _parts(links: np.ndarray, count: int) -> np.ndarray:
     """(N,) labels of what links join."""
-    graph = _scipy("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
-    labels: np.ndarray = _scipy("sparse.csgraph").connected_components(graph, directed=False)[1]
+    graph = scipy_module("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
+    labels: np.ndarray = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
     return labels
 
 
-def _scipy(module: str) -> Any:
-    return importlib.import_module(f"scipy.{module}")
+def scipy_module(name: str) -> Any:
+    """A module of scipy. Raises MissingExtra without it."""
+    try:
+        return importlib.import_module(f"scipy.{name}")
+    except ImportError:
+        raise MissingExtra('finding branches: needs scipy: pip install "athcodec[hierarchy]"') from None
