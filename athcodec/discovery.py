@@ -1,16 +1,15 @@
 """The branch hierarchy of a clip that names none: labels for its vertices, a tree over the labels, an order along each.
 
 Labels come from attributes named like branch ids, from the joints of a skin, from an edge graph, from the connected
-components of a render mesh, or from motion: patches of a mesh that move rigidly. All but edge graphs are then arranged
-alike: a branch hangs where it stays closest to a larger one in a few frames, and its vertices are put in order of their
-distance over the mesh from there. It looks at no more than a few frames, and knows no file format but that of its own
-results (`save`, `load`).
+components of a render mesh, or from motion: runs of points that keep their distance (point_runs.py), or patches of a
+mesh that move rigidly. All but runs and edge graphs are then arranged alike: a branch hangs where it stays closest to a
+larger one in a few frames, and its vertices are put in order of their distance over the mesh from there. It looks at no
+more than a few frames, and knows no file format but that of its own results (`save`, `load`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -22,10 +21,11 @@ import numpy as np
 
 from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
-from athcodec.errors import ClipError, MissingExtra
+from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.point_runs import base_points, run_links, scipy_module
 
-METHODS = ("attributes", "skeleton", "edges", "components", "motion")
+METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 
@@ -36,6 +36,7 @@ QUERY = 1 << 21  # neighbours in one query
 STAYING = 300.0  # weight of how constant the distance of two branches is, against how small it is
 ALIKE = 4.0  # further cost of two branches of the same size: no leaf grows on a leaf
 ROOT_SIZE = 0.25  # of the diagonal of the largest branch: smaller ones are no roots
+LONE_POINTS = 0.1  # of the vertices, up to which runs are tried against no patches
 WELD = 1e-6  # of the diagonal: vertices that stay closer than this are one vertex of a mesh that was split
 COMPONENTS_AT_MOST = 0.6  # of the vertices: more components than that are no branches but loose points
 IN_ORDER = 0.7  # rank correlation of the source's order with the distance from the base from which on it is kept
@@ -62,7 +63,7 @@ class Found:
     stem_index : (N,) int32 array or None
         The place of each vertex on its stem, as in MotionClip.
     method : str
-        How they were found: "attributes", "skeleton", "edges", "components", "motion", or "file".
+        How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
     """
 
     vertex_branch: np.ndarray
@@ -81,22 +82,29 @@ class Found:
 
 
 def candidates(clip: MotionClip) -> list[Found]:
-    """What find_branches gives; and where that goes by motion, also patches of another size, patches without parents,
-    and one single branch: only a trial shows which of them makes the smallest file. A clip that stands still has no
-    patches."""
+    """What find_branches gives; and where that goes by motion, or by runs that leave many points alone, also patches of
+    other sizes, patches without parents, and one single branch: only a trial shows which of them makes the smallest
+    file. A clip that stands still has no patches and no runs."""
     seen = _Seen(clip)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     if stands_still(clip):
-        found = _first_found(seen, METHODS[:-1], None)
+        found = _first_found(seen, METHODS[:-2], None)
         return [single] if found is None else [single, found]
     found = _first_found(seen, METHODS, None) or _by_motion(seen, None)
     if found.method == "skeleton":
         return [found, dataclasses.replace(found, stem_index=None)]
-    if found.method != "motion":
+    lone = np.count_nonzero(np.bincount(found.vertex_branch) == 1)
+    if found.method != "motion" and not (found.method == "runs" and lone > LONE_POINTS * clip.vertex_count):
         return [found]
-    if clip.vertex_count >= LARGE_MESH:
-        return [single, found, _by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
-    return [single, found, _by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
+    patches = [found] if found.method == "motion" else [found, _by_motion(seen, None)]
+    return [single, *patches, *_more_patches(seen)]
+
+
+def _more_patches(seen: _Seen) -> list[Found]:
+    """Patches of another size than usual, and such without parents."""
+    if seen.clip.vertex_count >= LARGE_MESH:
+        return [_by_motion(seen, None, LARGE_PATCH), _free_patches(seen, FREE_PATCHES[-1])]
+    return [_by_motion(seen, None, SMALL_PATCH), *(_free_patches(seen, size) for size in FREE_PATCHES)]
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
@@ -107,8 +115,9 @@ def find_branches(clip: MotionClip, method: str = "auto", root: int | None = Non
     clip : MotionClip
     method : str, optional
         "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
-        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "motion": patches
-        that move rigidly. "auto": the first of these that the clip has the data for.
+        vertices. "edges": a graph of centre lines. "components": the connected components of a mesh. "runs": points
+        without faces or edges, linked to those that keep their distance: blades, needles, strands, centre lines.
+        "motion": patches that move rigidly. "auto": the first of these that the clip has the data for.
     root : int, optional
         A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
 
@@ -331,7 +340,7 @@ def _used_ancestor(joint: int, parents: np.ndarray, is_used: np.ndarray) -> int:
 
 
 def _nearest_label(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    tree = _scipy("spatial").cKDTree(rest[label >= 0])
+    tree = scipy_module("spatial").cKDTree(rest[label >= 0])
     return np.where(label >= 0, label, label[label >= 0][tree.query(rest)[1]])
 
 
@@ -360,6 +369,18 @@ def _by_components(seen: _Seen, root: int | None) -> Found | None:
     return _arranged(seen, label, root, "components")
 
 
+def _by_runs(seen: _Seen, root: int | None) -> Found | None:
+    """Points that nothing joins, linked to those that keep their distance: blades, needles, strands, centre lines."""
+    if len(seen.mesh):
+        return None
+    frames = seen.frames[1:]  # the rest pose may have links of other lengths
+    links = run_links(frames)
+    if links is None:
+        return None
+    bases = base_points(frames, links, root)
+    return Found(*branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist()), "runs")
+
+
 def _by_motion(seen: _Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:
     """Patches that move rigidly, each on one that it touches."""
     return _arranged(seen, _patches(seen, patch_vertices), root, "motion")
@@ -382,6 +403,7 @@ _FINDERS: dict[str, Callable[[_Seen, int | None], Found | None]] = {
     "skeleton": _by_skeleton,
     "edges": _by_edges,
     "components": _by_components,
+    "runs": _by_runs,
     "motion": _by_motion,
 }
 _EXPECTED = {
@@ -389,6 +411,7 @@ _EXPECTED = {
     "skeleton": "joints with weights",
     "edges": "edges without cycles and no faces",
     "components": "faces or edges in several separate pieces",
+    "runs": "points without faces or edges, of which neighbours keep their distance",
     "motion": "vertices",
     "auto": "vertices",
 }
@@ -446,9 +469,9 @@ def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
 
 def _components(links: np.ndarray, vertex_count: int) -> np.ndarray:
     """(N,) labels of the parts that links join, numbered by their first vertices."""
-    sparse = _scipy("sparse")
+    sparse = scipy_module("sparse")
     graph = sparse.coo_matrix((np.ones(len(links), np.int8), links.T), (vertex_count, vertex_count))
-    label = _scipy("sparse.csgraph").connected_components(graph, directed=False)[1]
+    label = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
     return _numbered(label)
 
 
@@ -480,7 +503,7 @@ def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: in
     """A tree of branches of the least cost in all, from a root outwards: of each part that no contact joins one."""
     count = int(label.max()) + 1
     own, other = label[contacts.vertices].T
-    sparse, graphs = _scipy("sparse"), _scipy("sparse.csgraph")
+    sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
     least = contacts.cost.max(initial=1e-30) * 1e-9  # a cost of nothing would be no contact
     graph = sparse.coo_matrix((contacts.cost + least, (own, other)), (count, count)).tocsr()
     tree = graphs.minimum_spanning_tree(graph)
@@ -512,7 +535,7 @@ def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: 
     for branch in np.flatnonzero(parent >= 0).tolist():
         above = int(parent[branch])
         if above not in tree_of:
-            tree_of[above] = _scipy("spatial").cKDTree(rest[order[bounds[above] : bounds[above + 1]]])
+            tree_of[above] = scipy_module("spatial").cKDTree(rest[order[bounds[above] : bounds[above + 1]]])
         vertices = order[bounds[branch] : bounds[branch + 1]]
         base[branch] = vertices[tree_of[above].query(rest[vertices])[0].argmin()]
     return _Joints(parent, base)
@@ -566,7 +589,7 @@ def _contacts(frames: np.ndarray, label: np.ndarray) -> _Contacts:
 
 def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     """(C, 2) vertices and the nearest one to each on every branch that is near it."""
-    cKDTree, count = _scipy("spatial").cKDTree, int(label.max()) + 1
+    cKDTree, count = scipy_module("spatial").cKDTree, int(label.max()) + 1
     found = [np.zeros((0, 2), np.int64), *_others_nearby(cKDTree(rest), rest, label, min(NEIGHBOURS, len(rest)))]
     part = _components(np.concatenate([label[pairs] for pairs in found]), count)
     sizes = np.bincount(part, np.bincount(label, minlength=count))
@@ -615,9 +638,9 @@ def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarra
     """(N,) distances from the base of each vertex's branch over the links within it; straight where none lead there."""
     inner = links[label[links[:, 0]] == label[links[:, 1]]]
     length = np.linalg.norm(rest[inner[:, 0]] - rest[inner[:, 1]], axis=1)
-    graph = _scipy("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
+    graph = scipy_module("sparse").coo_matrix((length, inner.T), (len(rest),) * 2).tocsr()
     graph.data = np.maximum(graph.data, 1e-30)  # a distance of nothing would be no link
-    way: np.ndarray = _scipy("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
+    way: np.ndarray = scipy_module("sparse.csgraph").dijkstra(graph, directed=False, indices=joints.base, min_only=True)
     return np.where(np.isfinite(way), way, np.linalg.norm(rest - rest[joints.base][label], axis=1))
 
 
@@ -630,15 +653,10 @@ def _rank_correlation(label: np.ndarray, first: np.ndarray, second: np.ndarray) 
 
 def _near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
     """(L, 2) pairs of points and their nearest others."""
-    near = _scipy("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
+    near = (
+        scipy_module("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
+    )
     return np.stack([np.repeat(np.arange(len(points)), near.shape[1] - 1), near[:, 1:].reshape(-1)], axis=1)
-
-
-def _scipy(module: str) -> Any:
-    try:
-        return importlib.import_module(f"scipy.{module}")
-    except ImportError:
-        raise MissingExtra('finding branches: needs scipy: pip install "athcodec[hierarchy]"') from None
 
 
 # ---- patches that move rigidly ----
@@ -666,8 +684,8 @@ def _rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) -
 def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
     """(N,) labels: the nearest, over the links, of `count` seeds that are far from each other; every part has one."""
     length = np.maximum(np.linalg.norm(rest[links[:, 0]] - rest[links[:, 1]], axis=1), 1e-30)
-    graph = _scipy("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
-    dijkstra = _scipy("sparse.csgraph").dijkstra
+    graph = scipy_module("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
+    dijkstra = scipy_module("sparse.csgraph").dijkstra
     seeds = np.unique(_components(links, len(rest)), return_index=True)[1].tolist()
     way = dijkstra(graph, indices=seeds, min_only=True)
     while len(seeds) < count and way.max() > 0:

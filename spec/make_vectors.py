@@ -357,6 +357,15 @@ valid(
     "every rotation factor there is: 0, 1, 2, 4, 8",
     lambda: moving([Stem(-1, 3), *(Stem(b, 2, 1) for b in range(4))], 21, frames=4, heads=HEADS),
 )
+BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
+
+
+def interleaved(stems: list[Stem]) -> list[int]:
+    """Numbers of the vertices in a source that holds all first vertices, then all second ones."""
+    places = [(i, b) for b, stem in enumerate(stems) for i in range(stem.count)]
+    return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
+
+
 valid(
     "permutations",
     "branches and vertices numbered otherwise in the source",
@@ -373,6 +382,21 @@ valid(
     "permutations-said",
     "numbers as expected, but said one by one",
     lambda: still(FORK, branch_source=[0, 1], vertex_source=[0, 1, 2, 3, 4]),
+)
+valid(
+    "permutation-interleaved",
+    "all first vertices in front of all second ones, of stems of different lengths",
+    lambda: still(BLADES, vertex_source=interleaved(BLADES)),
+)
+valid(
+    "permutation-interleaved-long",
+    "the same of two stems of more vertices than numbers are remembered of",
+    lambda: still([Stem(-1, 259), Stem(-1, 260)], vertex_source=interleaved([Stem(-1, 259), Stem(-1, 260)])),
+)
+valid(
+    "permutation-turned",
+    "stems from tip to base",
+    lambda: still(BLADES, vertex_source=[v for a, b in ((0, 3), (3, 7), (7, 9), (9, 12)) for v in range(a, b)[::-1]]),
 )
 
 # ---- valid: segments, time, levels -------------------------------------------------------------------------
@@ -2264,6 +2288,18 @@ hierarchy(
 hierarchy(
     "vertex-negative", "a vertex with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=[-1, 0, 1, 2, 3]
 )
+for what, vertex_source in (
+    ("along-beyond", [0, 3, 6, 1, 2]),
+    ("along-negative", [4, 1, -2, 0, 3]),
+    ("beside-beyond", [1, 3, 0, 4, 6]),
+    ("beside-negative", [3, 1, 4, 0, -2]),
+):
+    hierarchy(
+        f"vertex-{what}",
+        "a number out of range, as expected",
+        [Stem(-1, 3), Stem(0, 2, 1)],
+        vertex_source=vertex_source,
+    )
 invalid(
     "hierarchy-depth-limit",
     "LIMIT_EXCEEDED",

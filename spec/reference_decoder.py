@@ -620,19 +620,21 @@ class Branch:
     last_place: int = 0  # where on this stem the last child so far hangs
 
 
+PLACES = 256  # of a stem, whose numbers are expected from those of other stems
+
+
 def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
     """Branches, and both permutations: number i here is number source[i] of the source."""
     coder = RangeDecoder(stream)
     branches = decode_branches(coder, branch_count, vertex_count)
     decode_attaches(coder, branches)
-    sources = NumberModel()
-    branch_source = decode_numbers(coder, sources, [(0, branch_count)], branch_count)
+    branch_source = decode_numbers(coder, [(0, branch_count)], branch_count)
     stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
     for b in sorted(range(branch_count), key=lambda b: branch_source[b]):
         stem_start[b] = start
         start += branches[b].count
     runs = [(stem_start[b], branches[b].count) for b in range(branch_count)]
-    vertex_source = decode_numbers(coder, sources, runs, vertex_count)
+    vertex_source = decode_numbers(coder, runs, vertex_count)
     coder.finish()
     measure_subtrees(branches)
     return branches, branch_source, vertex_source
@@ -681,17 +683,44 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
 
 
-def decode_numbers(coder: RangeDecoder, model: NumberModel, runs: list, total: int) -> list[int]:
+def decode_numbers(coder: RangeDecoder, runs: list, total: int) -> list[int]:
     """A permutation of `total` numbers, in runs of (expected first number, length)."""
-    regular, numbers = not coder.bit(Context(32768)), []
-    for expected, length in runs:
-        for _ in range(length):
-            value = expected if regular else expected + code_signed(coder, model, 16)
-            require(0 <= value < total, "a permutation has a number out of range")
-            numbers.append(value)
-            expected = value + 1
-    require(len(set(numbers)) == total, "a permutation has a number twice")
+    numbers: list[int] = []
+    if coder.bit(Context(32768)):
+        decode_permutation(coder, runs, total, numbers)
+    else:
+        for start, length in runs:
+            numbers += range(start, start + length)
+    require(sorted(numbers) == list(range(total)), "a permutation has a number twice")
     return numbers
+
+
+def decode_permutation(coder: RangeDecoder, runs: list, total: int, numbers: list[int]) -> None:
+    """Each number one step behind that before it, or behind that at the same place of an earlier run, or neither."""
+    expected = [[[Context(32768) for _ in range(3)] for _ in range(2)] for _ in range(2)]
+    differences, mean, last = NumberModel(), 64, 0
+    beside, step, step_beside = [-1] * PLACES, 1, 1
+    for start, length in runs:
+        for i in range(length):
+            begins, known = 1 if i == 0 else 0, beside[i] if i < PLACES else -1
+            following = start if i == 0 else numbers[-1] + 1
+            along = start if i == 0 else numbers[-1] + step
+            if coder.bit(expected[0][begins][last]):
+                value, last = along, 0
+            elif known >= 0 and coder.bit(expected[1][begins][last]):
+                value, last = known + step_beside, 1
+            else:
+                difference, last = code_signed(coder, differences, mean), 2
+                mean = mean - (mean + 3) // 4 + clipped(difference) * 4
+                value = following + difference
+            require(0 <= value < total, "a permutation has a number out of range")
+            if i > 0:
+                step = value - numbers[-1]
+            if known >= 0:
+                step_beside = value - known
+            if i < PLACES:
+                beside[i] = value
+            numbers.append(value)
 
 
 def measure_subtrees(branches: list[Branch]) -> None:

@@ -379,12 +379,24 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
         for b in sorted(range(len(stems)), key=lambda b: order[b]):
             starts[b], start = start, start + stems[b].count
         runs = [(starts[b], stem.count) for b, stem in enumerate(stems)]
-    script, numbers = [1], iter(source)
-    for expected, length in runs:
-        for _ in range(length):
-            value = next(numbers)
-            script.append(value - expected)
-            expected = value + 1
+    script, numbers, before = [1], iter(source), []
+    beside, step, step_beside = {}, 1, 1
+    for start, length in runs:
+        for i in range(length):
+            value, known = next(numbers), beside.get(i)
+            along, following = (before[-1] + step, before[-1] + 1) if i > 0 else (start, start)
+            script.append(int(value == along))
+            if value != along and known is not None:
+                script.append(int(value == known + step_beside))
+            if value != along and (known is None or value != known + step_beside):
+                script.append(value - following)
+            if i > 0:
+                step = value - before[-1]
+            if known is not None:
+                step_beside = value - known
+            if i < rd.PLACES:
+                beside[i] = value
+            before.append(value)
     return script
 
 

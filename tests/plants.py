@@ -242,6 +242,39 @@ def awkward_plants(draw, **fixed):
     return awkward(**drawn | fixed)
 
 
+def runs_of_points(
+    counts: list[int], frames: int = 24, seed: int = 0, order: str = "runs", still: int = 1, drift: float = 0.0
+) -> MotionClip:
+    """Runs of so many points that bend and keep the lengths of their elements, a root each.
+
+    order: of the vertices, run after run, all first points before all second ones ("interleaved"), or at random.
+    still: lowest points that do not move. drift: how far runs move as a whole, over their own length of about 1.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 2 * np.pi, frames)
+
+    def waves(size: float) -> np.ndarray:
+        return size * np.sin(rng.uniform(0.5, 2, 3) * time[:, None] + rng.uniform(0, 6.28, 3))
+
+    positions = []
+    for count in counts:
+        share = np.clip(np.arange(1, count) - (still - 1), 0, None) / max(1, count)
+        slope = rng.normal(0, 0.3, 3) + waves(0.8)[:, None] * share[:, None]
+        heading = slope + [0.0, 1.0, 0.0]
+        heading *= rng.uniform(0.5, 1.5) / max(1, count) / np.linalg.norm(heading, axis=2, keepdims=True)
+        base = rng.uniform(-1, 1, 3) * [len(counts) ** 0.5 / 5, 0, len(counts) ** 0.5 / 5] + waves(drift)
+        positions.append(base[:, None] + np.concatenate([np.zeros((frames, 1, 3)), np.cumsum(heading, axis=1)], axis=1))
+    branch = np.repeat(np.arange(len(counts)), counts)
+    place = source_stem_index(branch)
+    vertices = {
+        "runs": np.arange(len(branch)),
+        "interleaved": np.argsort(place, kind="stable"),
+        "shuffled": rng.permutation(len(branch)),
+    }[order]
+    moved = np.concatenate(positions, axis=1)[:, vertices]
+    return clip_of(moved, moved[0], branch[vertices], np.full(len(counts), -1), stem_index=place[vertices])
+
+
 def diagonal(clip: MotionClip) -> float:
     return float(np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3).astype(np.float64), axis=0)))
 

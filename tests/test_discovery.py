@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import plant
+from plants import plant, runs_of_points
 
 import athcodec
 from athcodec import MotionClip, discovery
 from athcodec.cli import main
-from athcodec.clip import Skin
+from athcodec.clip import Skin, source_stem_index
 from athcodec.encoding.job import EncodingJob
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders
+from bench.odd.grass import ORDERS, grass
 from bench.trees.mesh import dress
 from bench.trees.wind import Wind
 
@@ -168,6 +169,90 @@ def test_points_without_any_mesh_are_compressed_too(tmp_path, vertices):
     with athcodec.open(tmp_path / "a.ath") as decoder:
         apart = np.linalg.norm(decoder.positions(dtype=np.float64) - clip.block(0, 6), axis=2)
         assert apart.max() <= result.max_error_bound
+
+
+ORDERS_OF_RUNS = ("runs", "interleaved", "shuffled")
+RUNS = {
+    "blades of 3 to 11 points": dict(counts=[3 + 7 * n % 9 for n in range(90)]),
+    "blades with three points in the ground": dict(counts=[8] * 60, still=3),
+    "needles of 2 points in the air": dict(counts=[2] * 80, drift=0.5),
+    "strands of 30 points, loose at both ends": dict(counts=[30] * 12, drift=0.3),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("order", ORDERS_OF_RUNS)
+def test_runs_of_points_are_found_whatever_their_order(name, order):
+    clip = runs_of_points(**RUNS[name], order=order)
+    found = athcodec.find_branches(bare(clip))
+    assert found.method == "runs"
+    assert len(found.branch_parent) == clip.branch_count
+    assert (found.branch_parent < 0).all()
+    pairs = np.stack([found.vertex_branch, clip.vertex_branch], axis=1)
+    assert len(np.unique(pairs, axis=0)) == clip.branch_count, "points of several runs in one branch"
+    place = source_stem_index(clip.vertex_branch) if clip.stem_index is None else clip.stem_index
+    last = np.bincount(clip.vertex_branch)[clip.vertex_branch] - 1
+    turned = found.stem_index != place
+    assert (found.stem_index == np.where(turned, last - place, place)).all(), "points are not in the order of their run"
+    assert "drift" in RUNS[name] or not turned[place == 0].any(), "a run does not begin at its base"
+
+
+@pytest.fixture(scope="module")
+def named_grass(tmp_path_factory) -> int:
+    """Bytes of a meadow whose blades are named, in order."""
+    clip = grass(seed=1, blades=150, frames=48)
+    path = tmp_path_factory.mktemp("grass") / "a.ath"
+    return athcodec.encode(clip, path, rel_error=1e-3, attributes="none").bytes
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_unnamed_blades_take_hardly_more_than_named_ones(order, named_grass, tmp_path):
+    clip = grass(seed=1, blades=150, frames=48, named=False, order=order)
+    result = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-3, attributes="none")
+    permutation = result.chunk_bytes["HIERARCHY"] if order == "shuffled" else 0
+    assert result.bytes - permutation < 1.05 * named_grass
+    if order == "interleaved":
+        assert result.chunk_bytes["HIERARCHY"] < 100
+
+
+def test_loose_points_of_a_tree_get_its_centre_lines():
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        found = athcodec.find_branches(bare(sample, edges=None))
+        assert found.method == "runs"
+        assert (found.branch_parent < 0).sum() == 1
+        order = np.lexsort((found.stem_index, found.vertex_branch))
+        along = found.vertex_branch[order[1:]] == found.vertex_branch[order[:-1]]
+        ours = np.sort(np.stack([order[:-1], order[1:]], axis=1)[along], axis=1)
+        edges = set(map(tuple, np.sort(sample.edges, axis=1).tolist()))
+        assert sum(tuple(pair) in edges for pair in ours.tolist()) > 0.98 * len(ours)
+
+
+def sheet(frames: int = 24) -> np.ndarray:
+    """A flag of 20 x 30 points."""
+    u, v = (grid.reshape(-1) / 10 for grid in np.meshgrid(np.arange(20), np.arange(30)))
+    time = np.linspace(0, 6, frames)[:, None]
+    return np.stack([u + 0 * time, 0.3 * u * np.sin(2 * u + v - 3 * time), v + 0 * time], axis=2)
+
+
+def body(frames: int = 24) -> np.ndarray:
+    """300 points of a thrown stone."""
+    points = np.random.default_rng(0).normal(size=(300, 3))
+    angle = np.linspace(0, 4, frames)
+    cos, sin, zero = np.cos(angle), np.sin(angle), 0 * angle
+    turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]]).transpose(2, 0, 1)
+    return points @ turn + np.linspace(0, 5, frames)[:, None, None]
+
+
+def noise(frames: int = 24) -> np.ndarray:
+    return np.random.default_rng(0).normal(size=(frames, 300, 3))
+
+
+@pytest.mark.parametrize("points", [sheet, body, noise])
+def test_points_that_are_no_runs_are_taken_for_none(points):
+    clip = MotionClip(points().astype(np.float32), np.arange(24.0))
+    assert athcodec.find_branches(clip).method == "motion"
+    with pytest.raises(ClipError, match="neighbours keep their distance"):
+        athcodec.find_branches(clip, "runs")
 
 
 def test_far_pieces_are_plants_of_their_own(dressed):

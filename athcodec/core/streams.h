@@ -11,10 +11,34 @@
 
 /* ---- hierarchy ---- */
 
+enum { PLACES = 256 };
+
+/* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
+ * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
 typedef struct {
-    number_model up, count, attach, lag, source;
-    ath_context flag[3][2], permuted[2];
+    number_model difference;
+    ath_context permuted,
+        expected[2][2][3]; /* by expectation; whether a run begins; which one was right before, 2: none */
+    int32_t beside[PLACES], step[2], last; /* beside: -1: none yet */
+    uint32_t mean;
+} permutation_model;
+
+typedef struct {
+    number_model up, count, attach, lag;
+    permutation_model branch_source, vertex_source;
+    ath_context flag[3][2];
 } hierarchy_model;
+
+static void permutation_model_init(permutation_model *model)
+{
+    number_model_init(&model->difference);
+    context_init(&model->permuted, 32768);
+    for (int32_t i = 0; i < 12; i++) context_init(&model->expected[i / 6][i / 3 % 2][i % 3], 32768);
+    for (int32_t i = 0; i < PLACES; i++) model->beside[i] = -1;
+    model->step[0] = model->step[1] = 1;
+    model->last = 0;
+    model->mean = 64;
+}
 
 static void hierarchy_model_init(hierarchy_model *model)
 {
@@ -22,10 +46,10 @@ static void hierarchy_model_init(hierarchy_model *model)
     number_model_init(&model->count);
     number_model_init(&model->attach);
     number_model_init(&model->lag);
-    number_model_init(&model->source);
+    permutation_model_init(&model->branch_source);
+    permutation_model_init(&model->vertex_source);
     for (int32_t i = 0; i < 3; i++)
         for (int32_t j = 0; j < 2; j++) context_init(&model->flag[i][j], 16384);
-    for (int32_t i = 0; i < 2; i++) context_init(&model->permuted[i], 32768);
 }
 
 static int32_t code_flags(ath_coder *coder, hierarchy_model *model, int32_t before, int32_t flags)
@@ -85,26 +109,49 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     return 1;
 }
 
-/* Source numbers in file order. `expected` is that of entry i: one more than the entry before, or where a run starts,
- * what is stored as its start. */
-static int code_number_of(ath_coder *coder, hierarchy_model *model, int regular, int32_t expected, int32_t count,
-                          int32_t *source)
+/* The number at `place` of a run that is expected to begin with `start`; `source` points at it, behind those before. */
+static int code_source_number(ath_coder *coder, permutation_model *model, int32_t start, int32_t place, int32_t count,
+                              int32_t *source)
 {
-    int32_t given = ENCODING ? *source - expected : 0; /* when decoding, it is not initialised */
-    int64_t value = regular ? expected : (int64_t)expected + code_signed(coder, &model->source, 16, given);
+    int32_t known = place < PLACES ? model->beside[place] : -1, right = 2;
+    int64_t given = ENCODING ? *source : 0, value; /* when decoding, it is not initialised */
+    int64_t following = place == 0 ? start : (int64_t)source[-1] + 1;
+    int64_t along = place == 0 ? start : (int64_t)source[-1] + model->step[0];
+    int64_t beside = (int64_t)known + model->step[1];
+    ath_context(*expected)[2][3] = model->expected;
+    if (coder_bit(coder, &expected[0][place == 0][model->last], given == along)) {
+        right = 0;
+        value = along;
+    } else if (known >= 0 && coder_bit(coder, &expected[1][place == 0][model->last], given == beside)) {
+        right = 1;
+        value = beside;
+    } else {
+        int32_t difference = code_signed(coder, &model->difference, model->mean, (int32_t)(given - following));
+        model->mean = model->mean - (model->mean + 3) / 4 + clipped(difference) * 4;
+        value = following + difference;
+    }
     if (value < 0 || value >= count) return 0;
     *source = (int32_t)value;
+    model->last = right;
+    if (place > 0) model->step[0] = *source - source[-1];
+    if (known >= 0) model->step[1] = *source - known;
+    if (place < PLACES) model->beside[place] = *source;
     return 1;
 }
 
 static int code_branch_numbers(ath_coder *coder, hierarchy_model *model, int32_t count, int32_t *source)
 {
+    permutation_model *own = &model->branch_source;
     int regular = 1;
     if (ENCODING)
         for (int32_t b = 0; b < count; b++) regular = regular && source[b] == b;
-    regular = !coder_bit(coder, &model->permuted[0], !regular);
-    for (int32_t b = 0; b < count; b++)
-        if (!code_number_of(coder, model, regular, b == 0 ? 0 : source[b - 1] + 1, count, source + b)) return 0;
+    regular = !coder_bit(coder, &own->permuted, !regular);
+    for (int32_t b = 0; b < count; b++) {
+        if (regular)
+            source[b] = b;
+        else if (!code_source_number(coder, own, 0, b, count, source + b))
+            return 0;
+    }
     return 1;
 }
 
@@ -124,19 +171,24 @@ static void expect_starts(ath_branch *branches, int32_t branch_count, const int3
 static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t branch_count,
                                int32_t vertex_count, const int32_t *branch_source, int32_t *source)
 {
+    permutation_model *own = &model->vertex_source;
     int regular = 1;
     expect_starts(branches, branch_count, branch_source);
     if (ENCODING)
         for (int32_t b = 0; b < branch_count; b++)
             for (int32_t i = 0; i < branches[b].count; i++)
                 regular = regular && source[branches[b].first + i] == branches[branch_source[b]].subtree + i;
-    regular = !coder_bit(coder, &model->permuted[1], !regular);
-    for (int32_t b = 0; b < branch_count; b++)
+    regular = !coder_bit(coder, &own->permuted, !regular);
+    for (int32_t b = 0; b < branch_count; b++) {
+        int32_t start = branches[branch_source[b]].subtree, *entry = source + branches[b].first;
+        if (start + branches[b].count > vertex_count) return 0; /* branch_source is no permutation */
         for (int32_t i = 0; i < branches[b].count; i++) {
-            int32_t *entry = source + branches[b].first + i;
-            int32_t expected = i == 0 ? branches[branch_source[b]].subtree : entry[-1] + 1;
-            if (!code_number_of(coder, model, regular, expected, vertex_count, entry)) return 0;
+            if (regular)
+                entry[i] = start + i;
+            else if (!code_source_number(coder, own, start, i, vertex_count, entry + i))
+                return 0;
         }
+    }
     return 1;
 }
 

@@ -1,0 +1,191 @@
+"""Runs among points that nothing joins: blades, needles, strands, the centre lines of plants.
+
+Neighbours along a run keep their distance however they move against each other; points of different runs do not,
+however close they stand. So links are sought that keep their length, the shortest of them first. Nothing but positions
+is looked at: the order of the points does not matter.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from athcodec.errors import MissingExtra
+
+NEAR = (16, 96)  # points around each one, at least and at most, among which its neighbours are looked for
+PAIRS = 1 << 19  # in all, where that is more than the least
+ROUNDS = 6  # of looking for those of loose ends, among ever fewer points and so ever further away
+PRECISION = 1e-7  # of the diagonal, and of the distance from the origin: what moves less stands still
+USUAL, ALIKE = 0.25, 30.0  # links are steady up to ALIKE times this quantile of the steadiest ones of all points
+STEADY = 0.05  # change of a link's length over how much its ends move against each other, at most, for that
+PLIANT = 3.0  # times that quantile: of links that are steadier the shorter one is the better
+UNSTEADY, UNLIKE = 0.2, 4.0  # likewise, at most, where all others are UNLIKE times as unsteady
+OFF_LINE = 0.5  # of a link's length: how far off its line a still point behind it may be
+CROWD = 1.5  # of the length of the links at a point: what else is steady within that is no neighbour on a run
+CROWDED = 0.25  # of such pairs for each point: they are a sheet or a body
+JOINED = 0.5  # of the points, at least, that are on runs
+PAIRS_AT_ONCE = 1 << 13
+
+
+def run_links(frames: np.ndarray) -> np.ndarray | None:
+    """(L, 2) pairs of neighbours along runs, which close no cycles; None where the points are no runs.
+
+    frames: (F, N, 3) positions in a few frames.
+    """
+    count, steady = frames.shape[1], _Steady(frames)
+    links, loose = np.zeros((0, 2), np.int64), np.arange(count)
+    for turn in range(ROUNDS):
+        steady.add(_near_pairs(frames[-turn, loose], loose))
+        links, before = steady.tree(), len(links)
+        if turn == 0 and steady.beside(links) > CROWDED * count:
+            return None
+        if len(links) == before:
+            break
+        loose = np.flatnonzero(_degrees(links, count) < 2)
+    links = np.concatenate([links, steady.distinct(_near_pairs(frames[0, loose], loose), links)])
+    links = _with_still_points(frames, links, steady.precision)
+    return links if np.count_nonzero(_degrees(links, count)) >= JOINED * count else None
+
+
+def base_points(frames: np.ndarray, links: np.ndarray, root: int | None) -> np.ndarray:
+    """Of each thing that links join the end that moves least, of ends that move about alike the first of the source;
+    `root`, if any, of its own."""
+    count = frames.shape[1]
+    way = np.sqrt(((frames - frames[0]) ** 2).sum(axis=(0, 2)))
+    part, is_inner = _parts(links, count), _degrees(links, count) > 1
+    least = np.full(part.max() + 1, np.inf)
+    np.minimum.at(least, part[~is_inner], way[~is_inner])
+    moves_more = way > 2 * least[part]
+    order = np.lexsort((moves_more, is_inner, np.arange(count) != root, part))
+    bases: np.ndarray = order[np.unique(part[order], return_index=True)[1]]
+    return bases
+
+
+class _Steady:
+    """Pairs of points that keep their distance."""
+
+    def __init__(self, frames: np.ndarray):
+        self._start, self._count = frames[0], frames.shape[1]
+        self._tracks = (frames - frames[0].mean(axis=0)).transpose(1, 0, 2).astype(np.float32)
+        low, high = frames.min(axis=(0, 1)), frames.max(axis=(0, 1))
+        away = float(np.maximum(np.abs(low), np.abs(high)).max())
+        self.precision = PRECISION * max(float(np.linalg.norm(high - low)), away) + 1e-300
+        self._best = np.ones(self._count)  # change of the steadiest pair of each point
+        self._pairs, self._change, self._length = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0)
+
+    def add(self, pairs: np.ndarray) -> None:
+        """Those of some pairs, (P, 2), that keep their distance."""
+        change, length = self._measured(pairs)
+        for end in pairs.T:
+            np.minimum.at(self._best, end, change)
+        self._usual = float(np.quantile(self._best, USUAL))
+        is_steady = change < min(ALIKE * self._usual, STEADY)
+        pairs = np.concatenate([self._pairs, pairs[is_steady]])
+        once = np.unique(pairs[:, 0] * self._count + pairs[:, 1], return_index=True)[1]
+        self._pairs = pairs[once]
+        self._change = np.concatenate([self._change, change[is_steady]])[once]
+        self._length = np.concatenate([self._length, length[is_steady]])[once]
+
+    def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How much the distance of each pair changes, over how much the two move against each other; and its mean."""
+        change, length = np.empty(len(pairs)), np.empty(len(pairs))
+        for start in range(0, len(pairs), PAIRS_AT_ONCE):
+            some = slice(start, start + PAIRS_AT_ONCE)
+            way = self._tracks[pairs[some, 0]] - self._tracks[pairs[some, 1]]
+            apart = np.sqrt(np.einsum("ptk,ptk->pt", way, way))
+            way -= way.mean(axis=1, keepdims=True)
+            moved = np.sqrt(np.einsum("ptk,ptk->p", way, way) / way.shape[1])
+            change[some] = (apart.std(axis=1) + self.precision) / (moved + self.precision)
+            length[some] = apart.mean(axis=1)
+        return change, length
+
+    def distinct(self, pairs: np.ndarray, links: np.ndarray) -> np.ndarray:
+        """(L, 2) pairs of a point without links that are much steadier than any other pair of either end."""
+        degree, part = _degrees(links, self._count), _parts(links, self._count)
+        pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
+        change, _ = self._measured(pairs)
+        least = np.full((2, self._count), np.inf)
+        for end in pairs.T:
+            np.minimum.at(least[0], end, change)
+        is_least = (change <= least[0][pairs].min(axis=1)) & (change < UNSTEADY)
+        for end in pairs[~is_least].T:
+            np.minimum.at(least[1], end, change[~is_least])
+        is_distinct = is_least & (UNLIKE * change < least[1][pairs].min(axis=1))
+        return pairs[is_distinct & (degree[pairs].min(axis=1) == 0)]
+
+    def tree(self) -> np.ndarray:
+        """(L, 2) of them those that join the same points at the least cost in all."""
+        sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
+        cost = np.maximum(self._length, self.precision) * np.hypot(self._change, PLIANT * self._usual)
+        graph = sparse.coo_matrix((cost, self._pairs.T), (self._count, self._count)).tocsr()
+        tree = graphs.minimum_spanning_tree(graph).tocoo()
+        return np.stack([tree.row, tree.col], axis=1).astype(np.int64)
+
+    def beside(self, links: np.ndarray) -> int:
+        """How many of them are no links, but about as short as the links at both points."""
+        way = np.linalg.norm(self._start[links[:, 0]] - self._start[links[:, 1]], axis=1)
+        longest = np.zeros(self._count)
+        for end in links.T:
+            np.maximum.at(longest, end, way)
+        near = self._length <= CROWD * longest[self._pairs].min(axis=1)
+        return int(near.sum()) - len(links)
+
+
+def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) -> np.ndarray:
+    """The links, and those to points that do not move, where they stand behind an end that does not move either."""
+    count = frames.shape[1]
+    still = np.sqrt(((frames - frames[0]) ** 2).sum(axis=2)).max(axis=0) <= 4 * precision
+    cKDTree = scipy_module("spatial").cKDTree
+    for _ in range(ROUNDS):
+        degree = _degrees(links, count)
+        inner, end = np.concatenate([links, links[:, ::-1]]).T
+        is_end = still[end] & (degree[end] == 1)
+        inner, end = inner[is_end], end[is_end]
+        lone = np.flatnonzero(still & (degree == 0))
+        if not len(end) or not len(lone):
+            break
+        step = frames[0, end] - frames[0, inner]
+        apart, which = cKDTree(frames[0, lone]).query(frames[0, end] + step)
+        fits = np.flatnonzero(apart <= OFF_LINE * np.linalg.norm(step, axis=1))
+        fits = fits[np.argsort(apart[fits], kind="stable")]
+        taken = fits[np.unique(which[fits], return_index=True)[1]]
+        if not len(taken):
+            break
+        links = np.concatenate([links, np.stack([end[taken], lone[which[taken]]], axis=1)])
+    return links
+
+
+def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
+    """(P, 2) names of near points, the smaller first, each pair once."""
+    if len(names) < 2:
+        return np.zeros((0, 2), np.int64)
+    count = min(len(names), 1 + int(np.clip(PAIRS // len(names), *NEAR)))
+    near = names[scipy_module("spatial").cKDTree(points).query(points, k=count)[1].reshape(-1)]
+    pairs = np.sort(np.stack([np.repeat(names, count), near], axis=1), axis=1)
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    size = int(names.max()) + 1
+    keys = np.sort(pairs[:, 0] * size + pairs[:, 1])
+    keys = keys[np.append(True, keys[1:] != keys[:-1])]
+    return np.stack([keys // size, keys % size], axis=1)
+
+
+def _degrees(links: np.ndarray, count: int) -> np.ndarray:
+    """(N,) links at each point."""
+    return np.bincount(links.reshape(-1), minlength=count)
+
+
+def _parts(links: np.ndarray, count: int) -> np.ndarray:
+    """(N,) labels of what links join."""
+    graph = scipy_module("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
+    labels: np.ndarray = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
+    return labels
+
+
+def scipy_module(name: str) -> Any:
+    """A module of scipy. Raises MissingExtra without it."""
+    try:
+        return importlib.import_module(f"scipy.{name}")
+    except ImportError:
+        raise MissingExtra('finding branches: needs scipy: pip install "athcodec[hierarchy]"') from None
