@@ -34,7 +34,7 @@ OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 CLIPS = 7
-STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
 ATTRIBUTE = OPTIONAL | 32
 KIND_NAMES = {
     HIERARCHY: "HIERARCHY",
@@ -50,6 +50,7 @@ KIND_NAMES = {
     SHAPES: "SHAPES",
     EXACT: "EXACT",
     REFINED_REST: "REFINED_REST",
+    PREDICTED: "PREDICTED",
     ATTRIBUTE: "ATTRIBUTE",
 }
 
@@ -104,6 +105,7 @@ class Header:
     is_float64: bool = False
     clip_count: int = 1
     layer_count: int = 1
+    is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
 
@@ -242,6 +244,7 @@ _CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
 _REFINED_REST = struct.Struct("<f")
+_PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<H")
 
 
@@ -359,6 +362,10 @@ def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
 
 def pack_refined_rest(step: float, stream: bytes) -> bytes:
     return _REFINED_REST.pack(step) + stream
+
+
+def pack_predicted(step: float, settings: int, stream: bytes) -> bytes:
+    return _PREDICTED.pack(step, settings) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:

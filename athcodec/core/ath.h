@@ -100,6 +100,7 @@ enum {
     ATH_SHAPES = 19, /* of all segments, in segment 0 */
     ATH_EXACT = 20,
     ATH_REFINED_REST = 21, /* of all segments, in segment 0 */
+    ATH_PREDICTED = 22,
     ATH_ATTRIBUTE = ATH_OPTIONAL | 32
 };
 

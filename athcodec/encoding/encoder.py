@@ -122,7 +122,7 @@ def encode(
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         decided = job.decide(bound)
-        return job.write(path, out, spool, decided, job.coded(decided, range(job.segment_count)))
+        return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
 
 
 def draft(

@@ -84,12 +84,13 @@ def _moved(source: Source, segment: int) -> float:
 class Choice:
     """Settings of a file: those of its only layer of precision, or of the refinements and of the first layer.
 
-    learned_modes: of the last layer.
+    learned_modes: of the last layer. predicted: where the motion is predicted, the second field of PREDICTED.
     """
 
     settings: Settings
     first_layer: Settings
     learned_modes: LearnedModes | None
+    predicted: int | None = None
 
 
 def decide(

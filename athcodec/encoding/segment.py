@@ -162,12 +162,12 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
 class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
-    def __init__(self, source: Source, ath: Ath, settings: Settings):
+    def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-        self.plan = Plan(branches, hierarchy.vertex_count, source.pool)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted)
         self.rest_chunk = self._code_rest(source, branches, settings)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream)
 

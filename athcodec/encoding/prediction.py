@@ -1,0 +1,161 @@
+"""Predicted motion, the other way to code a clip: every vertex of every frame about what is decoded (FORMAT.md).
+
+It suits what cosines and modes do not: growth, few frames, noise, jumps, rests. `best_prediction` finds its settings,
+`code_predicted_segment` makes the chunks of a segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec.ath import Ath, Survey, Thresholds
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.layers import Layer, Layers
+from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.search import Choice
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, lags
+from athcodec.errors import BoundError
+
+MEMORIES = (2, 9, 0, 13)  # heads of PREDICTED to choose from
+REST_STEPS = (0.5, 1.15)  # over the bound
+STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
+TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
+MAP_SHARE, MAP_STEPS = 0.02, (0.1, 0.25, 0.5, 1.0)  # of the bytes, for level 0; over the error of the rest pose
+LESS_ERROR = 0.9  # of level 0, with maps that are worth their bytes
+
+
+def one_map_each(seen: Survey) -> Ath:
+    """The ATH in which each root's subtree moves as one."""
+    epsilon, xi = (float(errors.max(initial=0.0)) for errors in (seen.largest_gads, seen.largest_distance))
+    return replace(seen, xi=None).ath(Thresholds(epsilon, 0, xi, 0))
+
+
+def predicted_layers(source: Source, choice: Choice) -> tuple[Ath, CodedPrelude, Layers]:
+    """What the segments share."""
+    ath = one_map_each(source.seen)
+    prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
+    return ath, prelude, Layers(prelude.rest_chunk, prelude.plan, [Layer(prelude.plan, choice.settings, None)])
+
+
+def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
+    branches, levels = source.hierarchy.branch_count, ath.height + 2
+    none = np.zeros(branches, bool)
+    return Settings(
+        bound=bound,
+        largest_bound=source.largest_bound(bound),
+        limit=source.limit(bound),
+        step=qz.single(qz.SAFE_REST_CAP * float(np.min(source.limit(bound)))),
+        level_steps=np.ones(levels),
+        rest_step=qz.single(rest_step),
+        sheet=none,
+        loose=none,
+        lags=lags(source, rest_step),
+        rotation_step_factors=(0,) * levels,
+        only_tips=False,
+        learned_bases=(False,) * levels,
+        learned_pieces=None,
+        node_steps=np.ones(levels),
+    )
+
+
+def best_prediction(source: Source, bound: float, most_bytes: float) -> tuple[Choice, float] | None:
+    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have; None
+    where that is above `most_bytes`, or the bound cannot be kept."""
+    ath = one_map_each(source.seen)
+    rests = [_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS]
+    plans = [CodedPrelude(source, ath, settings, predicted=True) for settings in rests]
+    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
+    samples = [source.positions(segment) for segment in some]
+    scale = source.clip.frame_count / sum(sample.shape[2] for sample in samples)
+    best, least = None, most_bytes
+    if _begun(plans[0], rests[0], samples, MEMORIES[0]) > 1.5 * most_bytes / source.clip.frame_count:
+        return None
+    for memory, (settings, prelude) in product(MEMORIES, list(zip(rests, plans))[:2]):
+        try:
+            motion = sum(len(_predicted(prelude, settings, sample, memory)[0]) for sample in samples)
+        except BoundError:
+            return None
+        size = motion * scale + prelude.prelude_bytes
+        if size < least:
+            best, least = Choice(settings, settings, None, memory), size
+    return None if best is None else (best, least)
+
+
+def _begun(prelude: CodedPrelude, settings: Settings, samples: Sequence[np.ndarray], memory: int) -> float:
+    """Bytes of a frame, as far as a few of them tell."""
+    sample = samples[len(samples) // 2]
+    start = (sample.shape[2] - TRIAL_FRAMES) // 2 if sample.shape[2] > TRIAL_FRAMES else 0
+    some = sample[:, :, start : start + TRIAL_FRAMES]
+    try:
+        coded = len(_predicted(prelude, settings, some, memory)[0])
+        first = len(_predicted(prelude, settings, some[:, :, :1], memory)[0]) if start else 0
+    except BoundError:
+        return 0.0
+    return (coded - first) / some.shape[2]
+
+
+def _predicted(
+    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, memory: int
+) -> tuple[bytes, np.ndarray]:
+    """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    source = np.ascontiguousarray(positions.transpose(2, 0, 1))
+    limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
+    for factor in STEPS:
+        step = qz.single(factor * settings.step)
+        coded = streams.encode_predicted(prelude.plan, prelude.origin, source, limits, step, memory, prelude.dtype)
+        if coded is not None:
+            return ct.pack_predicted(step, memory, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+    raise BoundError(
+        f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
+    )
+
+
+def code_predicted_segment(
+    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None = None
+) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
+    """As layers.code_segment."""
+    assert choice.predicted is not None
+    plan, settings = prelude.plan, choice.settings
+    payload, decoded = _predicted(prelude, settings, positions, choice.predicted)
+
+    def error(shown: np.ndarray) -> tuple[float, ...]:
+        return position_errors(shown, positions, prelude.origin, plan.pool)
+
+    last = plan.level_count - 1
+    chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
+    errors = [error(level_0.pose(level, prelude.origin, prelude.dtype)) for level in range(last)]
+    for moved in _with_maps(prelude, positions, errors[0][-1]):
+        maps = streams.encode_affines(moved, 0)
+        own = error(moved.pose(0, prelude.origin, prelude.dtype))
+        if len(maps) <= MAP_SHARE * len(payload) and own[-1] < LESS_ERROR * errors[0][-1]:
+            chunks[0, ct.AFFINES], errors[0] = maps, own
+            break
+    errors.append(error(decoded))
+    if errors[-1][0] > settings.largest_bound:
+        raise AssertionError(f"decoded error {errors[-1][0]} is beyond the bound {settings.largest_bound}")
+    if exact is not None:
+        chunks[last + 1, ct.EXACT] = streams.encode_exact(decoded, exact)
+        errors.append((0.0, 0.0, 0.0))
+    return chunks, np.array(errors)
+
+
+def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
+    """A segment that shows the rest pose where no maps move it."""
+    return SegmentMotion(prelude.plan, frames, [LevelStream(1.0)] * prelude.plan.level_count)
+
+
+def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
+    """Segments with maps of the roots, from fine to coarse; error: that of the rest pose standing still (RMS)."""
+    plan = prelude.plan
+    for part in MAP_STEPS:
+        moved = _still(prelude, positions.shape[2])
+        step = part * error * (plan.vertex_count / len(plan.nodes)) ** 0.5
+        if step > 0:
+            moved.analyse_nodes(positions, np.full(plan.level_count, step), qz.DEAD_ZONE, level=0)
+            yield moved
