@@ -395,7 +395,8 @@ static void set_info(ath_file *file, uint64_t prelude)
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
     int32_t lossy = ath_lossy_levels(file), found = file->info.full_level_count;
-    if (found == lossy || found == lossy + 1) return ATH_OK;
+    int placed = file->plan.height == 0 || !file->header.is_predicted;
+    if (placed && (found == lossy || found == lossy + 1)) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
 
