@@ -105,7 +105,10 @@ class Header(ctypes.Structure):
 
     _fields_ = [("file_length", c_uint64), ("front_length", c_uint64), ("max_error", c_double)]
     _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
-    _fields_ += [(name, c_int32) for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted".split()]
+    _fields_ += [
+        (name, c_int32)
+        for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted".split()
+    ]
 
 
 _PLAYING = {  # core/ath.h

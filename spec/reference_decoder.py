@@ -1229,8 +1229,8 @@ class Fit:
 
 @dataclass
 class Around:
-    """Positions less Origin: at rest, in the frame that one is coded about and the two before that, in the frame before,
-    in this one."""
+    """Positions less Origin: at rest, in the frame that one is coded about and the two before that, in the frame
+    before, and in this one."""
 
     rest: list[Point]
     was: list[list[Point]]

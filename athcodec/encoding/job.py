@@ -42,7 +42,7 @@ from athcodec.encoding.layers import (
 )
 from athcodec.encoding.prediction import best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, decide
+from athcodec.encoding.search import EFFORTS, Choice, decide, first_cost
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -52,6 +52,7 @@ from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
+SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -266,16 +267,17 @@ class EncodingJob:
         )
         ath = self.seen.ath(self.thresholds(bound))
         ratio = self._layer_ratios(ath, bound)[0]
+        share = PREDICTED_SHARE if ratio > 1 else 1.0
+        unsearched = share * first_cost(self.source, ath, bound, self.options.effort, self.report)
+        prediction = best_prediction(self._long_segments, bound, unsearched)
+        if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+            return self._predicted(prediction.choice)
         choices, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
         best = layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
-        return self._predicted_if_smaller(bound, best)
-
-    def _predicted_if_smaller(self, bound: float, transformed: _Decided) -> _Decided:
-        """Layers are worth something, so where there are some, a file without has to be smaller by far."""
-        share = PREDICTED_SHARE if len(transformed.layers.each) > 1 else 1.0
-        found = best_prediction(self._long_segments, bound, share * self._bytes_like_the_middle(transformed))
-        return transformed if found is None else self._predicted(found[0])
+        if prediction is not None and prediction.bytes < share * self._bytes_like_the_middle(best):
+            return self._predicted(prediction.choice)
+        return best
 
     @property
     def _long_segments(self) -> Source:

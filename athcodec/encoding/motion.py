@@ -54,7 +54,14 @@ class Plan:
     bases. rest: (N, 3) float64, less the origin.
     """
 
-    def __init__(self, branches: np.ndarray, vertex_count: int, pool: ThreadPool = SERIAL, refined: bool = False, predicted: bool = False):
+    def __init__(
+        self,
+        branches: np.ndarray,
+        vertex_count: int,
+        pool: ThreadPool = SERIAL,
+        refined: bool = False,
+        predicted: bool = False,
+    ):
         self.branches, self.pool, self.predicted = branches, pool, predicted
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)

@@ -6,9 +6,8 @@ It suits what cosines and modes do not: growth, few frames, noise, jumps, rests.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import product
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +25,7 @@ MEMORIES = (2, 9, 0, 13)  # heads of PREDICTED to choose from
 REST_STEPS = (0.5, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
+TOO_MANY = 1.2  # over the bytes wanted, that a few frames may promise
 MAP_SHARE, MAP_STEPS = 0.02, (0.1, 0.25, 0.5, 1.0)  # of the bytes, for level 0; over the error of the rest pose
 LESS_ERROR = 0.9  # of level 0, with maps that are worth their bytes
 
@@ -64,39 +64,44 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
     )
 
 
-def best_prediction(source: Source, bound: float, most_bytes: float) -> tuple[Choice, float] | None:
-    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have; None
-    where that is above `most_bytes`, or the bound cannot be kept."""
+@dataclass(frozen=True)
+class FoundPrediction:
+    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have."""
+
+    choice: Choice
+    bytes: float
+
+
+def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
+    """None where that is above `most_bytes`, or the bound cannot be kept."""
     ath = one_map_each(source.seen)
-    rests = [_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS]
-    plans = [CodedPrelude(source, ath, settings, predicted=True) for settings in rests]
+    first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
     some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
     samples = [source.positions(segment) for segment in some]
     scale = source.clip.frame_count / sum(sample.shape[2] for sample in samples)
-    best, least = None, most_bytes
-    if _begun(plans[0], rests[0], samples, MEMORIES[0]) > 1.5 * most_bytes / source.clip.frame_count:
-        return None
-    for memory, (settings, prelude) in product(MEMORIES, list(zip(rests, plans))[:2]):
-        try:
-            motion = sum(len(_predicted(prelude, settings, sample, memory)[0]) for sample in samples)
-        except BoundError:
-            return None
-        size = motion * scale + prelude.prelude_bytes
-        if size < least:
-            best, least = Choice(settings, settings, None, memory), size
-    return None if best is None else (best, least)
+    prelude = CodedPrelude(source, ath, first, predicted=True)
 
+    def size(prelude: CodedPrelude, settings: Settings, memory: int) -> FoundPrediction:
+        motion = sum(len(_predicted(prelude, settings, sample, memory)[0]) for sample in samples)
+        return FoundPrediction(Choice(settings, settings, None, memory), motion * scale + prelude.prelude_bytes)
 
-def _begun(prelude: CodedPrelude, settings: Settings, samples: Sequence[np.ndarray], memory: int) -> float:
-    """Bytes of a frame, as far as a few of them tell."""
-    sample = samples[len(samples) // 2]
-    start = (sample.shape[2] - TRIAL_FRAMES) // 2 if sample.shape[2] > TRIAL_FRAMES else 0
-    some = sample[:, :, start : start + TRIAL_FRAMES]
     try:
-        coded = len(_predicted(prelude, settings, some, memory)[0])
-        first = len(_predicted(prelude, settings, some[:, :, :1], memory)[0]) if start else 0
+        if _begun(prelude, first, samples[len(samples) // 2]) * source.clip.frame_count > TOO_MANY * most_bytes:
+            return None
+        found = [size(prelude, first, memory) for memory in MEMORIES]
+        memory = min(found, key=lambda one: one.bytes).choice.predicted
+        assert memory is not None
+        found += [size(CodedPrelude(source, ath, own, predicted=True), own, memory) for own in others]
     except BoundError:
-        return 0.0
+        return None
+    best = min(found, key=lambda one: one.bytes)
+    return best if best.bytes < most_bytes else None
+
+
+def _begun(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> float:
+    """Bytes of a frame behind the first, as far as a few of them tell."""
+    some = positions[:, :, :TRIAL_FRAMES]
+    coded, first = (len(_predicted(prelude, settings, part, MEMORIES[0])[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2]
 
 

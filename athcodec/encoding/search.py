@@ -106,6 +106,12 @@ def decide(
     ], prelude
 
 
+def first_cost(source: Source, ath: Ath, bound: float, effort: str, report: Progress) -> float:
+    """Bytes of the file at the settings that a search starts with, about."""
+    search = Search.of(source, ath, bound, effort, report)
+    return search.cost(search.start)[0]
+
+
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
     """The start of a search."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
