@@ -80,6 +80,7 @@ class Info(Structure):
         ("eta", c_uint32),
         ("lam", c_uint32),
         ("rest_is_float64", c_int32),
+        ("is_predicted", c_int32),
     ]
 
 

@@ -1991,7 +1991,7 @@ table(
     "twice-unknown-motion",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind twice",
-    lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8016, b"", 0, 0)),
+    lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8018, b"", 0, 0)),
 )
 table(
     "length-limit",

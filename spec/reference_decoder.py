@@ -1270,15 +1270,16 @@ class Prediction:
     def decode(self, frames: int) -> np.ndarray:
         """(vertices, 3, frames), as they are put out."""
         out: list[np.ndarray] = []
-        known: list[list[Point]] = []
+        known, abouts = [self.rest], [0]  # the rest pose, then the frames; which of these each is coded about
         for t in range(frames):
             copied = self._decode_reference(t)
-            about = t - self.distance
+            about = t + 1 - self.distance
+            abouts.append(abouts[about] if copied else about)
             if copied:
-                now = out[about] if about >= 0 else self._put_out(self.rest)
+                now = out[about - 1] if about > 0 else self._put_out(self.rest)
             else:
-                was = [known[about - i] if about - i >= 0 else self.rest for i in range(3)]
-                now = self._decode_frame(Around(self.rest, was, known[-1] if t > 0 else self.rest, []))
+                was = [known[about], known[abouts[about]], known[abouts[abouts[about]]]]
+                now = self._decode_frame(Around(self.rest, was, known[-1], []))
             out.append(now)
             known.append((now.astype(float) - self.origin).tolist())
         self.coder.finish()

@@ -232,6 +232,7 @@ typedef struct ath_info {
     float epsilon, xi;  /* the thresholds by which nodes were accepted */
     uint32_t eta, lambda;
     int32_t rest_is_float64; /* 1: the rest pose is double, else float */
+    int32_t is_predicted;    /* 1: all levels but level 0 are predicted motion */
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);

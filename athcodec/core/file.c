@@ -389,6 +389,7 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->layer_count = header->layer_count;
     info->chunk_count = (int32_t)header->chunk_count;
     info->is_float64 = header->is_float64;
+    info->is_predicted = header->is_predicted;
 }
 
 /* One level more than the lossy ones gives the very positions of the source. */

@@ -39,7 +39,7 @@ typedef struct {
 /* Positions around the frame that is coded, less the origin, vertex_count x 3 each. */
 typedef struct {
     const double *rest;
-    const double *was[3]; /* the frame that it is coded about, the two before that */
+    const double *was[3]; /* the frame that it is coded about, what that is coded about, and so on */
     const double *last;   /* the frame before it */
     double *now;
 } predicted_frames;
@@ -339,6 +339,7 @@ typedef struct {
     const double *rest, *origin;
     void *positions;
     int32_t is_float64, vertex_count, frame;
+    int32_t about[ATH_SEGMENT_FRAMES]; /* the frame that each was coded about, -1: the rest pose */
     predicted_frames around;
 } prediction;
 
@@ -443,16 +444,19 @@ static void copy_frame(prediction *p, int32_t from)
     for (size_t i = 0; i < numbers; i++) put_out(p, at + i - i % 3, i % 3, p->rest[i]);
 }
 
+static int32_t about(const prediction *p, int32_t frame) { return frame < 0 ? -1 : p->about[frame]; }
+
 /* What a frame is coded about. Returns 0 where that is not valid; `copied`: then it has no vertices coded. */
 static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t distance)
 {
     if (!code_reference(coder, &p->model, p->frame, copied, &distance)) return 0;
     int32_t from = p->frame - distance;
+    p->about[p->frame] = *copied ? about(p, from) : from;
     if (*copied) {
         copy_frame(p, from);
         return 1;
     }
-    for (int32_t i = 0; i < 3; i++) p->around.was[i] = known_frame(p, from - i, p->memory[i]);
+    for (int32_t i = 0; i < 3; i++, from = about(p, from)) p->around.was[i] = known_frame(p, from, p->memory[i]);
     p->around.last = distance == 1 ? p->around.was[0] : known_frame(p, p->frame - 1, p->memory[3]);
     p->around.rest = p->rest;
     p->around.now = p->memory[4];

@@ -17,6 +17,7 @@ const INFO = {
   vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
   levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
   chunkCount: "i32", isFloat64: "i32", epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
+  isPredicted: "i32",
 };
 const INFO_SIZE = 120;
 const CLIP = {
@@ -353,9 +354,10 @@ export class AthFile {
       this.#core.c.ath_get_info(this.#at, at);
       return this.#core.struct(INFO, at);
     });
-    const { originX, originY, originZ, isFloat64, restIsFloat64, ...rest } = info;
+    const { originX, originY, originZ, isFloat64, restIsFloat64, isPredicted, ...rest } = info;
     const origin = [originX, originY, originZ];
-    return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0 });
+    return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0,
+      isPredicted: isPredicted !== 0 });
   }
 
   #clipTable() {
