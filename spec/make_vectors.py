@@ -137,6 +137,7 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
 
 ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]
 SINGLE = [Stem(-1, 1, flags=WHOLE)]
+RESTING = [0, 1, *[0] * 12]  # a frame of them that is no copy
 
 
 def frame_steps(vertices: int, seed: int, large: int = 12, still: float = 0.5) -> list[int]:
@@ -160,7 +161,7 @@ def swayed(frames: int, seed: int, vertices: int = 12, **options) -> list:
     return [[0, 1, *frame_steps(vertices, seed + t, **options)] for t in range(frames)]
 
 
-valid("predicted-still", "nothing moves", lambda: predicted(ROOTED, [[0, 1]] * 3))
+valid("predicted-still", "nothing moves", lambda: predicted(ROOTED, [RESTING] * 3))
 valid("predicted-smallest", "one vertex, one frame", lambda: predicted(SINGLE, [[0, 1]]))
 valid("predicted", "vertices move at random, longer than any line", lambda: predicted(ROOTED, swayed(30, 1, large=5)))
 for settings in (0, 7, 8, 15):
@@ -2935,7 +2936,7 @@ invalid(
     "BAD_CHUNK",
     1,
     "a frame is coded about one before the rest pose",
-    lambda: predicted(ROOTED, [[0, 1], [0, 0, 2]]),
+    lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
 )
 
 # ---- invalid: layers ---------------------------------------------------------------------------------------
