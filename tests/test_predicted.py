@@ -19,7 +19,7 @@ from plants import STEADY, awkward_plants, bound_for, clip_of, grow, plant, rand
 import athcodec
 from athcodec import container as ct
 from athcodec import encoding
-from athcodec.encoding import job
+from athcodec.encoding import search
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
@@ -32,7 +32,7 @@ FRAMES = 60
 @pytest.fixture
 def always(monkeypatch):
     """Every clip is coded with predicted motion."""
-    monkeypatch.setattr(job, "first_cost", lambda *_: math.inf)
+    monkeypatch.setattr(search.Search, "first_cost", lambda _: math.inf)
 
 
 def simple_bytes(positions: np.ndarray, bound: float) -> int:
@@ -148,6 +148,11 @@ def test_swaying_trees_keep_their_modes(tmp_path):
     assert size(clip, tmp_path, 1e-3).choices["motion"] == "transformed"
 
 
+def test_who_asks_for_a_hierarchy_of_maps_gets_it(tmp_path):
+    found = size(growth(), tmp_path, 1e-4, tam=athcodec.Thresholds(0, 0, 0, 0))
+    assert found.choices["motion"] == "transformed" and len(found.levels) > 3
+
+
 def test_layers_are_given_up_only_for_a_much_smaller_file(tmp_path):
     found = size(growth(), tmp_path, 1e-4, ladder="decades")
     assert found.choices["motion"] == "predicted" and len(found.levels) == 2
@@ -161,7 +166,7 @@ def test_layers_are_given_up_only_for_a_much_smaller_file(tmp_path):
 def test_any_clip_keeps_the_bound_and_decodes_as_the_document_says(scratch, clip, fraction, segment_frames):
     bound, path = bound_for(clip, fraction), scratch / "any.ath"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(job, "first_cost", lambda *_: math.inf)
+        patch.setattr(search.Search, "first_cost", lambda _: math.inf)
         found = athcodec.encode(clip, path, max_error=bound, ladder="none", segment_frames=segment_frames)
     positions = clip.block(0, clip.frame_count).astype(float)
     with athcodec.open(path, strict=True) as decoder:
@@ -236,7 +241,7 @@ def test_a_target_size_is_met(always, tmp_path):
 def grown(tmp_path_factory):
     path = tmp_path_factory.mktemp("grown") / "a.ath"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(job, "first_cost", lambda *_: math.inf)
+        patch.setattr(search.Search, "first_cost", lambda _: math.inf)
         athcodec.encode(plant(seed=2, frames=40), path, rel_error=1e-3, segment_frames=16)
     return path.read_bytes()
 

@@ -64,10 +64,10 @@ def encode(
     target_size : int, optional
         Bytes: the file has the smallest bound that fits.
     segment_frames : int, optional
-        Longest segment in frames, 16 to 256; default 128.
+        Longest segment in frames, 16 to 256; default 128, or 256 where motion is predicted.
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
-        within the bound.
+        within the bound. Where they are given, motion is not predicted, which has no such hierarchy.
     exact_rest : bool
         Keep the rest pose bit for bit.
     lossless : bool

@@ -40,9 +40,9 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
-from athcodec.encoding.prediction import best_prediction, code_predicted_segment, predicted_layers
+from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, decide, first_cost
+from athcodec.encoding.search import EFFORTS, Choice, Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -268,16 +268,21 @@ class EncodingJob:
         ath = self.seen.ath(self.thresholds(bound))
         ratio = self._layer_ratios(ath, bound)[0]
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        unsearched = share * first_cost(self.source, ath, bound, self.options.effort, self.report)
-        prediction = best_prediction(self._long_segments, bound, unsearched)
+        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio > 1)
+        unsearched = share * search.first_cost()
+        prediction = self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
-        choices, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
+        choices, prelude = search.decide(ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
         best = layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
         if prediction is not None and prediction.bytes < share * self._bytes_like_the_middle(best):
             return self._predicted(prediction.choice)
         return best
+
+    def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
+        """None for one who asks for a hierarchy of maps, which predicted motion has not."""
+        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
 
     @property
     def _long_segments(self) -> Source:

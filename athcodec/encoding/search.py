@@ -93,25 +93,6 @@ class Choice:
     predicted: int | None = None
 
 
-def decide(
-    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
-) -> tuple[list[Choice], CodedPrelude]:
-    """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to the
-    last one's, 1 if that is the same layer."""
-    search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1)
-    first_layer, candidates = search.found(ratio)
-    prelude = search.prelude(candidates[0])
-    return [
-        Choice(settings, first_layer, search.learned_modes(prelude.plan, settings)) for settings in candidates
-    ], prelude
-
-
-def first_cost(source: Source, ath: Ath, bound: float, effort: str, report: Progress) -> float:
-    """Bytes of the file at the settings that a search starts with, about."""
-    search = Search.of(source, ath, bound, effort, report)
-    return search.cost(search.start)[0]
-
-
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
     """The start of a search."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
@@ -217,6 +198,19 @@ class Search:
         hierarchy, branches = self.source.hierarchy, self.ath.node_branch
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
+
+    def first_cost(self) -> float:
+        """Bytes of a whole file at the settings that the search starts with."""
+        return self.cost(self.start)[0]
+
+    def decide(self, ratio: int = 1) -> tuple[list[Choice], CodedPrelude]:
+        """Settings to choose from, and hierarchy and rest pose as coded with them; ratio: of the first layer's step to
+        the last one's, 1 if that is the same layer."""
+        first_layer, candidates = self.found(ratio)
+        prelude = self.prelude(candidates[0])
+        return [
+            Choice(settings, first_layer, self.learned_modes(prelude.plan, settings)) for settings in candidates
+        ], prelude
 
     def found(self, ratio: int = 1) -> tuple[Settings, list[Settings]]:
         """Settings of a first layer, and those to choose from for refinements; for a large plant those of a sample of
