@@ -105,7 +105,10 @@ class Header(ctypes.Structure):
 
     _fields_ = [("file_length", c_uint64), ("front_length", c_uint64), ("max_error", c_double)]
     _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
-    _fields_ += [(name, c_int32) for name in "level_count full_level_count clip_count layer_count is_float64".split()]
+    _fields_ += [
+        (name, c_int32)
+        for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted".split()
+    ]
 
 
 _PLAYING = {  # core/ath.h
@@ -243,6 +246,12 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_affines": (
         c_int64,
         [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
+    ),
+    "ath_without_stems": (None, [POINTER(CorePlan), c_void_p, c_void_p]),
+    "ath_predicted_memory": (c_size_t, [c_int32]),
+    "ath_encode_predicted": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, c_int, *[c_void_p] * 3],
     ),
     "ath_encode_corrections": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_void_p, c_int64]),
 }

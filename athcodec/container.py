@@ -36,7 +36,7 @@ HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
 CLIPS = 7
 SOURCE_REST = 8
-STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
 ATTRIBUTE = OPTIONAL | 32
 KIND_NAMES = {
     HIERARCHY: "HIERARCHY",
@@ -53,6 +53,7 @@ KIND_NAMES = {
     SHAPES: "SHAPES",
     EXACT: "EXACT",
     REFINED_REST: "REFINED_REST",
+    PREDICTED: "PREDICTED",
     ATTRIBUTE: "ATTRIBUTE",
 }
 
@@ -107,6 +108,7 @@ class Header:
     is_float64: bool = False
     clip_count: int = 1
     layer_count: int = 1
+    is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
 
@@ -247,6 +249,7 @@ _CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
 _REFINED_REST = struct.Struct("<f")
+_PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<H")
 
 
@@ -380,6 +383,10 @@ def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
 
 def pack_refined_rest(step: float, stream: bytes) -> bytes:
     return _REFINED_REST.pack(step) + stream
+
+
+def pack_predicted(step: float, settings: int, stream: bytes) -> bytes:
+    return _PREDICTED.pack(step, settings) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:

@@ -82,6 +82,7 @@ class Info(Structure):
         ("rest_is_float64", c_int32),
         ("rest_is_host", c_int32),
         ("host_checksum", c_uint32 * 2),
+        ("is_predicted", c_int32),
     ]
 
 

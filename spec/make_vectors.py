@@ -41,6 +41,7 @@ from spec.scripted import (
     hierarchy_chunk,
     hierarchy_script,
     host_rest_chunk,
+    predicted_head,
     refined_rest_chunk,
     refined_row,
     rest_chunk,
@@ -146,6 +147,123 @@ def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **f
         scripts[rd.AFFINES, level] = lambda level=level: Chance(100 * seed + level + 50, large=4)
     return Plant(stems, frames, segments, **{"scripts": scripts} | fields)
 
+
+# ---- valid: predicted motion ---------------------------------------------------------------------------------
+
+ROOTED = [Stem(-1, 4, flags=WHOLE), Stem(0, 3, 2), Stem(1, 2, 2), Stem(0, 3, 3)]
+SINGLE = [Stem(-1, 1, flags=WHOLE)]
+RESTING = [0, 1, *[0] * 12]  # a frame of them that is no copy
+
+
+def frame_steps(vertices: int, seed: int, large: int = 12, still: float = 0.5) -> list[int]:
+    """Of a frame: whether vertices have integers, and these."""
+    chance, values = Chance(seed, large=large), []
+    for _ in range(vertices):
+        moved = int(chance.random.random() >= still)
+        values += [1, *(chance.answer("signed", 0) for _ in range(3))] if moved else [0]
+    return values
+
+
+def predicted(stems: list[Stem], frames: list, segments: int = 1, settings: int = 2, **fields) -> Plant:
+    """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
+    scripts = {(rd.PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
+    fields = {"predicted": predicted_head(settings=settings)} | fields
+    fields["scripts"] = scripts | fields.get("scripts", {})
+    return Plant(stems, len(frames) * segments, segments, **fields)
+
+
+def swayed(frames: int, seed: int, vertices: int = 12, **options) -> list:
+    return [[0, 1, *frame_steps(vertices, seed + t, **options)] for t in range(frames)]
+
+
+valid("predicted-still", "nothing moves", lambda: predicted(ROOTED, [RESTING] * 3))
+valid("predicted-smallest", "one vertex, one frame", lambda: predicted(SINGLE, [[0, 1]]))
+valid("predicted", "vertices move at random, longer than any line", lambda: predicted(ROOTED, swayed(30, 1, large=5)))
+for settings in (0, 7, 8, 15):
+    valid(
+        f"predicted-settings-{settings}",
+        f"Memory {settings & 7}, Common {settings >> 3}",
+        lambda settings=settings: predicted(ROOTED, swayed(12, 2), settings=settings),
+    )
+valid(
+    "predicted-references",
+    "frames that are copies of earlier ones, of the rest pose, and coded about earlier ones",
+    lambda: predicted(
+        ROOTED,
+        [
+            [0, 1, *frame_steps(12, 3)],
+            [0, 1, *frame_steps(12, 4)],
+            [1, 1],
+            [1, 1],
+            [0, 0, 2, *frame_steps(12, 5)],
+            [1, 0, 5],
+            [0, 1, *frame_steps(12, 6)],
+            [0, 0, 0, *frame_steps(12, 7)],
+        ],
+    ),
+)
+valid(
+    "predicted-all-copied", "every frame is the rest pose", lambda: predicted(ROOTED, [[1, 1]] + [[1, 0, 0], [1, 0, 2]])
+)
+valid(
+    "predicted-twins",
+    "vertices that rest at the same places, and a stem as long as another",
+    lambda: predicted(
+        [Stem(-1, 6, flags=WHOLE), Stem(-1, 6, flags=WHOLE), Stem(1, 2, 5)],
+        swayed(9, 8, 14, large=6),
+        points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(14)],
+    ),
+)
+valid(
+    "predicted-collapsed",
+    "all vertices rest at one place",
+    lambda: predicted(ROOTED, swayed(6, 9), points=[[2.0, 2.0, 2.0]] * 12),
+)
+valid(
+    "predicted-huge",
+    "the largest integers and steps: positions leave the range of binary32",
+    lambda: predicted(
+        SINGLE, [[0, 1, 1, (1 << 30) - 1, -((1 << 30) - 1), 1]] * 5, predicted=predicted_head(FLOAT_MAX, 3)
+    ),
+)
+valid(
+    "predicted-tiny", "a subnormal Step", lambda: predicted(ROOTED, swayed(4, 10), predicted=predicted_head(FLOAT_TINY))
+)
+valid(
+    "predicted-wide",
+    "binary64 positions far from the origin",
+    lambda: predicted(ROOTED, swayed(7, 11), is_float64=True, origin=(1e6, -3e5, 0.125)),
+)
+valid(
+    "predicted-rounded",
+    "binary32 positions far from the origin, a step below their spacing",
+    lambda: predicted(ROOTED, swayed(7, 12), origin=(1e6, -3e5, 0.125)),
+)
+valid(
+    "predicted-segments",
+    "two segments, of which one has maps for level 0",
+    lambda: predicted(ROOTED, swayed(5, 13), 2, scripts={(rd.AFFINES, 0, 1): [-8, *row((5, -3, 1), (0, 2, 0))]}),
+)
+valid(
+    "predicted-roots",
+    "maps of roots of one vertex, of one stem and of a subtree",
+    lambda: predicted(
+        [Stem(-1, 1), Stem(-1, 3), Stem(-1, 2, flags=WHOLE), Stem(2, 2, 1)],
+        swayed(3, 14, 8),
+        scripts={(rd.AFFINES, 0, 0): lambda: Chance(15, large=4)},
+    ),
+)
+valid("predicted-level-0", "shortened: level 0 of 2", lambda: predicted(ROOTED, swayed(2, 16)).draft().upto(0))
+valid(
+    "predicted-lossless",
+    "the source's own numbers behind it",
+    lambda: (
+        predicted(ROOTED, swayed(2, 17))
+        .draft()
+        .with_header(level_count=3, full_level_count=3)
+        .add(Entry(rd.EXACT, b"", 2, 0))
+    ),
+)
 
 # ---- valid: plants -----------------------------------------------------------------------------------------
 
@@ -1033,8 +1151,8 @@ valid(
         Entry(0x8000, FUTURE),
         Entry(0x8009, FUTURE),
         Entry(0x800F, b""),
-        Entry(0x8016, FUTURE, 0, 1),
-        Entry(0x8016, FUTURE, 1, 1),
+        Entry(0x8018, FUTURE, 0, 1),
+        Entry(0x8018, FUTURE, 1, 1),
         Entry(0x801F, FUTURE, 1, 1),
         Entry(0x801F, b"", 2, 0),
         Entry(0x8021, FUTURE),
@@ -1426,7 +1544,7 @@ def everything() -> Draft:
             Entry(rd.FACES, numbers(FACES_3)),
             Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
             Entry(0x8009, FUTURE),
-            Entry(0x8016, FUTURE, 1, 1),
+            Entry(0x8018, FUTURE, 1, 1),
             Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
             Entry(rd.ATTRIBUTE, element(NESTED_16, b"\1", "a")),
             Entry(0x8040, FUTURE),
@@ -1949,7 +2067,7 @@ def inserted(at: int, *entries: Entry) -> Draft:
 for kind, level, why in (
     (0x0000, 255, "kind 0"),
     (0x0009, 255, "in the prelude"),
-    (0x0016, 0, "of motion"),
+    (0x0018, 0, "of motion"),
     (0x0021, 255, "behind the motion"),
     (0x7FFF, 255, "the last one"),
 ):
@@ -1992,7 +2110,7 @@ table(
     "unknown-without-level",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind with Level 255",
-    lambda: fork().add(Entry(0x8016, b"")),
+    lambda: fork().add(Entry(0x8018, b"")),
 )
 table("order-prelude", "BAD_CHUNK_TABLE", "REST before HIERARCHY", lambda: swapped(0, 1))
 table("order-motion-first", "BAD_CHUNK_TABLE", "a motion chunk before TIME", lambda: swapped(2, 3))
@@ -2001,7 +2119,7 @@ table(
     "order-optional",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind before the known ones of its level: bit 15 counts",
-    lambda: inserted(3, Entry(0x8016, b"", 0, 0)),
+    lambda: inserted(3, Entry(0x8018, b"", 0, 0)),
 )
 table(
     "order-attributes",
@@ -2038,7 +2156,7 @@ table(
     "twice-unknown-motion",
     "BAD_CHUNK_TABLE",
     "an unknown optional motion kind twice",
-    lambda: fork().add(Entry(0x8016, b"", 0, 0), Entry(0x8016, b"", 0, 0)),
+    lambda: fork().add(Entry(0x8018, b"", 0, 0), Entry(0x8018, b"", 0, 0)),
 )
 table(
     "length-limit",
@@ -2056,7 +2174,7 @@ table(
     "length-limit-before-place",
     "LIMIT_EXCEEDED",
     "the Length is checked before the Level",
-    lambda: fork().add(Entry(0x8016, b"", length=2**30 - 1)),
+    lambda: fork().add(Entry(0x8018, b"", length=2**30 - 1)),
 )
 for kind in (rd.HIERARCHY, rd.REST, rd.TIME):
     table(
@@ -2972,6 +3090,84 @@ motion(
     "bytes behind the stream",
     lambda: fork().content(rd.CORRECTIONS, 2, 1) + b"\1" * 12,
     1,
+)
+
+# ---- invalid: predicted motion -------------------------------------------------------------------------------
+
+
+def swaying() -> Draft:
+    return predicted(ROOTED, swayed(3, 18), 2).draft()
+
+
+PREDICTED_PLACE = rd.PREDICTED, 1, 1
+invalid(
+    "predicted-missing", "BAD_CHUNK_TABLE", "open", "a segment has none", lambda: swaying().without(*PREDICTED_PLACE)
+)
+invalid(
+    "predicted-stems",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "a segment has STEMS too",
+    lambda: swaying().add(Entry(rd.STEMS, stems_head(), 1, 0)),
+)
+invalid(
+    "predicted-corrections",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "a segment has CORRECTIONS too",
+    lambda: swaying().add(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5), 1, 0)),
+)
+invalid(
+    "predicted-unsaid",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "PREDICTED where Is_Predicted is 0",
+    lambda: fork().add(Entry(rd.PREDICTED, predicted_head(), 2, 0)),
+)
+invalid(
+    "predicted-at-level-0",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "PREDICTED of level 0",
+    lambda: swaying().add(Entry(rd.PREDICTED, predicted_head(), 0, 0)),
+)
+invalid(
+    "predicted-layers",
+    "BAD_HEADER",
+    "open",
+    "Layer_Count 2",
+    lambda: swaying().with_header(layer_count=2, full_level_count=3),
+)
+invalid(
+    "predicted-nodes",
+    "BAD_HEADER",
+    "open",
+    "h is 1",
+    lambda: (
+        predicted([Stem(-1, 3), Stem(0, 2, 1)], swayed(1, 19, 5)).draft().with_header(full_level_count=3, level_count=2)
+    ),
+)
+for name, reason, content in (
+    ("short", "4 bytes", predicted_head()[:4]),
+    ("settings", "a reserved bit of Settings", predicted_head(settings=16)),
+    ("step-0", "Step 0", predicted_head(0.0)),
+    ("step-nan", "Step is NaN", predicted_head(math.nan)),
+    ("left-over", "a byte behind the stream", predicted_head() + b"\1" * 400),
+    ("zero", "a stream that ends in 0", predicted_head() + b"\1\0"),
+):
+    invalid(
+        f"predicted-{name}",
+        "BAD_CHUNK",
+        1,
+        reason,
+        lambda content=content: swaying().change(*PREDICTED_PLACE, content=content),
+    )
+invalid(
+    "predicted-before-first",
+    "BAD_CHUNK",
+    1,
+    "a frame is coded about one before the rest pose",
+    lambda: predicted(ROOTED, [RESTING, [0, 0, 2]]),
 )
 
 # ---- invalid: layers ---------------------------------------------------------------------------------------

@@ -100,7 +100,7 @@ OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
 IS_HOST = 4  # of REST's Method
 METADATA, FACES, EDGES, CLIPS, SOURCE_REST = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7, 8
-STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST = 16, 17, 18, 19, 20, 21
+STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
 ATTRIBUTE = OPTIONAL | 32
 KINDS = {
     HIERARCHY: "HIERARCHY",
@@ -117,6 +117,7 @@ KINDS = {
     SHAPES: "SHAPES",
     EXACT: "EXACT",
     REFINED_REST: "REFINED_REST",
+    PREDICTED: "PREDICTED",
     ATTRIBUTE: "ATTRIBUTE",
 }
 
@@ -134,6 +135,7 @@ class Header:
     clip_count: int
     layer_count: int
     is_float64: bool
+    is_predicted: bool
     max_error: float
 
 
@@ -471,6 +473,7 @@ def decode_counts(coder: RangeDecoder, front_length: int, chunk_count: int) -> H
     clips = 1 + code_unsigned(coder, model, 0)
     layers = 1 + code_unsigned(coder, model, 16)
     is_float64 = bool(coder.raw_bit())
+    is_predicted = bool(coder.bit(Context(6000)))
     max_error = from_bits(raw_bits(coder, 63), 64)
     return Header(
         front_length,
@@ -484,6 +487,7 @@ def decode_counts(coder: RangeDecoder, front_length: int, chunk_count: int) -> H
         clips,
         layers,
         is_float64,
+        is_predicted,
         max_error,
     )
 
@@ -503,7 +507,7 @@ def check_counts(header: Header, limits: Limits) -> None:
         ("Full_Level_Count", header.full_level_count <= MOST_LEVELS),
         ("Level_Count", header.level_count >= 1),
         ("Clip_Count", header.clip_count <= MOST_CLIPS),
-        ("Layer_Count", header.layer_count <= MOST_LAYERS),
+        ("Layer_Count", header.layer_count <= (1 if header.is_predicted else MOST_LAYERS)),
         ("Max_Error", finite(header.max_error)),
     ):
         require(valid, f"{name} is out of range", "BAD_HEADER")
@@ -1386,6 +1390,305 @@ def decode_difference(coder: RangeDecoder, model: RefinementModel, known: bool, 
     return -magnitude if negative else magnitude
 
 
+# ---- predicted motion --------------------------------------------------------------------------------------
+
+GUESSES, FEATURES, LINE_GUESS, FITTED = 11, 8, 6, 10
+LONGEST_LINE, LONGEST_MEAN, SOLVED_EVERY, RUNS = 24, 64, 16, 8
+
+Point = list[float]
+
+
+@dataclass
+class Follower:
+    """A vertex from frame to frame: which others tell of it, and what is known of its motion."""
+
+    before: int
+    near: int
+    like: int
+    line: Point
+    mean: Point
+    above: int = -1
+    slope: Point = field(default_factory=lambda: [0.0] * 3)
+    older: Point = field(default_factory=lambda: [0.0] * 3)
+    error: list[float] = field(default_factory=lambda: [0.0] * GUESSES)
+    noise: float = 0.0
+    age: int = 0
+    frames: int = 0
+    size: tuple[int, int] = (0, 0)
+
+    @property
+    def kind(self) -> int:
+        """0: it follows nothing, 1: the first one of a stem, 2: others."""
+        return 0 if self.before < 0 else 2 if self.near == self.before else 1
+
+    def learn_line(self, x: Point, last: Point, off: float, step: float) -> None:
+        turned = off > 4.0 * step + 3.0 * self.noise
+        if not turned:
+            self.noise = self.noise + (off - self.noise) * 0.125
+        self.age = 1 if turned else min(self.age + 1, LONGEST_LINE)
+        more = (self.age + 1.0) * (self.age + 2.0)
+        at, along = (4.0 * self.age + 2.0) / more, 6.0 / more
+        for k in range(3):
+            ahead = self.line[k] + self.slope[k]
+            if turned:
+                self.older[k], self.line[k], self.slope[k] = self.slope[k], x[k], x[k] - last[k]
+            else:
+                self.line[k] = ahead + at * (x[k] - ahead)
+                self.slope[k] = self.slope[k] + along * (x[k] - ahead)
+
+    def learn_mean(self, x: Point) -> None:
+        self.frames = min(self.frames + 1, LONGEST_MEAN)
+        for k in range(3):
+            self.mean[k] = self.mean[k] + (x[k] - self.mean[k]) / self.frames
+
+
+def followers(branches: list[Branch], rest: list[Point], step: float) -> list[Follower]:
+    found: list[Follower] = []
+    first_before, last = -1, {}
+    for branch in branches:
+        like = last.get(branch.count, -1)
+        last[branch.count] = branch.first
+        for i in range(branch.count):
+            before = branch.first + i - 1 if i > 0 else branch.attach
+            at = rest[branch.first + i]
+            near = before if i > 0 else first_before
+            found.append(Follower(before, near, like + i if like >= 0 else -1, list(at), list(at)))
+        first_before = branch.first
+    follow_twins(found, [tuple(steps_in(x, step * 0.00390625) for x in at) for at in rest])
+    for vertex in found:
+        vertex.above = found[vertex.before].before if vertex.before >= 0 else -1
+    return found
+
+
+def follow_twins(found: list[Follower], cells: list[tuple[int, ...]]) -> None:
+    """Vertices that rest where an earlier one does, and not where the one does that they follow, follow that."""
+    places, table = 16, {}
+    while places < 2 * len(found):
+        places *= 2
+    for v, vertex in enumerate(found):
+        x, y, z = cells[v]
+        entry = (x * 73856093 + y * 19349663 + z * 83492791) % (1 << 32)
+        entry = (entry ^ entry >> 15) % places
+        twin = table.get(entry, -1)
+        table[entry] = v
+        joined = vertex.before >= 0 and cells[vertex.before] == cells[v]
+        if twin >= 0 and cells[twin] == cells[v] and not joined:
+            vertex.before = vertex.near = twin
+
+
+class Fit:
+    """Least squares over the features of vertices of one kind, and the mean errors of their guesses."""
+
+    def __init__(self):
+        self.moments = [[0.0] * FEATURES for _ in range(FEATURES)]
+        self.products, self.weights, self.error = [0.0] * FEATURES, [0.0] * FEATURES, [0.0] * GUESSES
+        self.count, self.wait = 0, 1
+
+    def learn(self, features: list[list[float]], way: Point, weight: float, memory: int) -> None:
+        x, y, z = features
+        for i in range(FEATURES):
+            wx, wy, wz = weight * x[i], weight * y[i], weight * z[i]
+            row = self.moments[i]
+            for j in range(FEATURES):
+                row[j] = row[j] + (wx * x[j] + wy * y[j] + wz * z[j])
+            self.products[i] = self.products[i] + (wx * way[0] + wy * way[1] + wz * way[2])
+        self.count = min(self.count + 1, 8 * SOLVED_EVERY)
+        self.wait -= 1
+        if self.wait == 0:
+            self._solve()
+            self.wait = min(1 + self.count // 8, SOLVED_EVERY)
+            keep = 1.0 - self.wait / memory
+            self.moments = [[x * keep for x in row] for row in self.moments]
+            self.products = [x * keep for x in self.products]
+
+    def _solve(self) -> None:
+        lower, y = [[0.0] * FEATURES for _ in range(FEATURES)], [0.0] * FEATURES
+        for i in range(FEATURES):
+            for j in range(i + 1):
+                a = self.moments[i][j]
+                if i == j:
+                    a = a + (1.0 + a * 1e-6)
+                for k in range(j):
+                    a = a - lower[i][k] * lower[j][k]
+                lower[i][j] = math.sqrt(a if a > 0.5 else 0.5) if i == j else a / lower[j][j]
+            total = self.products[i]
+            for k in range(i):
+                total = total - lower[i][k] * y[k]
+            y[i] = total / lower[i][i]
+        for i in reversed(range(FEATURES)):
+            total = y[i]
+            for k in range(i + 1, FEATURES):
+                total = total - lower[k][i] * self.weights[k]
+            self.weights[i] = total / lower[i][i]
+
+
+@dataclass
+class Around:
+    """Positions less Origin: at rest, in the frame that one is coded about and the two before that, in the frame
+    before, and in this one."""
+
+    rest: list[Point]
+    was: list[list[Point]]
+    last: list[Point]
+    now: list[Point]
+
+
+@dataclass
+class Way:
+    """Where a vertex is expected to go: of each axis the guesses and features, and what was chosen."""
+
+    guesses: list[list[float]]
+    features: list[list[float]]
+    way: Point
+
+
+class Prediction:
+    """PREDICTED of a segment."""
+
+    def __init__(self, chunk: bytes, branches: list[Branch], rest: np.ndarray, origin: np.ndarray, number: np.dtype):
+        require(len(chunk) >= 5 and chunk[4] <= 15, "Settings of PREDICTED are out of range")
+        self.step, self.memory, self.common = f32(chunk, 0), 32 << (chunk[4] & 7), chunk[4] >= 8
+        require(finite(self.step) and self.step > 0.0, "Step of PREDICTED is out of range")
+        self.coder = RangeDecoder(chunk[5:])
+        self.rest, self.origin, self.number = rest.tolist(), origin, number
+        self.vertices = followers(branches, self.rest, self.step)
+        self.numbers, self.distances = NumberModel(), NumberModel()
+        self.moved = [
+            [[Context(6000 if own + near == 0 else 32768) for _ in range(3)] for near in range(4)] for own in range(4)
+        ]
+        self.copied = [[Context(6000) for _ in range(RUNS)] for _ in range(RUNS)]
+        self.usual = [Context(60000) for _ in range(2)]
+        self.fits = [Fit() for _ in range(3)]
+        self.run = self.last_run = 0
+        self.distance = 1
+
+    def decode(self, frames: int) -> np.ndarray:
+        """(vertices, 3, frames), as they are put out."""
+        out: list[np.ndarray] = []
+        known, abouts = [self.rest], [0]  # the rest pose, then the frames; which of these each is coded about
+        for t in range(frames):
+            copied = self._decode_reference(t)
+            about = t + 1 - self.distance
+            abouts.append(abouts[about] if copied else about)
+            if copied:
+                now = out[about - 1] if about > 0 else self._put_out(self.rest)
+            else:
+                was = [known[about], known[abouts[about]], known[abouts[abouts[about]]]]
+                now = self._decode_frame(Around(self.rest, was, known[-1], []))
+            out.append(now)
+            known.append((now.astype(float) - self.origin).tolist())
+        self.coder.finish()
+        return np.stack(out, axis=2)
+
+    def _put_out(self, positions: list[Point]) -> np.ndarray:
+        return (np.array(positions) + self.origin).astype(self.number)
+
+    def _decode_reference(self, frame: int) -> int:
+        copied = self.coder.bit(self.copied[min(self.run, RUNS - 1)][min(self.last_run, RUNS - 1)])
+        if not self.coder.bit(self.usual[copied]):
+            self.distance = code_unsigned(self.coder, self.distances, 64) + 1
+        require(self.distance <= frame + 1, "a frame is coded about one before the first")
+        if copied:
+            self.run += 1
+        else:
+            self.last_run, self.run = self.run, 0
+        return copied
+
+    def _decode_frame(self, around: Around) -> np.ndarray:
+        out = []
+        for v in range(len(self.vertices)):
+            p = self._predict(around, v)
+            steps = self._decode_steps(v)
+            at = [around.was[0][v][k] + p.way[k] + float(steps[k]) * self.step for k in range(3)]
+            out.append(self._put_out([at])[0])
+            around.now.append((out[v].astype(float) - self.origin).tolist())
+            self._learn(around, v, p)
+        return np.array(out)
+
+    def _predict(self, around: Around, v: int) -> Way:
+        vertex = self.vertices[v]
+        fit, scale = self.fits[vertex.kind], self._grown(vertex, around)
+        guesses, features = zip(*(self._guess(vertex, around, v, k, scale, fit.weights) for k in range(3)))
+        errors = list(vertex.error)
+        if vertex.near >= 0:
+            errors = [a + b for a, b in zip(errors, self.vertices[vertex.near].error)]
+        if self.common:
+            errors = [a + b for a, b in zip(errors, fit.error)]
+        chosen = 0
+        for i in range(1, GUESSES):
+            chosen = i if errors[i] < errors[chosen] else chosen
+        way = [own[chosen] if finite(own[chosen]) else 0.0 for own in guesses]
+        return Way(list(guesses), list(features), way)
+
+    @staticmethod
+    def _grown(vertex: Follower, around: Around) -> float:
+        """How far the edge before a vertex on its stem is out, over the rest pose's."""
+        u, p = vertex.before, vertex.above
+        if u < 0 or p < 0 or vertex.near != u:
+            return 1.0
+        along = length2 = 0.0
+        for k in range(3):
+            edge = around.rest[u][k] - around.rest[p][k]
+            along = along + edge * (around.now[u][k] - around.now[p][k])
+            length2 = length2 + edge * edge
+        return along / length2 if length2 > 1e-60 else 1.0
+
+    @staticmethod
+    def _guess(vertex: Follower, around: Around, v: int, k: int, scale: float, weights: list[float]) -> tuple:
+        now, (was, was2, was3) = around.now, around.was
+
+        def moved(u: int) -> tuple[float, float]:
+            return (now[u][k] - was[u][k], was[u][k] - was2[u][k]) if u >= 0 else (0.0, 0.0)
+
+        x, u, joined, edge = was[v][k], vertex.before, 0.0, 0.0
+        if u >= 0:
+            joined = now[u][k] - x
+            edge = joined + scale * (around.rest[v][k] - around.rest[u][k])
+        own, (before, before2), (above, above2) = x - was2[v][k], moved(u), moved(vertex.above)
+        line, mean = (vertex.line[k] + vertex.slope[k]) - x, vertex.mean[k] - x
+        features = [own, was2[v][k] - was3[v][k], before, before2, above, above2, line, mean]
+        fitted = 0.0
+        for weight, feature in zip(weights, features):
+            fitted = fitted + weight * feature
+        like = moved(vertex.like)[0]
+        guesses = [0.0, own, before, own + (before - before2), edge, joined, line, mean, like, vertex.older[k], fitted]
+        return guesses, features
+
+    def _decode_steps(self, v: int) -> list[int]:
+        vertex, vertices = self.vertices[v], self.vertices
+        own, older = vertex.size
+        near = vertices[vertex.near].size[0] if vertex.near >= 0 else 0
+        beside = max(vertices[u].size[0] if u >= 0 else 0 for u in (v - 1, vertex.before))
+        contexts = self.moved[size_class(own + older // 2)][size_class(near)]
+        expected, steps, total = (2 * own + older + 2 * near + beside) * 8 // 9, [0, 0, 0], 0
+        if self.coder.bit(contexts[0 if beside == 0 else 1 if beside < 4 else 2]):
+            for k in range(3):
+                about = expected if k == 0 else (2 * expected + total * 16 // k) // 3
+                steps[k] = code_signed(self.coder, self.numbers, about)
+                total += clipped(steps[k])
+        vertex.size = total, own
+        return steps
+
+    def _learn(self, around: Around, v: int, p: Way) -> None:
+        vertex, x = self.vertices[v], around.now[v]
+        fit, way = self.fits[vertex.kind], [x[k] - around.was[0][v][k] for k in range(3)]
+        errors = []
+        for i in range(GUESSES):
+            a, b, c = (abs(way[k] - p.guesses[k][i]) for k in range(3))
+            errors.append(a + b + c)
+            vertex.error[i] = 0.5 * vertex.error[i] + errors[i]
+            fit.error[i] = 0.9 * fit.error[i] + 0.1 * errors[i]
+        a, b, c = (abs(way[k] - p.way[k]) for k in range(3))
+        off = a + b + c + self.step
+        fit.learn(p.features, way, 1.0 / (off * off), self.memory)
+        vertex.learn_line(x, around.last[v], errors[LINE_GUESS], self.step)
+        vertex.learn_mean(x)
+
+
+def size_class(size: int) -> int:
+    return 0 if size == 0 else 1 if size < 2 else 2 if size < 6 else 3
+
+
 # ---- plan: what all segments share -------------------------------------------------------------------------
 
 PIECE_VERTICES = 64
@@ -1442,7 +1745,8 @@ class Node:
 class Plan:
     """Pieces and nodes of a hierarchy; once the rest pose is set, also their bases."""
 
-    def __init__(self, branches: list[Branch]):
+    def __init__(self, branches: list[Branch], is_predicted: bool = False):
+        self.is_predicted = is_predicted  # then no piece has modes, and all nodes have maps
         self.pieces: list[Piece] = []
         self.nodes: list[Node] = []
         self.rest = np.zeros((0, 3))
@@ -1473,7 +1777,7 @@ class Plan:
                 last_branch.first + last_branch.count - branch.first,
                 level=branch.depth,
                 last=self.height if branch.flags & WHOLE else branch.depth,
-                coded=branch.subtree > 1 or branch.count > PIECE_VERTICES,
+                coded=self.is_predicted or branch.subtree > 1 or branch.count > PIECE_VERTICES,
             )
         )
 
@@ -1503,7 +1807,7 @@ class Plan:
                 self.pieces[piece.parent].carries = True
 
     def has_stems(self, level: int) -> bool:
-        return any(level in (piece.level, piece.low_level) for piece in self.pieces)
+        return not self.is_predicted and any(level in (piece.level, piece.low_level) for piece in self.pieces)
 
     def has_affines(self, level: int, shown: int) -> bool:
         """Whether playing `shown` needs the maps of `level`."""
@@ -2196,11 +2500,11 @@ class Pose:
     def coded_map(self, node: Node):
         """By rows of its own; functionals are (3,) with a track per axis."""
         motion, piece = self.motion, self.plan.pieces[node.piece]
-        step = motion.node_step[node.number]
+        step = motion.node_step.get(node.number, 1.0)
         c, R = self.attach_frame(piece)
         if piece.has_shift:
             c = c + over_time(motion.node_shift.get(node.number), step, motion.cosines)
-        rows = motion.node_rows[node.number]
+        rows = motion.node_rows.get(node.number, [])  # of predicted motion, where no chunk has them
         return (
             c,
             R,
@@ -2638,22 +2942,26 @@ class AthFile:
         )
         deepest = max(branch.depth for branch in self.branches)
         require(deepest + 1 <= self.limits.hierarchy_depth, "branches are nested too deep", "LIMIT_EXCEEDED")
-        self.plan = Plan(self.branches)
+        self.plan = Plan(self.branches, self.header.is_predicted)
         require(
-            self.header.full_level_count in (self.lossy_levels, self.lossy_levels + 1),
+            self.header.full_level_count in (self.lossy_levels, self.lossy_levels + 1)
+            and (self.plan.height == 0 or not self.header.is_predicted),
             "Full_Level_Count is not that of the hierarchy and its layers",
             "BAD_HEADER",
         )
 
     def _check_motion_chunks(self) -> None:
         """FORMAT.md, "Levels and chunks"."""
-        plan, wanted, allowed = self.plan, set(), set()
+        plan, predicted, wanted, allowed = self.plan, self.header.is_predicted, set(), set()
         for level in range(self.header.level_count):
             for s in range(self.header.segment_count):
                 wanted |= {(STEMS, level, s)} if self._has_stems(level) else set()
-                wanted |= {(AFFINES, level, s)} if plan.has_affines(level, level) else set()
+                maps = {(AFFINES, level, s)} if plan.has_affines(level, level) else set()
+                wanted |= set() if predicted else maps
+                wanted |= {(PREDICTED, level, s)} if predicted and level == 1 else set()
                 wanted |= {(EXACT, level, s)} if level == self.lossy_levels else set()
-                allowed |= {(CORRECTIONS, level, s)} if plan.height < level < self.lossy_levels else set()
+                corrections = plan.height < level < self.lossy_levels and not predicted
+                allowed |= {(CORRECTIONS, level, s)} if corrections else maps
             allowed |= {(SHAPES, level, 0)} if self._has_stems(level) else set()
             allowed |= {(REFINED_REST, level, 0)} if self._may_refine_rest(level) else set()
         there = {(c.kind, c.level, c.segment) for c in self.chunks if c.is_motion and c.kind in KINDS}
@@ -2806,8 +3114,17 @@ class AthFile:
         for chunk in self._needed(s, level):
             require(self.is_available(chunk), f"{chunk} has not arrived", "TRUNCATED")
         frames, shown = self._segment_lengths[s], min(level, self.lossy_levels - 1)
+        if self.header.is_predicted and shown > 0:
+            chunk = self.content(PREDICTED, shown, s)
+            coded = Prediction(chunk, self.branches, self.plan.rest, self.origin, self.position_type)
+            positions = coded.decode(frames)
+        else:
+            positions = self._layers(s, frames, shown)
+        return decode_exact(self.content(EXACT, level, s), positions) if level > shown else positions
+
+    def _layers(self, s: int, frames: int, shown: int) -> np.ndarray:
         pose = self._first_layer(s, frames, min(shown, self.plan.height + 1))
-        for q in range(1, self._layer_of(level) + 1):
+        for q in range(1, self._layer_of(shown) + 1):
             pose = self._refinement(s, frames, q, pose)
         positions = (pose.placed + self.origin[:, None]).astype(self.position_type)
         if self.find(CORRECTIONS, shown, s):
@@ -2816,13 +3133,13 @@ class AthFile:
             q = decode_corrections(chunk[4:], self.header.vertex_count, frames)
             corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
             positions = np.where(q != 0, corrected, positions)
-        return decode_exact(self.content(EXACT, level, s), positions) if level > shown else positions
+        return positions
 
     def _needed(self, s: int, level: int) -> list[Chunk]:
         """Chunks that playing a segment at a level takes."""
         places = [(CORRECTIONS, min(level, self.lossy_levels - 1), s), (EXACT, level, s)]
         for d in range(level + 1):
-            places += [(SHAPES, d, 0), (REFINED_REST, d, 0), (STEMS, d, s)]
+            places += [(SHAPES, d, 0), (REFINED_REST, d, 0), (STEMS, d, s), (PREDICTED, d, s)]
             places += [(AFFINES, d, s)] if self.plan.has_affines(d, level) else []
         return [self._places[place] for place in places if place in self._places]
 
@@ -2834,7 +3151,7 @@ class AthFile:
                 decode_shapes(self.content(SHAPES, d), plan, motion, d)
             if plan.has_stems(d):
                 decode_stems(read_stems_head(self.content(STEMS, d, s), motion, d), plan, motion, d)
-            if plan.has_affines(d, level):
+            if plan.has_affines(d, level) and self.find(AFFINES, d, s):
                 decode_affines(self.content(AFFINES, d, s), plan, motion, d)
         pose = Pose(plan, motion)
         pose.place_level(level)

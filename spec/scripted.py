@@ -218,6 +218,7 @@ class FrontScript:
             counts["clip_count"] - 1,
             counts["layer_count"] - 1,
             int(counts["is_float64"]),
+            int(counts["is_predicted"]),
             *_bits(rd.to_bits(counts["max_error"], 64), 63),
         ]
         self.bits, self.before, self.was_motion, self.place = [8] * (rd.OTHER + 1), rd.OTHER, False, (0, 0)
@@ -280,6 +281,7 @@ class Draft:
                 chunk_count=len(self.entries),
                 clip_count=1,
                 is_float64=0,
+                is_predicted=0,
                 max_error=1.0,
                 layer_count=1,
             )
@@ -489,6 +491,10 @@ def stems_head(
     return head + struct.pack("<HBI", rank, base, len(basis)) + basis if bits else head
 
 
+def predicted_head(step: float = 0.0625, settings: int = 2) -> bytes:
+    return struct.pack("<fB", step, settings)
+
+
 def basis_stream(rows: list[list[int]], bits: int) -> bytes:
     """A learned basis over time of these integers."""
     script = []
@@ -525,6 +531,7 @@ class Plant:
     layers: int = 1
     ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
     shift: int = 2  # of SHAPES
+    predicted: bytes | None = None  # of predicted motion, Step and Settings; then AFFINES are there only with a script
 
     def draft(self) -> Draft:
         vertices = sum(stem.count for stem in self.stems)
@@ -536,7 +543,8 @@ class Plant:
         )
         branches, _, vertex_source = rd.decode_hierarchy(stream, len(self.stems), vertices)
         rest = self._rest(branches)
-        self.plan = self.level_0 = rd.Plan(branches)
+        self.branches, predicted = branches, self.predicted is not None
+        self.plan = self.level_0 = rd.Plan(branches, predicted)
         rests = self._set_rest(branches, rest, vertex_source)
         clips = self.clips or (rd.Clip(self.frames, self.segments),)
         entries = [
@@ -577,6 +585,7 @@ class Plant:
                 full_level_count=levels,
                 clip_count=len(clips),
                 is_float64=int(self.is_float64),
+                is_predicted=int(predicted),
                 layer_count=self.layers,
             ),
             tuple(entries),
@@ -657,10 +666,14 @@ class Plant:
                 head = self._head(level, s, motion)
                 stream = self._write(rd.decode_stems, (rd.STEMS, level, s), self.plan, motion, level)
                 entries.append(Entry(rd.STEMS, head + stream, level, s))
-            if self.plan.has_affines(level, level):
+            scripted = self.predicted is None or (rd.AFFINES, level, s) in self.scripts
+            if self.plan.has_affines(level, level) and scripted:
                 plan = self.level_0 if level == 0 else self.plan
                 stream = self._write(rd.decode_affines, (rd.AFFINES, level, s), plan, motion, level)
                 entries.append(Entry(rd.AFFINES, stream, level, s))
+        if self.predicted is not None:
+            stream = self._write(self._predict, (rd.PREDICTED, 1, s), frames)
+            entries.append(Entry(rd.PREDICTED, self.predicted + stream, 1, s))
         if self.layers > 1:
             entries += self._refinements(s, motion)
         for level in range(last, last + self.layers):
@@ -669,6 +682,11 @@ class Plant:
                 stream = self._write(rd.decode_corrections, place, sum(stem.count for stem in self.stems), frames)
                 entries.append(Entry(rd.CORRECTIONS, struct.pack("<f", 0.5) + stream, *place[1:]))
         return entries
+
+    def _predict(self, stream: bytes, frames: int) -> None:
+        number = np.dtype("<f8" if self.is_float64 else "<f4")
+        coded = rd.Prediction(self.predicted + stream, self.branches, self.plan.rest, np.array(self.origin), number)
+        coded.decode(frames)
 
     def _head(self, level: int, s: int, motion: rd.Motion) -> bytes:
         """Of STEMS; the motion gets its steps and waves."""

@@ -28,7 +28,7 @@ from spec.scripted import Draft, Entry  # noqa: E402
 
 COUNTS = (
     "vertex_count branch_count frame_count segment_count full_level_count level_count clip_count layer_count "
-    "is_float64 max_error"
+    "is_float64 is_predicted max_error"
 ).split()
 CHECKSUM_AT = 12
 

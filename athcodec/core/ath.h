@@ -104,6 +104,7 @@ enum {
     ATH_SHAPES = 19, /* of all segments, in segment 0 */
     ATH_EXACT = 20,
     ATH_REFINED_REST = 21, /* of all segments, in segment 0 */
+    ATH_PREDICTED = 22,
     ATH_ATTRIBUTE = ATH_OPTIONAL | 32
 };
 
@@ -252,6 +253,7 @@ typedef struct ath_info {
     int32_t rest_is_float64;   /* 1: the rest pose is double, else float */
     int32_t rest_is_host;      /* 1: the rest pose is a mesh of the host's, for ath_set_host_mesh */
     uint32_t host_checksum[2]; /* of that mesh: CRC-32C of its floats as bytes, little-endian, and of these backwards */
+    int32_t is_predicted;      /* 1: all levels but level 0 are predicted motion */
 } ath_info;
 
 ATH_API void ath_get_info(const ath_file *file, ath_info *info);

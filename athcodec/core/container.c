@@ -92,7 +92,8 @@ static int is_bad_header(const ath_limits *limits, const ath_header *header, ath
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 2, ATH_LEVELS)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LEVEL_COUNT, header->level_count, 1, header->full_level_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_CLIP_COUNT, header->clip_count, 1, 255)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LAYER_COUNT, header->layer_count, 1, ATH_LAYERS)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_LAYER_COUNT, header->layer_count, 1,
+                         header->is_predicted ? 1 : ATH_LAYERS)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_MAX_ERROR, header->max_error, 0, LARGEST);
 }
 
@@ -463,6 +464,14 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->basis.size = length;
     *body = rest_of(*body, 7 + length);
     return ATH_OK;
+}
+
+int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body)
+{
+    if (chunk.size < 5 || chunk.bytes[4] > 15) return ATH_BAD_CHUNK;
+    *head = ath_predicted_head_of((double)f32_at(chunk.bytes), chunk.bytes[4]);
+    *body = rest_of(chunk, 5);
+    return is_step(head->step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body)

@@ -9,7 +9,7 @@ typedef struct ath_header {
     uint64_t file_length, front_length;
     double max_error;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
-    int32_t level_count, full_level_count, clip_count, layer_count, is_float64;
+    int32_t level_count, full_level_count, clip_count, layer_count, is_float64, is_predicted;
 } ath_header;
 
 /* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
@@ -66,6 +66,12 @@ typedef struct {
 } ath_clip_entry;
 
 /* 0: first + i * step; 1: first + i / step; 2: stream; 3 as 1 and 4 as 0, by a whole rate, from 0 on */
+/* Of PREDICTED: the step, how many samples fits remember, and whether the errors of all vertices of a fit count. */
+typedef struct {
+    double step;
+    int32_t memory, common;
+} ath_predicted_head;
+
 typedef int32_t ath_time_method;
 
 typedef struct {
@@ -90,6 +96,12 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
+ATH_INLINE ath_predicted_head ath_predicted_head_of(double step, int32_t settings)
+{
+    ath_predicted_head head = {step, 32 << (settings & 7), settings >> 3};
+    return head;
+}
+int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body);
 int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
 
 int ath_is_finite(double value);

@@ -3,6 +3,7 @@
 #include "encode.h"
 #include "front_model.h"
 #include "motion_streams.h"
+#include "predicted_model.h"
 #include "streams.h"
 
 /* The size written; -1: no space, -2: the input is not something that the stream can hold. */
@@ -223,6 +224,167 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
         code_vertex(&coder, model, frames, next > first);
     }
     return coder_finish(&coder);
+}
+
+/* ---- predicted motion ---- */
+
+/* What is coded: frames x vertex_count x 3 source positions less the origin, and the limit of each vertex. */
+typedef struct {
+    const double *source, *limits;
+} predicted_source;
+
+enum { LOOKED_AT = 32 }; /* vertices that tell which frame is like another */
+
+static const double *source_of(const prediction *p, const predicted_source *source, int32_t v)
+{
+    return source->source + 3 * ((size_t)p->vertex_count * (size_t)p->frame + (size_t)v);
+}
+
+/* Square of the distance of a vertex from where it was in an earlier frame. */
+static double way2_from(const prediction *p, const predicted_source *source, int32_t frame, int32_t v)
+{
+    const double *wanted = source_of(p, source, v);
+    size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)ath_max(frame, 0) + from;
+    double way2 = 0.0;
+    for (size_t k = 0; k < 3; k++) {
+        double off = (frame < 0 ? p->rest[from + k] : put_back(p, at, k)) - wanted[k];
+        way2 = way2 + off * off;
+    }
+    return way2;
+}
+
+static int is_within(const prediction *p, const predicted_source *source, int32_t frame, int32_t v)
+{
+    return way2_from(p, source, frame, v) <= source->limits[v] * source->limits[v];
+}
+
+static int is_copy(const prediction *p, const predicted_source *source, int32_t frame)
+{
+    int32_t stride = p->vertex_count / LOOKED_AT + 1;
+    for (int32_t v = 0; v < p->vertex_count; v += stride)
+        if (!is_within(p, source, frame, v)) return 0;
+    for (int32_t v = 0; v < p->vertex_count; v++)
+        if (!is_within(p, source, frame, v)) return 0;
+    return 1;
+}
+
+static double unlike(const prediction *p, const predicted_source *source, int32_t frame)
+{
+    double sum = 0.0;
+    int32_t stride = p->vertex_count / LOOKED_AT + 1;
+    for (int32_t v = 0; v < p->vertex_count; v += stride) sum = sum + ath_sqrt(way2_from(p, source, frame, v));
+    return sum;
+}
+
+/* How many frames ago the one is that a frame is a copy of, or else the one that it is like, if much more than the last. */
+static int32_t find_reference(const prediction *p, const predicted_source *source, int *copied)
+{
+    int32_t last = p->model.last_distance, best = 1;
+    *copied = 1;
+    if (last <= p->frame + 1 && is_copy(p, source, p->frame - last)) return last;
+    double least = 0.0;
+    for (int32_t distance = 1; distance <= p->frame + 1; distance++) {
+        if (is_copy(p, source, p->frame - distance)) return distance;
+        double now = unlike(p, source, p->frame - distance);
+        if (distance == 1) least = 0.25 * now;
+        if (now < least) {
+            least = now;
+            best = distance;
+        }
+    }
+    *copied = 0;
+    return best;
+}
+
+/* Steps towards 0 while the vertex stays within its limit, those that take it least away first. */
+static void shorten(const double *rest, double step, double limit2, int32_t steps[3])
+{
+    for (;;) {
+        double best = limit2;
+        int32_t axis = -1;
+        for (int32_t k = 0; k < 3; k++) {
+            double off2 = 0.0;
+            if (steps[k] == 0) continue;
+            for (int32_t i = 0; i < 3; i++) {
+                double left = rest[i] - (double)(steps[i] - (i != k ? 0 : steps[k] > 0 ? 1 : -1)) * step;
+                off2 = off2 + left * left;
+            }
+            if (off2 < best) {
+                best = off2;
+                axis = k;
+            }
+        }
+        if (axis < 0) return;
+        steps[axis] -= steps[axis] > 0 ? 1 : -1;
+    }
+}
+
+/* The smallest integers that keep a vertex within its limit. 0: there are none. */
+static int choose_steps(prediction *p, const predicted_source *source, int32_t v, const predicted_way *way,
+                        int32_t steps[3])
+{
+    const double *wanted = source_of(p, source, v), *was = p->around.was[0] + 3 * (size_t)v;
+    double left[3], step = p->head.step, limit = source->limits[v];
+    int32_t nearest[3];
+    for (size_t k = 0; k < 3; k++) {
+        left[k] = wanted[k] - (was[k] + way->way[k]);
+        double units = left[k] / step;
+        if (!(absolute(units) < 1073741822.0)) return 0;
+        nearest[k] = steps[k] = units < 0.0 ? -(int32_t)(0.5 - units) : (int32_t)(0.5 + units);
+    }
+    if (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] < limit * limit)
+        steps[0] = steps[1] = steps[2] = 0;
+    else
+        shorten(left, step, limit * limit, steps);
+    place_vertex(p, v, way, steps);
+    if (is_within(p, source, p->frame, v)) return 1;
+    memcpy(steps, nearest, sizeof nearest);
+    place_vertex(p, v, way, steps);
+    return is_within(p, source, p->frame, v);
+}
+
+static int encode_frame(ath_coder *coder, prediction *p, const predicted_source *source)
+{
+    predicted_way way;
+    int copied, valid = 1;
+    int32_t distance = find_reference(p, source, &copied);
+    if (!start_frame(coder, p, &copied, distance)) return 0;
+    for (int32_t v = 0; !copied && valid && v < p->vertex_count; v++) {
+        int32_t steps[3];
+        predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+        valid = choose_steps(p, source, v, &way, steps);
+        code_steps(coder, &p->model, p->vertices, v, steps);
+        learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    }
+    p->frame++;
+    return valid;
+}
+
+size_t ath_predicted_memory(int32_t vertex_count)
+{
+    prediction counted;
+    return ath_size_or_most(carve_prediction(&counted, vertex_count, 0));
+}
+
+int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan, const double *origin,
+                             int32_t frames, int is_float64, double step, int settings, const double *source,
+                             const double *limits, void *positions)
+{
+    ath_coder coder;
+    prediction *p = (prediction *)memory;
+    predicted_source wanted = {source, limits};
+    int valid = 1;
+    coder_start(&coder, bytes, capacity);
+    carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
+    p->head = ath_predicted_head_of(step, settings);
+    p->rest = plan->rest;
+    p->origin = origin;
+    p->positions = positions;
+    p->is_float64 = is_float64;
+    p->vertex_count = plan->vertex_count;
+    start_prediction(p, plan->branches, plan->branch_count);
+    for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
+    return written(&coder, valid);
 }
 
 size_t ath_model_size(void)

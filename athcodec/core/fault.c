@@ -63,6 +63,7 @@ const char *ath_kind_name(int kind)
     case ATH_SHAPES: return "SHAPES";
     case ATH_EXACT: return "EXACT";
     case ATH_REFINED_REST: return "REFINED_REST";
+    case ATH_PREDICTED: return "PREDICTED";
     case ATH_ATTRIBUTE: return "ATTRIBUTE";
     default: return 0;
     }

@@ -233,6 +233,7 @@ static void build_plan(ath_file *file)
     plan->piece_count = ath_count_pieces(file->branches, plan->branch_count, plan->vertex_count);
     plan->node_count = ath_count_nodes(file->branches, plan->branch_count);
     ath_build_plan(plan, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
+    if (file->header.is_predicted) ath_without_stems(plan, file->pieces, file->nodes);
 }
 
 /* A refinement's pieces come all with its level. */
@@ -261,7 +262,7 @@ static void plan_levels(ath_file *file)
     const ath_plan *plan = &file->plan;
     file->stems_levels = 0;
     memset(file->affine_levels, 0, sizeof file->affine_levels);
-    for (int32_t p = 0; p < plan->piece_count; p++) {
+    for (int32_t p = 0; p < plan->piece_count && !file->header.is_predicted; p++) {
         file->stems_levels |= 1u << plan->pieces[p].level;
         if (plan->pieces[p].low_level >= 0) file->stems_levels |= 1u << plan->pieces[p].low_level;
     }
@@ -282,7 +283,8 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
     if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
     if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
     int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
-    if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height;
+    if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height && !file->header.is_predicted;
+    if (kind == ATH_PREDICTED) return d == shown && d > file->plan.height && file->header.is_predicted;
     if (kind == ATH_REFINED_REST && d <= shown && file->header.layer_count > 1)
         return d > file->plan.height + 1 || (d == 1 && stands_alone(file));
     return kind == ATH_EXACT && d == level && d > shown;
@@ -305,18 +307,18 @@ static int refuse_first_missing(const ath_file *file, int32_t kind, int32_t leve
 /* The table has the motion chunks that the hierarchy asks for, and no others. */
 static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
 {
-    static const int32_t kinds[] = {ATH_STEMS, ATH_AFFINES, ATH_EXACT};
-    int32_t count[3][ATH_LEVELS] = {{0}};
+    static const int32_t kinds[] = {ATH_STEMS, ATH_EXACT, ATH_PREDICTED, ATH_AFFINES};
+    int32_t count[4][ATH_LEVELS] = {{0}}, required = file->header.is_predicted ? 3 : 4;
     for (int32_t c = 0; c < file->info.chunk_count; c++) {
         const ath_chunk *chunk = file->chunks + c;
         if (!is_wanted(file, chunk)) {
             ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_UNEXPECTED_CHUNK, 1, 0, 0);
             return ath_fault_at(fault, chunk, c);
         }
-        for (int32_t i = 0; i < 3; i++)
+        for (int32_t i = 0; i < required; i++)
             if (chunk->kind == kinds[i]) count[i][chunk->level]++;
     }
-    for (int32_t i = 0; i < 3; i++)
+    for (int32_t i = 0; i < required; i++)
         for (int32_t d = 0; d < file->info.level_count; d++)
             if (ath_file_needs(file, kinds[i], d, d) && count[i][d] < file->info.segment_count)
                 return refuse_first_missing(file, kinds[i], d, fault);
@@ -388,7 +390,7 @@ static void know_rest(ath_file *file)
 {
     file->rest_known = 1;
     file->plan.rest = file->rest;
-    if (file->first_layer > 0)
+    if (file->first_layer > 0 && !file->header.is_predicted)
         file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
                                                        (int32_t *)file->scratch);
     ath_plan_nodes(&file->plan, file->nodes);
@@ -438,13 +440,15 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->layer_count = header->layer_count;
     info->chunk_count = (int32_t)header->chunk_count;
     info->is_float64 = header->is_float64;
+    info->is_predicted = header->is_predicted;
 }
 
 /* One level more than the lossy ones gives the very positions of the source. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
     int32_t lossy = ath_lossy_levels(file), found = file->info.full_level_count;
-    if (found == lossy || found == lossy + 1) return ATH_OK;
+    int placed = file->plan.height == 0 || !file->header.is_predicted;
+    if (placed && (found == lossy || found == lossy + 1)) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
 
@@ -739,7 +743,6 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
     int32_t layer = ath_layer_of(file, level);
     const ath_plan *plan = ath_level_plan(file, level);
     if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
-    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
         for (size_t k = 0; k < 3; k++)
@@ -973,7 +976,7 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
-    for (int32_t kind = ATH_STEMS; kind <= ATH_REFINED_REST; kind++)
+    for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!is_used(file, kind, d, level, 0)) continue;
             const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);

@@ -6,12 +6,11 @@
 #include "container.h"
 #include "number_model.h"
 
-enum { KNOWN_KINDS = 15, KIND_BITS = 5, SIZE_BITS = 30 };
+enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
 
-static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,         ATH_TIME,        ATH_METADATA,
-                                                  ATH_FACES,     ATH_EDGES,        ATH_CLIPS,       ATH_SOURCE_REST,
-                                                  ATH_STEMS,     ATH_AFFINES,      ATH_CORRECTIONS, ATH_SHAPES,
-                                                  ATH_EXACT,     ATH_REFINED_REST, ATH_ATTRIBUTE};
+static const uint16_t known_kinds[KNOWN_KINDS] = {
+    ATH_HIERARCHY, ATH_REST,    ATH_TIME,        ATH_METADATA, ATH_FACES, ATH_EDGES,        ATH_CLIPS,     ATH_SOURCE_REST,
+    ATH_STEMS,     ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES,   ATH_EXACT, ATH_REFINED_REST, ATH_PREDICTED, ATH_ATTRIBUTE};
 
 typedef struct {
     ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind before */
@@ -56,6 +55,7 @@ static uint32_t code_from(ath_coder *coder, number_model *model, uint32_t least,
 static void code_counts(ath_coder *coder, ath_header *header)
 {
     number_model counts;
+    ath_context predicted;
     uint64_t bits;
     number_model_init(&counts);
     header->vertex_count = code_from(coder, &counts, 1, 1 << 16, header->vertex_count);
@@ -70,6 +70,8 @@ static void code_counts(ath_coder *coder, ath_header *header)
     header->clip_count = (int32_t)code_from(coder, &counts, 1, 0, (uint32_t)header->clip_count);
     header->layer_count = (int32_t)code_from(coder, &counts, 1, 16, (uint32_t)header->layer_count);
     header->is_float64 = coder_raw_bit(coder, header->is_float64);
+    context_init(&predicted, 6000);
+    header->is_predicted = coder_bit(coder, &predicted, header->is_predicted);
     memcpy(&bits, &header->max_error, sizeof bits);
     bits = code_raw_bits(coder, 63, bits);
     memcpy(&header->max_error, &bits, sizeof bits);

@@ -178,6 +178,15 @@ static void whiten(const ath_plan *plan, ath_node *node)
     }
 }
 
+void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes)
+{
+    for (int32_t n = 0; n < plan->node_count; n++) nodes[n].coded = 1;
+    for (int32_t p = 0; p < plan->piece_count; p++) {
+        pieces[p].low_level = -1;
+        pieces[p].low_modes = 0;
+    }
+}
+
 void ath_plan_nodes(const ath_plan *plan, ath_node *nodes)
 {
     for (int32_t n = 0; n < plan->node_count; n++) {

@@ -57,6 +57,9 @@ ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t bran
  * been attached. `memory`: scratch, vertex_count. */
 ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
+/* Of predicted motion, whose levels have maps of nodes alone, all of them coded: no piece begins at their levels. */
+ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes);
+
 /* Doubles that the bases need; fills the pieces' offsets. gaps: vertex_count bytes; table: ath_basis_table_size. */
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,

@@ -4,11 +4,12 @@
 #include "exact_model.h"
 #include "kept.h"
 #include "motion_streams.h"
+#include "predict.h"
 #include "segment.h"
 
 enum { CHECKSUM_STEP = 1 << 16, TILE = 8, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 
-typedef enum { CHECKSUMS, HEADS, PIECES, DONE, FAILED } prepare_phase;
+typedef enum { CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
 
 typedef struct {
     ath_coder coder;
@@ -68,6 +69,8 @@ struct ath_work {
     affines_reader affines[ATH_LEVELS];
     corrections_reader corrections;
     exact_reader exact_level;
+    ath_prediction *prediction;
+    const ath_chunk *predicted; /* null: there is none, or it is not wanted */
     ath_stream streams[ATH_LEVELS];
     layer_work layers[ATH_LAYERS];
     ath_node_rows node;
@@ -147,6 +150,8 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
     }
     work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
     if (ath_file_is_lossless(file)) work->exact_level.model = (exact_model *)ath_take(&arena, sizeof(exact_model));
+    if (file->header.is_predicted)
+        work->prediction = (ath_prediction *)ath_take(&arena, ath_prediction_size(file->plan.vertex_count));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
     for (int32_t q = 0; q <= ath_layer_of(file, file->info.level_count - 1); q++)
@@ -306,13 +311,18 @@ static int32_t checksum_steps(const ath_chunk *chunk)
     return chunk && chunk->length > 0 ? (int32_t)((chunk->length - 1) / CHECKSUM_STEP) + 1 : 1;
 }
 
+/* Rest poses have been read. */
+static int32_t kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED : kind + 1; }
+
 int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 {
     int32_t checks = 0, heads = level + 2;
     for (int32_t d = 0; d <= level; d++)
-        for (int32_t kind = ATH_STEMS; kind <= ATH_EXACT; kind++)
+        for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind = kind_after(kind))
             checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
-    return checks + heads + file->plan.piece_count + 1;
+    int32_t predictions =
+        file->header.is_predicted ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment)) : 0;
+    return checks + heads + predictions + file->plan.piece_count + 1;
 }
 
 static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
@@ -350,6 +360,8 @@ static int find_chunks(ath_work *work)
     }
     work->corrections.chunk = chunk_of(work, ATH_CORRECTIONS, ath_min(work->level, ath_lossy_levels(work->file) - 1));
     work->exact_level.chunk = chunk_of(work, ATH_EXACT, work->level);
+    work->predicted = chunk_of(work, ATH_PREDICTED, ath_min(work->level, ath_lossy_levels(work->file) - 1));
+    if (result == ATH_OK) result = check_fed(work, work->predicted);
     if (result == ATH_OK) result = check_fed(work, work->corrections.chunk);
     return result == ATH_OK ? check_fed(work, work->exact_level.chunk) : result;
 }
@@ -377,6 +389,7 @@ static void ready_motion(ath_work *work)
     work->layer = ath_layer_of(work->file, work->level);
     for (int32_t q = work->first_layer; q <= work->layer; q++) ready_layer(work, q);
     work->node.step = &work->node_step;
+    memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
         work->streams[d].temporal = work->file->cosines[work->segment->frames];
@@ -448,7 +461,8 @@ static void next_phase(ath_work *work, prepare_phase phase)
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;
-    if (work->next_kind++ < ATH_EXACT) return;
+    work->next_kind = kind_after(work->next_kind);
+    if (work->next_kind <= ATH_PREDICTED) return;
     work->next_kind = ATH_STEMS;
     if (work->next++ == work->level) next_phase(work, HEADS);
 }
@@ -539,6 +553,14 @@ static int open_corrections(corrections_reader *reader)
     return ATH_OK;
 }
 
+static int open_predicted(ath_work *work)
+{
+    const ath_segment *segment = work->segment;
+    return blame(work, work->predicted,
+                 ath_prediction_start(work->prediction, &work->file->plan, work->file->info.origin, segment->frames,
+                                      segment->is_float64, bytes_of(work->predicted), segment->positions));
+}
+
 /* The streams of one level. */
 static int open_level(ath_work *work)
 {
@@ -549,8 +571,9 @@ static int open_level(ath_work *work)
             exact_model_init(work->exact_level.model);
             coder_start(&work->exact_level.coder, work->exact_level.chunk->bytes, work->exact_level.chunk->length);
         }
-        next_phase(work, PIECES);
+        next_phase(work, work->predicted ? FRAMES : PIECES);
         keep_streams(work);
+        if (work->predicted) return open_predicted(work);
         return chunk ? blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
     affines_reader *affines = work->affines + d;
@@ -781,6 +804,13 @@ static void copy_piece(ath_work *work, const ath_piece *piece)
     }
 }
 
+static int do_frames(ath_work *work)
+{
+    int result = ath_prediction_step(work->prediction);
+    if (result == ATH_OK) next_phase(work, PIECES);
+    return result == ATH_MORE ? ATH_OK : blame(work, work->predicted, result);
+}
+
 /* The piece at the first layer, then as each further one refines it. */
 static int place_piece(ath_work *work, int32_t p)
 {
@@ -800,7 +830,7 @@ static int show_piece(ath_work *work, int32_t p)
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
         copy_piece(work, piece);
-    else if (place_piece(work, p) != ATH_OK)
+    else if (!work->predicted && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
     work->exact += piece->count;
@@ -865,7 +895,7 @@ static int do_piece(ath_work *work)
     int32_t p = work->next++, result = ATH_OK;
     if (p == plan->piece_count) return finish(work);
     const ath_piece *piece = plan->pieces + p;
-    if (work->first_level == 0) result = read_first_layer(work, p);
+    if (work->first_level == 0 && !work->file->header.is_predicted) result = read_first_layer(work, p);
     if (work->kept) restore_piece(work, piece);
     if (result == ATH_OK && work->next_node < plan->node_count && plan->nodes[work->next_node].piece == p) {
         int32_t n = work->next_node++;
@@ -882,7 +912,10 @@ int ath_prepare_step(ath_work *work, int32_t steps)
     int result = ATH_OK;
     if (work->phase == FAILED) return ATH_BAD_ARGUMENT;
     for (; steps > 0 && work->phase != DONE && result == ATH_OK; steps--)
-        result = work->phase == CHECKSUMS ? check_some(work) : work->phase == HEADS ? open_level(work) : do_piece(work);
+        result = work->phase == CHECKSUMS ? check_some(work)
+                 : work->phase == HEADS   ? open_level(work)
+                 : work->phase == FRAMES  ? do_frames(work)
+                                          : do_piece(work);
     if (result != ATH_OK) work->phase = FAILED;
     return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
 }

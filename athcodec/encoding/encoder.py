@@ -66,10 +66,10 @@ def encode(
         Bytes: the file has the smallest bound that fits.
     segment_frames : int, optional
         Longest segment in frames, 16 to 256; default 128, or all frames of a clip of up to 256 whose float32 positions
-        take at most 32 MiB.
+        take at most 32 MiB, or 256 where motion is predicted.
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
-        within the bound.
+        within the bound. Where they are given, motion is not predicted, which has no such hierarchy.
     exact_rest : bool
         Keep the rest pose bit for bit. Else one that the clip was given comes back within the bound, or within 0.3 % of
         the diagonal where motion is coded about another pose; one that was made is not stored.
@@ -129,7 +129,7 @@ def encode(
     job, bound = _begin(clip, option, options, _weighted_progress(clip, progress, option, options))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         decided = job.decide(bound)
-        return job.write(path, out, spool, decided, job.coded(decided, range(job.segment_count)))
+        return job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
 
 
 def draft(

@@ -40,8 +40,9 @@ from athcodec.encoding.layers import (
     layer_ratios,
     layers_of,
 )
+from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, decide
+from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -50,6 +51,8 @@ from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
+PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
+SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
 
 
@@ -67,10 +70,15 @@ class EncodingOptions:
     effort: str = "default"
     jobs: int | None = None
     ladder: tuple[float, ...] = ()  # largest errors over the diagonal, descending; (): a single layer
+    predicted_frames: int = MAX_SEGMENT  # longest segment of predicted motion
 
     @classmethod
-    def of(cls, *, ladder: str | Sequence[float] = DEFAULT_LADDER, **options) -> EncodingOptions:
-        """ladder: as `ladder_of` takes it."""
+    def of(
+        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = DEFAULT_LADDER, **options
+    ) -> EncodingOptions:
+        """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
+        if segment_frames is not None:
+            options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
         return cls(ladder=ladder_of(ladder), **options)
 
     def __post_init__(self) -> None:
@@ -168,11 +176,24 @@ class _Decided:
     choice: Choice
     prelude: CodedPrelude
     layers: Layers
-    source_rest: np.ndarray
+    source: Source
+
+    @property
+    def segment_count(self) -> int:
+        return len(self.source.segments)
+
+    @property
+    def shared_bytes(self) -> int:
+        """Of hierarchy, rest poses and learned modes."""
+        return self.prelude.prelude_bytes + sum(map(len, layer_chunks(self.layers).values()))
 
     @property
     def fingerprint(self) -> str:
-        streams_and_pose = (self.prelude.hierarchy_stream, self.prelude.rest_chunk.stream, self.source_rest.tobytes())
+        streams_and_pose = (
+            self.prelude.hierarchy_stream,
+            self.prelude.rest_chunk.stream,
+            self.source.source_rest.tobytes(),
+        )
         return hashlib.sha256(b"".join(streams_and_pose)).hexdigest()
 
 
@@ -256,16 +277,40 @@ class EncodingJob:
         )
         ath = self.seen.ath(self.thresholds(bound))
         ratio = self._layer_ratios(ath, bound)[0]
-        choices, prelude = decide(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio)
+        if self.source.still:
+            choice = still_choice(self.source, ath, bound, ratio)
+            return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
+        share = PREDICTED_SHARE if ratio > 1 else 1.0
+        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio > 1)
+        unsearched = share * search.first_cost()
+        prediction = self._best_prediction(bound, unsearched)
+        if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
+            return self._predicted(prediction.choice)
+        choices, prelude = search.decide(ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
-        return layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
+        best = layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
+        if prediction is not None and prediction.bytes < share * self._bytes_like_the_middle(best):
+            return self._predicted(prediction.choice)
+        return best
+
+    def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
+        """None for one who asks for a hierarchy of maps, which predicted motion has not."""
+        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
+
+    @property
+    def _long_segments(self) -> Source:
+        return dataclasses.replace(self.source, segment_frames=self.options.predicted_frames)
+
+    def _predicted(self, choice: Choice) -> _Decided:
+        source = self._long_segments
+        ath, prelude, layers = predicted_layers(source, choice)
+        return _Decided(ath, choice, prelude, layers, source)
 
     def _bytes_like_the_middle(self, decided: _Decided) -> int:
         """Of the motion of a file whose segments are all like the one in the middle."""
         positions = self.source.positions(self.segment_count // 2)
         chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions)
-        shared = sum(map(len, layer_chunks(decided.layers).values()))
-        return self.segment_count * sum(map(len, chunks.values())) + shared
+        return self.segment_count * sum(map(len, chunks.values())) + decided.shared_bytes
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
         """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy."""
@@ -275,17 +320,20 @@ class EncodingJob:
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
         source = self.source.about(choice.reference)
         layers = layers_of(source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
-        return _Decided(ath, choice, prelude, layers, source.source_rest)
+        return _Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: _Decided) -> Draft:
-        return Draft(decided.choice, self.seen, self.segment_count, self.found, self.options, decided.fingerprint)
+        return Draft(decided.choice, self.seen, decided.segment_count, self.found, self.options, decided.fingerprint)
 
     def decided(self, draft: Draft) -> _Decided:
         """What the draft's maker had decided, made again. Raises ClipError where it is not the same."""
         settings = draft.choice.settings
-        ath = self.seen.ath(self.thresholds(settings.bound))
-        source = self.source.about(draft.choice.reference)
-        decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
+        if draft.choice.predicted is not None:
+            decided = self._predicted(draft.choice)
+        else:
+            ath = self.seen.ath(self.thresholds(settings.bound))
+            source = self.source.about(draft.choice.reference)
+            decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(
                 "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
@@ -295,7 +343,7 @@ class EncodingJob:
 
     def encode(self, bound: float, store: ct.ChunkStore) -> _Result:
         decided = self.decide(bound)
-        return self.fill(store, decided, self.coded(decided, range(self.segment_count)))
+        return self.fill(store, decided, self.coded(decided, range(decided.segment_count)))
 
     def file_size(self, bound: float) -> float:
         """Bytes of the file at a bound; infinite where it cannot be kept."""
@@ -320,7 +368,7 @@ class EncodingJob:
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
             mesh = self.clip.source_rest if self.options.host_rest else None
             with open_ath(out, strict=True, host_mesh=mesh) as decoder:
-                result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
+                result.store.replace(ct.CLIPS, self._clips(decided, self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
         with open_ath(out, strict=True) as decoder:  # before the file gets its name
@@ -334,26 +382,27 @@ class EncodingJob:
         self._add_prelude(store, decided)
         for (level, kind), content in layer_chunks(layers).items():
             store.add(kind, content, level)
-        errors = self._add_motion(store, layers.level_count, coded)
+        errors = self._add_motion(store, decided, coded)
         self._add_static(store)
         if self.clip.clip_ranges:
-            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.clip_ranges)))
+            store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.clip_ranges)))
         header = ct.Header(
             self.clip.vertex_count,
             self.clip.branch_count,
             self.clip.frame_count,
-            self.segment_count,
+            decided.segment_count,
             len(errors),
             len(errors),
             0.0 if self.options.lossless else self.source.largest_bound(decided.choice.settings.bound),
             self.clip.dtype == np.float64,
             len(self.clip.clip_range_frames),
             len(layers.each),
+            decided.choice.predicted is not None,
         )
         return _Result(store, header, errors)
 
-    def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
-        segment_counts = [len(segments) for segments in self.source.clip_range_segments]
+    def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
+        segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
         return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
@@ -429,22 +478,26 @@ class EncodingJob:
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
             positions, exact = self._positions(blocks.pop())  # not held any longer
+            if decided.choice.predicted is not None:
+                return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
             return CodedSegment(
                 index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact)
             )
 
-        at_once = thread_count(self.options.jobs, self.source)
-        pool = ThreadPool(at_once, beside=self.source.pool.jobs > 1)
-        return pool.ordered(code, ((index, [self.source.block(index)]) for index in segments), at_once)
+        source = decided.source
+        at_once = thread_count(self.options.jobs, source)
+        pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
+        return pool.ordered(code, ((index, [source.block(index)]) for index in segments), at_once)
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
 
-    def _add_motion(self, store: ct.ChunkStore, lossy_levels: int, coded: Iterable[CodedSegment]) -> np.ndarray:
+    def _add_motion(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> np.ndarray:
         """Returns (levels, segments, 3) errors. Raises ValueError unless each segment comes once."""
-        errors = np.zeros((lossy_levels + self.options.lossless, self.segment_count, len(MEASURES)))
-        missing = set(range(self.segment_count))
+        levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
+        errors = np.zeros((levels, count, len(MEASURES)))
+        missing = set(range(count))
         for segment in coded:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
@@ -452,9 +505,9 @@ class EncodingJob:
             errors[:, segment.index] = segment.errors
             for (level, kind), payload in segment.chunks.items():
                 store.add(kind, payload, level, segment.index)
-            self.report("motion", 1 - len(missing) / self.segment_count)
+            self.report("motion", 1 - len(missing) / count)
         if missing:
-            raise ValueError(f"segments: got {self.segment_count - len(missing)}, expected all {self.segment_count}")
+            raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         return errors
 
 
@@ -468,6 +521,7 @@ def _summary(
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
     settings, bound = decided.choice.settings, decided.choice.settings.bound
     choices = {
+        "motion": "transformed" if decided.choice.predicted is None else "predicted",
         "step_ratio": settings.step / bound,
         "rest_step_ratio": settings.rest_step / bound,
         "rotations": list(settings.rotation_step_factors),

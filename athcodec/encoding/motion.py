@@ -50,11 +50,19 @@ def cosine_basis(frames: int) -> np.ndarray:
 class Plan:
     """Pieces, nodes and bases of a plant, from its branches and decoded rest pose.
 
-    branches: (B,) of _native.BRANCH in file order. rest: (N, 3) float64, less the origin.
+    branches: (B,) of _native.BRANCH in file order. refined: of a refinement. predicted: of predicted motion, without
+    bases. rest: (N, 3) float64, less the origin.
     """
 
-    def __init__(self, branches: np.ndarray, vertex_count: int, pool: ThreadPool = SERIAL, refined: bool = False):
-        self.branches, self.pool = branches, pool
+    def __init__(
+        self,
+        branches: np.ndarray,
+        vertex_count: int,
+        pool: ThreadPool = SERIAL,
+        refined: bool = False,
+        predicted: bool = False,
+    ):
+        self.branches, self.pool, self.predicted = branches, pool, predicted
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
         if piece_count <= 0:
@@ -75,6 +83,8 @@ class Plan:
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         if refined:
             self.pieces["level"], self.pieces["low_level"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
+        if predicted:
+            lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
         self.rest = self.bases = None
 
     @property
@@ -90,9 +100,12 @@ class Plan:
         """Builds the bases on a decoded rest pose, (N, 3) float64."""
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
+        self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
+        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
+        if self.predicted:
+            return
         gaps = np.empty(vertices, np.uint8)
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
-        at = address(self.rest, np.float64, 3 * vertices)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
         self.bases = np.empty(size)
 
@@ -107,8 +120,7 @@ class Plan:
 
         for fill in fill_modes, fill_sheets:
             self.pool.map(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
-        self.core.rest, self.core.bases = at, self.bases.ctypes.data
-        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
+        self.core.bases = self.bases.ctypes.data
 
     @cached_property
     def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:

@@ -89,30 +89,14 @@ class Choice:
     """Settings of a file: those of its only layer of precision, or of the refinements and of the first layer.
 
     learned_modes: of the last layer. reference: the pose that motion is coded about, (N, 3) float64 less the origin,
-    file order; None: the rest pose.
+    file order; None: the rest pose. predicted: where the motion is predicted, the second field of PREDICTED.
     """
 
     settings: Settings
     first_layer: Settings
     learned_modes: LearnedModes | None
-    reference: np.ndarray | None
-
-
-def decide(
-    source: Source, ath: Ath, bound: float, effort: str, report: Progress, jobs: int | None = None, ratio: int = 1
-) -> tuple[list[Choice], CodedPrelude]:
-    """Settings to choose from, and hierarchy and poses as coded with them; ratio: of the first layer's step to the last
-    one's, 1 if that is the same layer."""
-    if source.still:
-        settings = still_settings(source, ath, bound)
-        return [Choice(settings, _coarser(settings, ratio), None, None)], CodedPrelude(source, ath, settings)
-    search = Search.of(source, ath, bound, effort, report, jobs, ratio > 1).about_best_reference()
-    first_layer, candidates = search.found(ratio)
-    prelude = search.prelude(candidates[0])
-    return [
-        Choice(settings, first_layer, search.learned_modes(prelude.plan, settings), search.source.reference)
-        for settings in candidates
-    ], prelude
+    reference: np.ndarray | None = None
+    predicted: int | None = None
 
 
 def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
@@ -151,6 +135,12 @@ def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
         step=qz.single(step),
         node_steps=np.full(len(settings.level_steps), STILL_STEP * source.seen.diagonal + step),
     )
+
+
+def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
+    """Of a clip all of whose frames are the rest pose; ratio: as Search.decide has it."""
+    settings = still_settings(source, ath, bound)
+    return Choice(settings, _coarser(settings, ratio), None)
 
 
 def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) -> Settings:
@@ -242,6 +232,22 @@ class Search:
         hierarchy, branches = self.source.hierarchy, self.ath.node_branch
         branches = branches[hierarchy.subtree_branches[branches] > 1]
         return np.bincount(hierarchy.branch_depth[branches], minlength=self.levels)
+
+    def first_cost(self) -> float:
+        """Bytes of a whole file at the settings that the search starts with."""
+        search = self.of_sample or self
+        return search.cost(search.start)[0]
+
+    def decide(self, ratio: int = 1) -> tuple[list[Choice], CodedPrelude]:
+        """Settings to choose from, and hierarchy and poses as coded with them; ratio: of the first layer's step to the
+        last one's, 1 if that is the same layer."""
+        search = self.about_best_reference()
+        first_layer, candidates = search.found(ratio)
+        prelude = search.prelude(candidates[0])
+        return [
+            Choice(settings, first_layer, search.learned_modes(prelude.plan, settings), search.source.reference)
+            for settings in candidates
+        ], prelude
 
     def found(self, ratio: int = 1) -> tuple[Settings, list[Settings]]:
         """Settings of a first layer, and those to choose from for refinements; for a large plant those of a sample of

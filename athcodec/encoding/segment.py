@@ -200,11 +200,11 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
 class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
-    def __init__(self, source: Source, ath: Ath, settings: Settings):
+    def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
-        self.plan = Plan(branches, hierarchy.vertex_count, source.pool)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted)
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)

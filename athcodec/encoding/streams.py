@@ -198,6 +198,40 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
     )
 
 
+def encode_predicted(
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, settings: int, dtype
+) -> tuple[bytes, np.ndarray] | None:
+    """Predicted motion of a segment, and the positions that it decodes to, (T, N, 3) of `dtype`.
+
+    source: (T, N, 3) float64 less the origin; limits: (N,). None where steps so large cannot keep the limits.
+    """
+    frames, vertices, _ = source.shape
+    memory = np.empty(lib.ath_predicted_memory(vertices) // 16 + 1, np.complex128)
+    positions = np.empty(source.shape, dtype)
+    capacity = 1024 + source.size
+    while True:
+        buffer = np.empty(capacity, np.uint8)
+        size = lib.ath_encode_predicted(
+            memory.ctypes.data,
+            buffer.ctypes.data,
+            capacity,
+            plan.core,
+            address(origin, np.float64, 3),
+            frames,
+            positions.dtype == np.float64,
+            step,
+            settings,
+            address(source, np.float64, source.size),
+            address(limits, np.float64, vertices),
+            positions.ctypes.data,
+        )
+        if size >= 0:
+            return buffer[:size].tobytes(), positions
+        if size < -1:
+            return None
+        capacity *= 4
+
+
 def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
     """What takes decoded positions, (N, 3, T) float32 or float64, to those of the source, bit for bit."""
     vertices, _, frames = positions.shape

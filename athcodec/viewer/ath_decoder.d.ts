@@ -83,6 +83,8 @@ export interface AthInfo {
   /** Whether positions are double in the file's own arithmetic; a Float64Array then holds more than a
    * Float32Array. */
   readonly isFloat64: boolean;
+  /** All levels but level 0 are predicted motion. */
+  readonly isPredicted: boolean;
   /** The same of the rest pose. */
   readonly restIsFloat64: boolean;
   /** Whether the rest pose is a mesh that the host has, for setHostMesh(); of that mesh the checksum, 16 hexadecimal

@@ -18,8 +18,9 @@ const INFO = {
   levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
   chunkCount: "i32", isFloat64: "i32", epsilon: "f32", xi: "f32", eta: "u32", lambda: "u32", restIsFloat64: "i32",
   restIsHost: "i32", meshForwards: "u32", meshBackwards: "u32",
+  isPredicted: "i32",
 };
-const INFO_SIZE = 128;
+const INFO_SIZE = 136;
 const CLIP = {
   name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
   loop: "i32",
@@ -375,10 +376,10 @@ export class AthFile {
       this.#core.c.ath_get_info(this.#at, at);
       return this.#core.struct(INFO, at);
     });
-    const { originX, originY, originZ, isFloat64, restIsFloat64, restIsHost, meshForwards, meshBackwards, ...rest } = info;
+    const { originX, originY, originZ, isFloat64, restIsFloat64, restIsHost, isPredicted, meshForwards, meshBackwards, ...rest } = info;
     const origin = [originX, originY, originZ], hex = (number) => number.toString(16).padStart(8, "0");
     return Object.freeze({ ...rest, origin, isFloat64: isFloat64 !== 0, restIsFloat64: restIsFloat64 !== 0,
-      restIsHost: restIsHost !== 0, hostChecksum: restIsHost ? hex(meshForwards) + hex(meshBackwards) : null });
+      restIsHost: restIsHost !== 0, isPredicted: isPredicted !== 0, hostChecksum: restIsHost ? hex(meshForwards) + hex(meshBackwards) : null });
   }
 
   #clipTable() {

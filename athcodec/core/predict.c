@@ -1,0 +1,76 @@
+/* Decodes predicted motion: predicted_model.h compiled for decoding. */
+#include "predict.h"
+#include "predicted_model.h"
+
+enum { STEP_VERTICES = 1024 };
+
+struct ath_prediction {
+    prediction segment; /* whose arrays lie behind it */
+    ath_coder coder;
+    int32_t frames, vertex; /* vertex: the next of the frame */
+};
+
+/* The coder's place, and the arrays behind it. */
+static uint64_t carve(ath_prediction *p, int32_t vertex_count, uint8_t *base)
+{
+    ath_arena arena = {base, 0};
+    ath_take(&arena, sizeof *p);
+    return arena.used + carve_prediction(&p->segment, vertex_count, base ? base + arena.used : 0);
+}
+
+uint64_t ath_prediction_size(int32_t vertex_count)
+{
+    ath_prediction counted;
+    return carve(&counted, vertex_count, 0);
+}
+
+int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *origin, int32_t frames, int is_float64,
+                         ath_bytes chunk, void *positions)
+{
+    prediction *segment = &p->segment;
+    ath_bytes body;
+    carve(p, plan->vertex_count, (uint8_t *)p);
+    if (ath_parse_predicted(chunk, &segment->head, &body) != ATH_OK) return ATH_BAD_CHUNK;
+    segment->rest = plan->rest;
+    segment->origin = origin;
+    segment->positions = positions;
+    segment->is_float64 = is_float64;
+    segment->vertex_count = plan->vertex_count;
+    start_prediction(segment, plan->branches, plan->branch_count);
+    coder_start(&p->coder, body.bytes, body.size);
+    p->frames = frames;
+    p->vertex = 0;
+    return ATH_OK;
+}
+
+int32_t ath_prediction_steps(int32_t vertex_count, int32_t frames)
+{
+    int64_t steps = (int64_t)frames * ((vertex_count - 1) / STEP_VERTICES + 1);
+    return steps < INT32_MAX / 2 ? (int32_t)steps : INT32_MAX / 2;
+}
+
+static void decode_vertex(ath_coder *coder, prediction *p, int32_t v)
+{
+    predicted_way way;
+    int32_t steps[3] = {0, 0, 0};
+    predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    code_steps(coder, &p->model, p->vertices, v, steps);
+    place_vertex(p, v, &way, steps);
+    learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+}
+
+int ath_prediction_step(ath_prediction *p)
+{
+    prediction *segment = &p->segment;
+    int copied = 0;
+    if (p->vertex == 0 && !start_frame(&p->coder, segment, &copied, 0)) return ATH_BAD_CHUNK;
+    int32_t stop = copied ? segment->vertex_count : ath_min(p->vertex + STEP_VERTICES, segment->vertex_count);
+    ath_coder coder = p->coder;
+    for (int32_t v = p->vertex; !copied && v < stop; v++) decode_vertex(&coder, segment, v);
+    p->coder = coder;
+    p->vertex = stop;
+    if (stop < segment->vertex_count) return ATH_MORE;
+    p->vertex = 0;
+    if (++segment->frame < p->frames) return ATH_MORE;
+    return coder_finish(&p->coder) ? ATH_OK : ATH_BAD_CHUNK;
+}

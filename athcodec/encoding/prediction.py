@@ -1,0 +1,171 @@
+"""Predicted motion, the other way to code a clip: every vertex of every frame about what is decoded (FORMAT.md).
+
+It suits what cosines and modes do not: growth, few frames, noise, jumps, rests. `best_prediction` finds its settings,
+`code_predicted_segment` makes the chunks of a segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from athcodec import container as ct
+from athcodec.ath import Ath, Survey, Thresholds
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+from athcodec.encoding.layers import Layer, Layers
+from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.search import Choice
+from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
+from athcodec.errors import BoundError
+
+MEMORIES = (2, 9, 0, 13)  # heads of PREDICTED to choose from
+REST_STEPS = (0.5, 1.15)  # over the bound
+STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
+TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
+TOO_MANY = 1.2  # over the bytes wanted, that a few frames may promise
+MAP_SHARE, MAP_STEPS = 0.02, (0.1, 0.25, 0.5, 1.0)  # of the bytes, for level 0; over the error of the rest pose
+LESS_ERROR = 0.9  # of level 0, with maps that are worth their bytes
+
+
+def one_map_each(seen: Survey) -> Ath:
+    """The ATH in which each root's subtree moves as one."""
+    epsilon, xi = (float(errors.max(initial=0.0)) for errors in (seen.largest_gads, seen.largest_distance))
+    return replace(seen, xi=None).ath(Thresholds(epsilon, 0, xi, 0))
+
+
+def predicted_layers(source: Source, choice: Choice) -> tuple[Ath, CodedPrelude, Layers]:
+    """What the segments share."""
+    ath = one_map_each(source.seen)
+    prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
+    only = Layer(prelude.plan, choice.settings, None)
+    return ath, prelude, Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
+
+
+def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
+    branches, levels = source.hierarchy.branch_count, ath.height + 2
+    none = np.zeros(branches, bool)
+    settings = Settings(
+        bound=bound,
+        largest_bound=source.largest_bound(bound),
+        limit=source.limit(bound),
+        step=qz.single(qz.SAFE_REST_CAP * float(np.min(source.limit(bound)))),
+        level_steps=np.ones(levels),
+        rest_step=qz.single(rest_step),
+        sheet=none,
+        loose=none,
+        lags=np.zeros(branches, np.int32),
+        adaptive_rest=False,
+        rotation_step_factors=(0,) * levels,
+        only_tips=False,
+        learned_bases=(False,) * levels,
+        learned_pieces=None,
+        node_steps=np.ones(levels),
+    )
+    return with_best_lags(source, ath, settings)
+
+
+@dataclass(frozen=True)
+class FoundPrediction:
+    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have."""
+
+    choice: Choice
+    bytes: float
+
+
+def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPrediction | None:
+    """None where that is above `most_bytes`, or the bound cannot be kept."""
+    ath = one_map_each(source.seen)
+    first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
+    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
+    samples = [source.positions(segment) for segment in some]
+    scale = source.clip.frame_count / sum(sample.shape[2] for sample in samples)
+    prelude = CodedPrelude(source, ath, first, predicted=True)
+
+    def size(prelude: CodedPrelude, settings: Settings, memory: int) -> FoundPrediction:
+        motion = sum(len(_predicted(prelude, settings, sample, memory)[0]) for sample in samples)
+        return FoundPrediction(
+            Choice(settings, settings, None, predicted=memory), motion * scale + prelude.prelude_bytes
+        )
+
+    try:
+        if _begun(prelude, first, samples[len(samples) // 2]) * source.clip.frame_count > TOO_MANY * most_bytes:
+            return None
+        found = [size(prelude, first, memory) for memory in MEMORIES]
+        memory = min(found, key=lambda one: one.bytes).choice.predicted
+        assert memory is not None
+        found += [size(CodedPrelude(source, ath, own, predicted=True), own, memory) for own in others]
+    except BoundError:
+        return None
+    best = min(found, key=lambda one: one.bytes)
+    return best if best.bytes < most_bytes else None
+
+
+def _begun(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> float:
+    """Bytes of a frame behind the first, as far as a few of them tell."""
+    some = positions[:, :, :TRIAL_FRAMES]
+    coded, first = (len(_predicted(prelude, settings, part, MEMORIES[0])[0]) for part in (some, some[:, :, :1]))
+    return (coded - first) / some.shape[2]
+
+
+def _predicted(
+    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, memory: int
+) -> tuple[bytes, np.ndarray]:
+    """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    source = np.ascontiguousarray(positions.transpose(2, 0, 1))
+    limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
+    for factor in STEPS:
+        step = qz.single(factor * settings.step)
+        coded = streams.encode_predicted(prelude.plan, prelude.origin, source, limits, step, memory, prelude.dtype)
+        if coded is not None:
+            return ct.pack_predicted(step, memory, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+    raise BoundError(
+        f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
+    )
+
+
+def code_predicted_segment(
+    prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None = None
+) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
+    """As layers.code_segment."""
+    assert choice.predicted is not None
+    plan, settings = prelude.plan, choice.settings
+    payload, decoded = _predicted(prelude, settings, positions, choice.predicted)
+
+    def error(shown: np.ndarray) -> tuple[float, ...]:
+        return position_errors(shown, positions, prelude.origin, plan.pool)
+
+    last = plan.level_count - 1
+    chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
+    errors = [error(level_0.pose(level, prelude.origin, prelude.dtype)) for level in range(last)]
+    for moved in _with_maps(prelude, positions, errors[0][-1]):
+        maps = streams.encode_affines(moved, 0)
+        own = error(moved.pose(0, prelude.origin, prelude.dtype))
+        if len(maps) <= MAP_SHARE * len(payload) and own[-1] < LESS_ERROR * errors[0][-1]:
+            chunks[0, ct.AFFINES], errors[0] = maps, own
+            break
+    errors.append(error(decoded))
+    if errors[-1][0] > settings.largest_bound:
+        raise AssertionError(f"decoded error {errors[-1][0]} is beyond the bound {settings.largest_bound}")
+    if exact is not None:
+        chunks[last + 1, ct.EXACT] = streams.encode_exact(decoded, exact)
+        errors.append((0.0, 0.0, 0.0))
+    return chunks, np.array(errors)
+
+
+def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
+    """A segment that shows the rest pose where no maps move it."""
+    return SegmentMotion(prelude.plan, frames, [LevelStream(1.0)] * prelude.plan.level_count)
+
+
+def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
+    """Segments with maps of the roots, from fine to coarse; error: that of the rest pose standing still (RMS)."""
+    plan = prelude.plan
+    for part in MAP_STEPS:
+        moved = _still(prelude, positions.shape[2])
+        step = part * error * (plan.vertex_count / len(plan.nodes)) ** 0.5
+        if step > 0:
+            moved.analyse_nodes(positions, np.full(plan.level_count, step), qz.DEAD_ZONE, level=0)
+            yield moved

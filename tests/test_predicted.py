@@ -1,0 +1,297 @@
+"""Predicted motion: clips that cosines and modes do not suit are small, and all else holds as for other files."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from files import Parts, opened
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plants import STEADY, awkward_plants, bound_for, clip_of, grow, plant, random_hierarchy, sway
+
+import athcodec
+from athcodec import container as ct
+from athcodec import encoding
+from athcodec.encoding import search
+from athcodec.errors import AthError, BadChunk, BadChunkTable
+
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
+
+from spec import reference_decoder as rd  # noqa: E402
+
+FRAMES = 60
+
+
+@pytest.fixture
+def always(monkeypatch):
+    """Every clip is coded with predicted motion."""
+    monkeypatch.setattr(search.Search, "first_cost", lambda _: math.inf)
+
+
+def simple_bytes(positions: np.ndarray, bound: float) -> int:
+    """What anyone would write: integers on a grid, differences in time and along vertices, zstd."""
+    step = 0.999 * 2 * bound / math.sqrt(3)
+    grid = np.rint((positions - positions.reshape(-1, 3).mean(axis=0)) / step).astype(np.int64)
+    sizes = []
+    for in_time in range(3):
+        for along in range(2):
+            left = np.diff(grid, in_time, axis=0, prepend=grid[:1] * np.zeros((in_time, 1, 1), int))
+            left = np.diff(left, along, axis=1, prepend=left[:, :1] * np.zeros((1, along, 1), int))
+            kind = next(
+                kind for kind in (np.int8, np.int16, np.int32, np.int64) if abs(left).max() <= np.iinfo(kind).max
+            )
+            for axes in ((2, 0, 1), (2, 1, 0)):
+                numbers = np.ascontiguousarray(left.transpose(axes), kind)
+                planes = numbers.reshape(-1, 1).view(np.uint8).T
+                sizes.append(len(zstandard.compress(planes.tobytes(), 19)))
+    return min(sizes)
+
+
+def tree(seed: int = 1, branches: int = 25, longest: int = 12):
+    rng = np.random.default_rng(seed)
+    vertex_branch, branch_parent = random_hierarchy(rng, branches, longest)
+    return rng, grow(rng, vertex_branch, branch_parent), vertex_branch, branch_parent
+
+
+def growth(eased: bool = False) -> athcodec.MotionClip:
+    """Branches come out of their parents one after the other, and stop."""
+    rng, rest, vertex_branch, branch_parent = tree()
+    begin, positions = np.zeros(len(branch_parent)), np.zeros((FRAMES, *rest.shape))
+    for branch, parent in enumerate(branch_parent):
+        mine = np.flatnonzero(vertex_branch == branch)
+        begin[branch] = 2.0 if parent < 0 else begin[parent] + rng.uniform(4, 9)
+        length = np.clip((np.arange(FRAMES) - begin[branch]) / 8, 0, 1)[:, None, None]
+        length = length * length * (3 - 2 * length) if eased else length
+        attach = mine[0]
+        if parent >= 0:
+            above = np.flatnonzero(vertex_branch == parent)
+            attach = above[np.linalg.norm(rest[above] - rest[mine[0]], axis=1).argmin()]
+        base = positions[:, [attach]] if parent >= 0 else np.broadcast_to(rest[attach], (FRAMES, 1, 3))
+        positions[:, mine] = base + length * (rest[mine] - rest[attach])
+    return clip_of(positions, rest, vertex_branch, branch_parent)
+
+
+def moved(change: Callable[[np.ndarray], np.ndarray]) -> athcodec.MotionClip:
+    rng, rest, *branches = tree()
+    return clip_of(change(sway(rng, rest, FRAMES, rough=0.0)), rest, *branches)
+
+
+def jumping(positions: np.ndarray) -> np.ndarray:
+    return positions + np.repeat(np.random.default_rng(2).normal(size=(FRAMES // 20, 1, 3)) * 50, 20, axis=0)
+
+
+def alone(positions: np.ndarray) -> athcodec.MotionClip:
+    return athcodec.MotionClip(positions.astype(np.float32), np.arange(len(positions)) / 24)
+
+
+def circle() -> np.ndarray:
+    t = np.linspace(0, 6, 100)
+    return np.stack([np.sin(t), np.cos(1.3 * t), t], axis=1)[:, None]
+
+
+ODD = {
+    "growth": growth,
+    "eased growth": lambda: growth(eased=True),
+    "noise": lambda: alone(np.random.default_rng(3).normal(size=(40, 90, 3))),
+    "one vertex": lambda: alone(circle()),
+    "one vertex in one frame": lambda: alone(circle()[:1]),
+    "jumps": lambda: moved(jumping),
+    "held poses": lambda: moved(lambda positions: np.repeat(positions[::3], 3, axis=0)),
+    "a motion that comes again": lambda: moved(lambda positions: np.tile(positions[:20], (3, 1, 1))),
+    "few frames": lambda: moved(lambda positions: positions[::12]),
+}
+
+
+def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) -> athcodec.encoding.Summary:
+    given = {"rel_error": fraction} | options
+    return athcodec.encode(clip, folder / "a.ath", attributes="none", **{"ladder": "none"} | given)
+
+
+@pytest.mark.parametrize("fraction", [1e-3, 1e-5])
+@pytest.mark.parametrize("make", ODD.values(), ids=ODD)
+def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
+    clip = make()
+    positions = clip.block(0, clip.frame_count).astype(float)
+    low, high = positions.reshape(-1, 3).min(axis=0), positions.reshape(-1, 3).max(axis=0)
+    bound = fraction * (float(np.linalg.norm(high - low)) or 1.0)
+    found = size(clip, tmp_path, fraction, rel_error=None, max_error=bound)
+    assert found.bytes <= 1.02 * simple_bytes(positions, bound) + 160
+
+
+@pytest.mark.parametrize("fraction", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("eased", [False, True])
+def test_growth_takes_at_most_seven_tenths_of_a_simple_codec(fraction, eased, tmp_path):
+    clip = growth(eased)
+    positions = clip.block(0, clip.frame_count).astype(float)
+    bound = fraction * float(np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0)))
+    found = size(clip, tmp_path, fraction)
+    assert found.choices["motion"] == "predicted"
+    assert found.bytes <= 0.7 * simple_bytes(positions, bound)
+
+
+def test_frames_that_are_there_already_cost_nothing(always, tmp_path):
+    once = size(moved(lambda positions: positions[:20]), tmp_path, 1e-4)
+    often = size(ODD["a motion that comes again"](), tmp_path, 1e-4)
+    held = size(moved(lambda positions: np.repeat(positions[:20], 3, axis=0)), tmp_path, 1e-4)
+    assert max(often.bytes, held.bytes) <= once.bytes + 40
+
+
+def test_swaying_trees_keep_their_modes(tmp_path):
+    clip = moved(lambda positions: positions)
+    assert size(clip, tmp_path, 1e-3).choices["motion"] == "transformed"
+
+
+def test_who_asks_for_a_hierarchy_of_maps_gets_it(tmp_path):
+    found = size(growth(), tmp_path, 1e-4, tam=athcodec.Thresholds(0, 0, 0, 0))
+    assert found.choices["motion"] == "transformed" and len(found.levels) > 3
+
+
+def test_layers_are_given_up_only_for_a_much_smaller_file(tmp_path):
+    found = size(growth(), tmp_path, 1e-4, ladder="decades")
+    assert found.choices["motion"] == "predicted" and len(found.levels) == 2
+
+
+# ---- what holds for every file ----
+
+
+@settings(STEADY, max_examples=40)
+@given(awkward_plants(), st.sampled_from([1e-1, 1e-2, 1e-4, 1e-6]), st.sampled_from([None, 16]))
+def test_any_clip_keeps_the_bound_and_decodes_as_the_document_says(scratch, clip, fraction, segment_frames):
+    bound, path = bound_for(clip, fraction), scratch / "any.ath"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search.Search, "first_cost", lambda _: math.inf)
+        found = athcodec.encode(clip, path, max_error=bound, ladder="none", segment_frames=segment_frames)
+    positions = clip.block(0, clip.frame_count).astype(float)
+    with athcodec.open(path, strict=True) as decoder:
+        for level in range(decoder.level_count):
+            shown = decoder.positions(level=level)
+            error = np.linalg.norm(shown.astype(float) - positions, axis=2).max()
+            assert error <= decoder.levels[level].max_error * (1 + 1e-9)
+        assert error <= bound
+        if found.choices["motion"] == "predicted" and positions.size < 30_000:
+            assert np.array_equal(rd.AthFile(path.read_bytes()).positions(), shown)
+
+
+def test_every_vertex_keeps_its_own_bound(always, tmp_path):
+    clip, weights = growth(), np.linspace(0.2, 3.0, growth().vertex_count)
+    found = size(clip, tmp_path, 1e-3, rel_error=None, max_error=0.01, weights=weights)
+    assert found.choices["motion"] == "predicted"
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        errors = np.linalg.norm(decoder.positions().astype(float) - clip.positions, axis=2).max(axis=0)
+        assert (errors <= 0.01 * weights).all() and errors.max() > 0.01
+
+
+def test_several_clips_and_loops_play(always, tmp_path):
+    clips = {"up": growth(), "down": growth(eased=True)}
+    joined = athcodec.join({name: athcodec.looped(clip) for name, clip in clips.items()})
+    assert size(joined, tmp_path, 1e-3).choices["motion"] == "predicted"
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        for name, clip in clips.items():
+            shown = decoder.play(name).positions().astype(float)
+            assert np.linalg.norm(shown - clip.positions, axis=2).max() <= decoder.max_error_bound
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_sources_own_numbers_come_back(always, dtype, tmp_path):
+    clip = plant(seed=3, branches=9, frames=40, dtype=dtype, offset=5.0)
+    assert size(clip, tmp_path, 1e-3, lossless=True).choices["motion"] == "predicted"
+    decoder = opened((tmp_path / "a.ath").read_bytes(), strict=True)
+    assert decoder.level_count == 3 and decoder.positions().tobytes() == clip.positions.tobytes()
+    before = decoder.positions(level=1).astype(float)
+    assert np.linalg.norm(before - clip.positions, axis=2).max() <= decoder.levels[1].max_error
+
+
+def test_a_draft_that_was_sent_elsewhere_makes_the_same_file(always, tmp_path):
+    clip = plant(seed=5, frames=50)
+    options = {"rel_error": 1e-3, "segment_frames": 16}
+    athcodec.encode(clip, tmp_path / "a.ath", **options)
+    draft = pickle.loads(pickle.dumps(encoding.draft(clip, **options)))
+    assert draft.segment_count == 4
+    coded = [*encoding.code_segments(clip, draft, [2, 3]), *encoding.code_segments(clip, draft, [0, 1])]
+    encoding.write(clip, draft, coded, tmp_path / "b.ath")
+    assert (tmp_path / "a.ath").read_bytes() == (tmp_path / "b.ath").read_bytes()
+
+
+def test_segments_are_as_long_as_can_be_unless_told_otherwise(always, tmp_path):
+    clip = plant(seed=6, frames=256)
+    size(clip, tmp_path, 1e-2)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert decoder.file.header.segment_count == 1
+    size(clip, tmp_path, 1e-2, segment_frames=100)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert decoder.file.header.segment_count == 3
+
+
+def test_a_target_size_is_met(always, tmp_path):
+    found = size(growth(), tmp_path, 0, rel_error=None, target_size=3000)
+    assert found.choices["motion"] == "predicted" and 2850 <= found.bytes <= 3000
+
+
+# ---- files cut short, changed, damaged ----
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    path = tmp_path_factory.mktemp("grown") / "a.ath"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search.Search, "first_cost", lambda _: math.inf)
+        athcodec.encode(plant(seed=2, frames=40), path, rel_error=1e-3, segment_frames=16)
+    return path.read_bytes()
+
+
+def test_level_0_alone_is_a_file(grown, tmp_path):
+    (tmp_path / "a.ath").write_bytes(grown)
+    athcodec.truncate(tmp_path / "a.ath", tmp_path / "b.ath", level=0)
+    shorter, whole = opened((tmp_path / "b.ath").read_bytes(), strict=True), opened(grown)
+    assert shorter.level_count == 1
+    assert np.array_equal(shorter.positions(), whole.positions(level=0))
+
+
+def test_a_file_cut_anywhere_behind_its_prelude_opens(grown):
+    whole, file = opened(grown), Parts.of(grown)
+    motion = [chunk for chunk, _ in file.chunks if chunk.is_motion]
+    for chunk in motion:
+        for at in (chunk.offset, chunk.offset + chunk.length // 2):
+            decoder = opened(grown[:at])
+            for level in range(decoder.complete_level + 1 if hasattr(decoder, "complete_level") else 0):
+                assert np.array_equal(decoder.positions(level=level), whole.positions(level=level))
+
+
+def test_a_segment_without_its_chunk_is_refused(grown):
+    parts = Parts.of(grown)
+    del parts.chunks[parts.index(ct.PREDICTED, 1, 1)]
+    with pytest.raises(BadChunkTable):
+        opened(parts.file())
+
+
+def test_changed_streams_give_positions_or_are_refused(grown):
+    """Their checksums fit."""
+    rng, parts = np.random.default_rng(1), Parts.of(grown)
+    payload = parts.payload(ct.PREDICTED, 1)
+    refused = 0
+    for _ in range(60):
+        changed = bytearray(payload)
+        for at in rng.integers(0, len(payload), rng.integers(1, 4)):
+            changed[at] = rng.integers(256)
+        try:
+            positions = opened(parts.with_payload(ct.PREDICTED, bytes(changed), 1)).positions(level=1)
+            assert not np.isnan(positions).any()
+        except AthError as error:
+            refused += isinstance(error, BadChunk)
+    assert refused > 0
+
+
+def test_damage_is_noticed(grown):
+    parts = Parts.of(grown)
+    chunk = parts.chunks[parts.index(ct.PREDICTED, 1, 1)][0]
+    damaged = bytearray(grown)
+    damaged[chunk.offset + chunk.length // 2] ^= 1
+    with pytest.raises(AthError, match="checksum"):
+        opened(bytes(damaged)).positions(level=1)
