@@ -131,7 +131,8 @@ void ath_inverse_temporal(const ath_stream *stream, int32_t frames, int32_t coun
 void ath_move(int32_t frames, const ath_frames *at, double *x);
 void ath_move_point(int32_t frames, const double *track, double *point);
 void ath_turn(int32_t frames, const double *omega, double *rotation);
-void ath_turn_towards(const double H[9], double size2, double R[9]);
+/* Turns R towards the rotation nearest to H, column k of which is what rest axis k became; not where H vanishes. */
+void ath_turn_to(const double H[9], int32_t steps, double R[9]);
 double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);
