@@ -389,8 +389,8 @@ class Search:
         return settings
 
     def _with_learned_modes_for_all(self, settings: Settings) -> Settings:
-        """Learned modes beside what was found without them, or in its place: on stems of few vertices they do what
-        rotations and the affine functions do, and the best of either alone leads past the best of all."""
+        """Learned modes beside what was found without them, or in its place: on stems of few vertices they serve the
+        motion that rotations and affine functions serve, which were chosen before learned modes were known."""
         unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
         bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
         found = []
