@@ -106,8 +106,8 @@ static void to_quaternion(const double R[9], double q[4])
 /* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
  * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
  * such as the twist of a straight stem, stays as in the frame before. */
-static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step,
-                         const double *local, double *omega)
+static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
+                         double *omega)
 {
     const double *a = ath_rest_attach(plan, piece);
     double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};

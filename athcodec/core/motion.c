@@ -75,7 +75,8 @@ ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, cons
         vz = vz * inverse;
         double cosine = ux * vx + uy * vy + uz * vz;
         double x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
-        double w = 1.0 + (cosine > 0.0 ? cosine : 0.0), sine2 = x * x + y * y + z * z; /* a quaternion, not of length 1 */
+        double w = 1.0 + (cosine > 0.0 ? cosine : 0.0),
+               sine2 = x * x + y * y + z * z; /* a quaternion, not of length 1 */
         double h = 2.0 / (w * w + sine2), g = w * h, c = 1.0 - h * sine2;
         double b0 = c + h * x * x, b1 = h * x * y - g * z, b2 = h * x * z + g * y;
         double b3 = h * x * y + g * z, b4 = c + h * y * y, b5 = h * y * z - g * x;
