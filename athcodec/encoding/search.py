@@ -41,7 +41,7 @@ WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
 PRELUDES_KEPT = 6  # between trials
-SHORT_STEM = 6  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
+SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 WORTH = {
     "_with_learned_bases": 2,
     "_with_learned_modes_for_all": 6,
