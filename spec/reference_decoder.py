@@ -1069,9 +1069,8 @@ class BentPose:
             for k in range(3):
                 size2 = size2 + float(d[k, 0]) * float(d[k, 0])
             H = 0.75 * H + moved[:, None] * d[None, :]
-            if size2 > 1e-200:
-                weight = 0.01 * size2 + 3.0 * (self.step * self.step)
-                turn = turn_towards(H + weight * turn, 1e-9 * size2, turn)
+            weight = 0.01 * size2 + 3.0 * (self.step * self.step)
+            turn = turn_to(H + weight * turn, 1, turn)
         return turn
 
     def _beam(self, stem: Branch, turn: np.ndarray) -> np.ndarray:
@@ -2473,11 +2472,7 @@ class Pose:
         size2 = in_order((d * d).ravel())
         moved = self.placed[piece.vertices] - c
         H = in_order(moved[:, :, None, :] * d[:, None, :, None])
-        H = H + 0.01 * size2 * R
-        if size2 > 1e-200:
-            for _ in range(4):
-                R = turn_towards(H, 1e-9 * size2, R)
-        return R
+        return turn_to(H + 0.01 * size2 * R, 4, R)
 
     # Nodes.
 
@@ -2685,52 +2680,58 @@ class Refinement(Pose):
 
 
 def follow_tangent(R: np.ndarray, tangent: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """R, turned by the least rotation that takes R tangent to v; R itself where v vanishes or is opposed."""
+    """R, turned by the least rotation that takes R tangent to v; beyond a right angle by less and less."""
     u = mat_vec(R, tangent)
     u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
     u = u * (1.0 / np.sqrt(np.where(u2 > 1e-200, u2, 1.0)))
     v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     v = v * (1.0 / np.sqrt(np.where(v2 > 1e-200, v2, 1.0)))
     cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-    follows = (v2 > 1e-200) & (cosine > -0.9)
-    c = np.where(follows, cosine, 1.0)
-    h = np.where(follows, 1.0 / (1.0 + cosine), 1.0)
-    x = np.where(follows, u[1] * v[2] - u[2] * v[1], 0.0)
-    y = np.where(follows, u[2] * v[0] - u[0] * v[2], 0.0)
-    z = np.where(follows, u[0] * v[1] - u[1] * v[0], 0.0)
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    w, sine2 = 1.0 + np.where(cosine > 0.0, cosine, 0.0), x * x + y * y + z * z
+    h = 2.0 / (w * w + sine2)
+    g, c = w * h, 1.0 - h * sine2
     return mat_mul(
         matrix(
             c + h * x * x,
-            h * x * y - z,
-            h * x * z + y,
-            h * x * y + z,
+            h * x * y - g * z,
+            h * x * z + g * y,
+            h * x * y + g * z,
             c + h * y * y,
-            h * y * z - x,
-            h * x * z - y,
-            h * y * z + x,
+            h * y * z - g * x,
+            h * x * z - g * y,
+            h * y * z + g * x,
             c + h * z * z,
         ),
         R,
     )
 
 
-def turn_towards(H: np.ndarray, least: float, R: np.ndarray) -> np.ndarray:
-    """A step of Newton's method towards the rotation nearest to H; down the gradient where H is mirrored."""
+def turn_to(H: np.ndarray, steps: int, R: np.ndarray) -> np.ndarray:
+    """R, turned towards the rotation nearest to H; R itself where H vanishes."""
+    norm2 = in_order((H * H).reshape(9, -1))
+    turns = norm2 > 1e-200
+    unit, turned = H * (1.0 / np.sqrt(np.where(turns, norm2, 1.0))), R
+    for _ in range(steps):
+        turned = turn_towards(unit, turned)
+    return np.where(turns, turned, R)
+
+
+def turn_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """A step of Newton's method towards the rotation nearest to H, of norm 1; damped where R is far off."""
     C = H[:, None, 0] * R[None, :, 0] + H[:, None, 1] * R[None, :, 1] + H[:, None, 2] * R[None, :, 2]
     C = C.reshape(9, -1)
     wx, wy, wz = C[7] - C[5], C[2] - C[6], C[3] - C[1]
-    a, b, c = C[4] + C[8], C[0] + C[8], C[0] + C[4]
+    trace = C[0] + C[4] + C[8]
+    most = np.where(trace > 1.0, trace, 1.0) + 1e-6
+    a, b, c = most - C[0], most - C[4], most - C[8]
     d, e, f = -0.5 * (C[1] + C[3]), -0.5 * (C[2] + C[6]), -0.5 * (C[5] + C[7])
-    ab = a * b - d * d
     xx, xy, xz = b * c - f * f, e * f - d * c, d * f - e * b
-    determinant = a * xx + d * xy + e * xz
-    newton = (a > least) & (ab > least * least) & (determinant > least * least * least)
-    scale = 0.25 / determinant
-    yy, yz = a * c - e * e, d * e - a * f
-    downhill = 0.25 / (np.abs(C[0] + C[4] + C[8]) + least)
-    x = np.where(newton, (xx * wx + xy * wy + xz * wz) * scale, wx * downhill)
-    y = np.where(newton, (xy * wx + yy * wy + yz * wz) * scale, wy * downhill)
-    z = np.where(newton, (xz * wx + yz * wy + ab * wz) * scale, wz * downhill)
+    yy, yz, zz = a * c - e * e, d * e - a * f, a * b - d * d
+    scale = 0.25 / (a * xx + d * xy + e * xz)
+    x = (xx * wx + xy * wy + xz * wz) * scale
+    y = (xy * wx + yy * wy + yz * wz) * scale
+    z = (xz * wx + yz * wy + zz * wz) * scale
     return mat_mul(rotation(x, y, z), R)
 
 

@@ -284,3 +284,47 @@ def bound_for(clip: MotionClip, fraction: float) -> float:
     low, high = clip.positions.min(axis=(0, 1)), clip.positions.max(axis=(0, 1))
     away = float(np.abs(clip.positions - clip.rest).max())
     return max(fraction * diagonal(clip), 3 * least_bound(low, high, clip.dtype), 1e-6 * away)
+
+
+def _turns(angles: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations of rotation vectors (..., 3)."""
+    size = np.linalg.norm(angles, axis=-1)[..., None, None] + 1e-12
+    x, y, z = np.moveaxis(angles, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3) / size
+    return np.eye(3) + np.sin(size) * cross + (1 - np.cos(size)) * cross @ cross
+
+
+def blown_tree(seed: int, branches: int = 120, frames: int = 120, lean: float = 1.2, sway: float = 0.15) -> MotionClip:
+    """A scanned tree in a gale: straight stems of one to five vertices, each leaning away from its parent by as much as
+    a right angle in all frames, so that tips have turned right over from their rest pose, and swaying about that."""
+    rng = np.random.default_rng(seed)
+    parent, counts = [-1], [12]
+    for b in range(1, branches):
+        parent.append(int(rng.integers(max(0, b - 40), b)) if rng.random() < 0.7 else 0)
+        counts.append(int(rng.choice([1, 2, 2, 3, 3, 4, 5])))
+    first = np.cumsum([0, *counts])
+    rest, positions = np.zeros((first[-1], 3)), np.zeros((frames, first[-1], 3))
+    time, wind, turned = np.arange(frames) / 30, lean * rng.normal(size=3), []
+    for b, count in enumerate(counts):
+        heading = rng.normal(size=3)
+        heading[1] = abs(heading[1]) + 0.3
+        heading = np.array([0.0, 1.0, 0.0]) if b == 0 else heading / np.linalg.norm(heading)
+        length = 8.0 if b == 0 else rng.uniform(0.1, 1.5)
+        rate, phase = rng.uniform(0.2, 4.0, 3), rng.uniform(0.0, 6.0, 3)
+        swing = rng.uniform(0.0, sway) * np.sin(2 * np.pi * rate * time[:, None] + phase)
+        turn = _turns(swing + rng.uniform(0.0, 0.4 if b else 0.08) * wind)
+        turned.append(turned[parent[b]] @ turn if b else turn)
+        hold = first[parent[b]] + rng.integers(counts[parent[b]]) if b else 0
+        along = np.arange(count) + (b > 0)
+        offsets = along[:, None] * heading * length / max(count - 1, 1)
+        own = slice(first[b], first[b + 1])
+        rest[own] = rest[hold] * (b > 0) + offsets
+        positions[:, own] = positions[:, [hold]] * (b > 0) + np.einsum("tij,vj->tvi", turned[b], offsets)
+    return MotionClip(
+        positions.astype(np.float32),
+        time,
+        rest=rest.astype(np.float32),
+        vertex_branch=np.repeat(np.arange(branches, dtype=np.int32), counts),
+        branch_parent=np.array(parent, np.int32),
+    )

@@ -2,7 +2,7 @@
  * decoder will have of its parent. Encoder only. */
 #include "encode.h"
 
-enum { ROTATION_STEPS = 5 };
+enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -104,8 +104,10 @@ static void to_quaternion(const double R[9], double q[4])
 }
 
 /* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
- * vertices relative to the attach point, in the predicted frame. */
-static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *local, double *omega)
+ * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
+ * such as the twist of a straight stem, stays as in the frame before. */
+static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
+                         double *omega)
 {
     const double *a = ath_rest_attach(plan, piece);
     double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
@@ -119,8 +121,8 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
                 for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
             }
         }
-        for (int32_t k = 0; k < 9; k++) H[k] += 1e-6 * size2 * R[k];
-        for (int32_t step = 0; size2 > 0.0 && step < ROTATION_STEPS; step++) ath_turn_towards(H, size2, R);
+        for (int32_t k = 0; k < 9; k++) H[k] += (1e-6 * size2 + step * step * (double)piece->count) * R[k];
+        ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
         to_quaternion(R, q);
         if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
             for (int32_t i = 0; i < 4; i++) q[i] = -q[i];
@@ -174,7 +176,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
     }
     to_local(T, piece, &scratch->at, source, local);
     if (rotation_step > 0.0) {
-        fit_rotation(plan, T, piece, local, scratch->track);
+        fit_rotation(plan, T, piece, base->step, local, scratch->track);
         if (before)
             ath_predict_track(base, T, before->frequencies, rotation_step, motion->ratio, before->rotation,
                               rows->coarse_rotation, rows->predicted_rotation);

@@ -8,9 +8,10 @@
 
 enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
 
-static const uint16_t known_kinds[KNOWN_KINDS] = {
-    ATH_HIERARCHY, ATH_REST,    ATH_TIME,        ATH_METADATA, ATH_FACES, ATH_EDGES,        ATH_CLIPS,     ATH_SOURCE_REST,
-    ATH_STEMS,     ATH_AFFINES, ATH_CORRECTIONS, ATH_SHAPES,   ATH_EXACT, ATH_REFINED_REST, ATH_PREDICTED, ATH_ATTRIBUTE};
+static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,         ATH_TIME,        ATH_METADATA,
+                                                  ATH_FACES,     ATH_EDGES,        ATH_CLIPS,       ATH_SOURCE_REST,
+                                                  ATH_STEMS,     ATH_AFFINES,      ATH_CORRECTIONS, ATH_SHAPES,
+                                                  ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED,   ATH_ATTRIBUTE};
 
 typedef struct {
     ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind before */

@@ -50,8 +50,8 @@ static ath_frames cached_frames(const ath_motion *motion, const ath_piece *piece
     return at;
 }
 
-/* The rotation by the least angle that takes the parent's rest tangent, turned by R, to its tangent now; R itself where
- * either tangent vanishes or they are opposed. */
+/* The rotation by the least angle that takes the parent's rest tangent, turned by R, to its tangent now; beyond a right
+ * angle by less and less, so that it is R itself where they are opposed, and where the tangent vanishes. */
 ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, const double *from, const double *to,
                            const double *parent, double turned[9][TURN_LANES])
 {
@@ -74,16 +74,13 @@ ATH_INLINE void turn_lanes(int32_t count, int32_t T, const double *tangent, cons
         vy = vy * inverse;
         vz = vz * inverse;
         double cosine = ux * vx + uy * vy + uz * vz;
-        int usable = (v2 > 1e-200) & (cosine > -0.9);
-        double wx = uy * vz - uz * vy, wy = uz * vx - ux * vz, wz = ux * vy - uy * vx;
-        double h = 1.0 / (1.0 + (usable ? cosine : 0.0));
-        wx = usable ? wx : 0.0;
-        wy = usable ? wy : 0.0;
-        wz = usable ? wz : 0.0;
-        double c = usable ? cosine : 1.0;
-        double b0 = c + h * wx * wx, b1 = h * wx * wy - wz, b2 = h * wx * wz + wy;
-        double b3 = h * wx * wy + wz, b4 = c + h * wy * wy, b5 = h * wy * wz - wx;
-        double b6 = h * wx * wz - wy, b7 = h * wy * wz + wx, b8 = c + h * wz * wz;
+        double x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+        double w = 1.0 + (cosine > 0.0 ? cosine : 0.0),
+               sine2 = x * x + y * y + z * z; /* a quaternion, not of length 1 */
+        double h = 2.0 / (w * w + sine2), g = w * h, c = 1.0 - h * sine2;
+        double b0 = c + h * x * x, b1 = h * x * y - g * z, b2 = h * x * z + g * y;
+        double b3 = h * x * y + g * z, b4 = c + h * y * y, b5 = h * y * z - g * x;
+        double b6 = h * x * z - g * y, b7 = h * y * z + g * x, b8 = c + h * z * z;
         turned[0][t] = b0 * r0 + b1 * r3 + b2 * r6;
         turned[1][t] = b0 * r1 + b1 * r4 + b2 * r7;
         turned[2][t] = b0 * r2 + b1 * r5 + b2 * r8;
@@ -303,41 +300,42 @@ ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const 
     }
 }
 
-/* One Newton step from R towards the rotation nearest to H (column k: what rest axis k became): with C = H R', the
- * turn omega solves (trace(C) - sym(C)) omega = axial(C). Where that matrix is not safely positive (mirrored H), a
- * step down the gradient serves. `size2` is the scale of H. */
-void ath_turn_towards(const double H[9], double size2, double R[9])
+/* One step of Newton's method from R towards the rotation nearest to H, which has a Frobenius norm of 1 (column k: what
+ * rest axis k became): with C = H R', the turn omega solves (trace(C) - sym(C)) omega = axial(C). Far from that rotation
+ * the trace is small, and 1 in its place keeps the matrix positive definite. */
+static void turn_towards(const double H[9], double R[9])
 {
     double C[9];
     for (int32_t i = 0; i < 3; i++)
         for (int32_t j = 0; j < 3; j++)
             C[3 * i + j] = H[3 * i] * R[3 * j] + H[3 * i + 1] * R[3 * j + 1] + H[3 * i + 2] * R[3 * j + 2];
     double wx = C[7] - C[5], wy = C[2] - C[6], wz = C[3] - C[1];
-    double a = C[4] + C[8], b = C[0] + C[8], c = C[0] + C[4];
+    double trace = C[0] + C[4] + C[8];
+    double most = (trace > 1.0 ? trace : 1.0) + 1e-6;
+    double a = most - C[0], b = most - C[4], c = most - C[8];
     double d = -0.5 * (C[1] + C[3]), e = -0.5 * (C[2] + C[6]), f = -0.5 * (C[5] + C[7]);
-    double ab = a * b - d * d, least = 1e-9 * size2;
     double xx = b * c - f * f, xy = e * f - d * c, xz = d * f - e * b;
-    double determinant = a * xx + d * xy + e * xz;
-    double x, y, z;
-    if (a > least && ab > least * least && determinant > least * least * least) {
-        double scale = 0.25 / determinant;
-        double yy = a * c - e * e, yz = d * e - a * f;
-        x = (xx * wx + xy * wy + xz * wz) * scale;
-        y = (xy * wx + yy * wy + yz * wz) * scale;
-        z = (xz * wx + yz * wy + ab * wz) * scale;
-    } else {
-        double trace = C[0] + C[4] + C[8];
-        double scale = 0.25 / ((trace < 0.0 ? -trace : trace) + least);
-        x = wx * scale;
-        y = wy * scale;
-        z = wz * scale;
-    }
+    double yy = a * c - e * e, yz = d * e - a * f, zz = a * b - d * d;
+    double scale = 0.25 / (a * xx + d * xy + e * xz);
+    double x = (xx * wx + xy * wy + xz * wz) * scale;
+    double y = (xy * wx + yy * wy + yz * wz) * scale;
+    double z = (xz * wx + yz * wy + zz * wz) * scale;
     double q[9];
     rational_rotation(x, y, z, q);
     for (int32_t k = 0; k < 3; k++) {
         double r0 = R[k], r1 = R[3 + k], r2 = R[6 + k];
         for (int32_t i = 0; i < 3; i++) R[3 * i + k] = q[3 * i] * r0 + q[3 * i + 1] * r1 + q[3 * i + 2] * r2;
     }
+}
+
+void ath_turn_to(const double H[9], int32_t steps, double R[9])
+{
+    double unit[9], norm2 = 0.0;
+    for (int32_t k = 0; k < 9; k++) norm2 = norm2 + H[k] * H[k];
+    if (!(norm2 > 1e-200)) return;
+    double inverse = 1.0 / ath_sqrt(norm2);
+    for (int32_t k = 0; k < 9; k++) unit[k] = H[k] * inverse;
+    for (int32_t step = 0; step < steps; step++) turn_towards(unit, R);
 }
 
 /* How a sheet as a whole has turned: the rotation nearest to its decoded vertices, its own R as the prior. */
@@ -361,8 +359,7 @@ static void turn_with_sheet(const ath_plan *plan, int32_t T, const ath_piece *pi
             R[k] = scratch->at.rotation[k * T + t];
             H[k] = H[k] + 0.01 * size2 * R[k];
         }
-        if (size2 > 1e-200)
-            for (int32_t step = 0; step < POLAR_ITERATIONS; step++) ath_turn_towards(H, size2, R);
+        ath_turn_to(H, POLAR_ITERATIONS, R);
         for (int32_t k = 0; k < 9; k++) rotation[k * T + t] = R[k];
     }
 }

@@ -134,7 +134,8 @@ void ath_turn(int32_t frames, const double *omega, double *rotation);
 /* R and the least rotation behind it that takes a tangent, as R turns it, to the way from one point to another. */
 void ath_follow_tangent(const double tangent[3], const double from[3], const double to[3], const double R[9],
                         double turned[9]);
-void ath_turn_towards(const double H[9], double size2, double R[9]);
+/* Turns R towards the rotation nearest to H, column k of which is what rest axis k became; not where H vanishes. */
+void ath_turn_to(const double H[9], int32_t steps, double R[9]);
 double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream);
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream);
 double ath_node_step(int32_t exponent);

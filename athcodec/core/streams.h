@@ -548,7 +548,7 @@ static void code_bent_sheet(ath_coder *coder, rest_model *model, const bent_pose
         }
         double prior_weight = 0.01 * size2 + 3.0 * (pose->step * pose->step);
         for (int32_t k = 0; k < 9; k++) prior[k] = H[k] + prior_weight * turn[k];
-        if (size2 > 1e-200) ath_turn_towards(prior, size2, turn);
+        ath_turn_to(prior, 1, turn);
     }
 }
 

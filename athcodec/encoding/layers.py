@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from athcodec import container as ct
+from athcodec._native import MEASURES
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
@@ -46,6 +47,10 @@ LEAST_RATIO = 8  # of the steps of neighbouring layers
 MOST_RATIO = 1 << 14  # likewise
 MOST_LAYERS, MOST_LEVELS = 8, 32  # of a file
 LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
+RMS = MEASURES.index("rms")
+LEVEL_TOLERANCE = 1.005  # of the RMS error of a level, over that of the level before
+FINER_MAPS, COARSER_MAPS = 3, 16  # half octaves that steps of maps may move for that
+TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # of corrections for that
 LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
 
 
@@ -259,45 +264,57 @@ class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
     def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
-        self._origin, self._dtype, self._positions = prelude.origin, prelude.dtype, positions
+        self._origin, self._dtype, self.positions = prelude.origin, prelude.dtype, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
         self._bases = _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
-        self.decoded = np.empty(0)
+        self.decoded = self._uncorrected = np.empty(0)
 
     def first(self, layer: Layer) -> SegmentMotion:
         """The levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
-        bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self._positions)
-        segment = analyse(plan, settings, self._positions, layer.modes, bases, layered=self._layered)
+        bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
+        segment = analyse(plan, settings, self.positions, layer.modes, bases, layered=self._layered)
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(segment, layer, plan.level_count - 1)
-        segment.analyse_nodes(self._positions, settings.node_steps, qz.DEAD_ZONE)
+        segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
+        self.errors = _EvenLevels(self, shown, settings).errors
+        self._keep_last_level_best(layer, plan.level_count - 1)
         for level, nodes in enumerate(shown):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
-        below = [self._error(nodes.pose(level, self._origin, self._dtype)) for level, nodes in enumerate(shown)]
-        self.errors = [*below, *self.errors]
         return segment
+
+    def _keep_last_level_best(self, layer: Layer, level: int) -> None:
+        """More corrections where the exact stems are worse than the maps before them."""
+        decoded, before = self._uncorrected, self.errors[level - 1][RMS]
+        for factor in TIGHTER_LIMITS:
+            if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
+                break
+            tighter = replace(layer.settings, limit=layer.settings.limit * factor)
+            self.decoded, chunk = self._corrected(decoded, tighter)
+            if chunk:
+                self.chunks[level, ct.CORRECTIONS] = chunk
+            self.errors[level] = self.error(self.decoded)
 
     def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
         """The segment as level 0 shows it, which may have a rest pose of its own."""
         if self._level_0 is segment.plan:
             return segment
         shown = SegmentMotion(self._level_0, segment.frames, segment.streams)
-        shown.analyse_nodes(self._positions, settings.node_steps, qz.DEAD_ZONE, level=0)
+        shown.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE, level=0)
         return shown
 
     def refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
-        segment = analyse(layer.plan, settings, self._positions, layer.modes, bases, before, ratio, layered=True)
+        segment = analyse(layer.plan, settings, self.positions, layer.modes, bases, before, ratio, layered=True)
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         self._finish_with(segment, layer, level)
@@ -305,19 +322,19 @@ class _SegmentCoder:
 
     def _finish_with(self, segment: SegmentMotion, layer: Layer, level: int) -> None:
         """Corrections of the level that a layer ends with, and its errors."""
-        decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
+        self._uncorrected = decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
         if layer.ratio == 1:
             self.decoded, chunk = self._corrected(decoded, layer.settings)
         else:
             self.decoded, chunk = self._tightest(decoded, layer.settings)
         if chunk:
             self.chunks[level, ct.CORRECTIONS] = chunk
-        self.errors.append(self._error(self.decoded))
+        self.errors.append(self.error(self.decoded))
 
     def _corrected(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
         """Positions within the limit, and the corrections that bring them there."""
         decoded = decoded.copy()
-        corrections, step = correct(decoded, self._positions, self._origin, settings, self._pool)
+        corrections, step = correct(decoded, self.positions, self._origin, settings, self._pool)
         return decoded, correction_chunk(corrections, step, decoded.shape)
 
     def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
@@ -339,8 +356,64 @@ class _SegmentCoder:
                 tightest = middle
         return best
 
-    def _error(self, decoded: np.ndarray) -> tuple[float, ...]:
-        return position_errors(decoded, self._positions, self._origin, self._pool)
+    def error_at(self, shown: SegmentMotion, level: int) -> tuple[float, ...]:
+        """Of a level without corrections."""
+        return self.error(shown.pose(level, self._origin, self._dtype))
+
+    def error(self, decoded: np.ndarray) -> tuple[float, ...]:
+        return position_errors(decoded, self.positions, self._origin, self._pool)
+
+
+class _EvenLevels:
+    """Errors of the levels of the first layer, whose maps it moves until no level's RMS is beyond that of the level
+    before: finer where that helps, else coarser at the level before, which need not be better than what follows.
+
+    shown: the segment as each level but the last shows it; its maps are there.
+    """
+
+    def __init__(self, coder: _SegmentCoder, shown: list[SegmentMotion], settings: Settings):
+        self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
+        self.errors = [coder.error_at(own, level) for level, own in enumerate(shown)] + coder.errors
+        for level in range(1, len(shown)):
+            self._move(level, level, level, 0.5**0.5, FINER_MAPS)
+        for level in range(len(shown), 0, -1):
+            self._move(level - 1, level, len(shown), 2.0**0.5, COARSER_MAPS)
+
+    def _is_worse(self, level: int) -> bool:
+        return self.errors[level][RMS] > LEVEL_TOLERANCE * self.errors[level - 1][RMS]
+
+    def _excess(self, first: int, last: int) -> float:
+        """How far the levels from `first` to `last` are beyond those before them."""
+        pairs = pairwise(error[RMS] for error in self.errors[first - 1 : last + 1])
+        return sum(max(0.0, after - LEVEL_TOLERANCE * before) for before, after in pairs)
+
+    def _move(self, level: int, worse: int, last: int, factor: float, most: int) -> None:
+        """Moves the steps of the maps of a level while `worse` is beyond the level before it, and that serves all
+        levels from there to `last`."""
+        if not self._shown[level].plan.has_affines(level):
+            return
+        for _ in range(most):
+            before = self.errors, self._steps
+            excess = self._excess(worse, last)
+            if not self._is_worse(worse):
+                return
+            self._set(level, factor)
+            if not self._excess(worse, last) < excess:
+                self.errors, self._steps = before
+                self._analyse(level)
+                return
+
+    def _set(self, moved: int, factor: float) -> None:
+        nodes = self._shown[moved].plan.nodes
+        last = int(nodes["last"][nodes["level"] == moved].max())
+        self._steps, self.errors = self._steps.copy(), [*self.errors]
+        self._steps[moved] *= factor
+        self._analyse(moved)
+        for level in range(moved, min(last + 1, len(self._shown))):
+            self.errors[level] = self._coder.error_at(self._shown[level], level)
+
+    def _analyse(self, level: int) -> None:
+        self._shown[level].analyse_nodes(self._coder.positions, self._steps, qz.DEAD_ZONE, level)
 
 
 def code_segment(

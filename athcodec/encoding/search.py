@@ -45,7 +45,12 @@ LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
 PRELUDES_KEPT = 6  # between trials
 REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
-WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
+SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
+WORTH = {
+    "_with_learned_bases": 2,
+    "_with_learned_modes_for_all": 6,
+    "_with_node_steps": 4,
+}  # trials, of other work in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +273,7 @@ class Search:
             self._with_rotations,
             self._with_learned_bases,
             self._with_basis,
-            self._with_learned_modes,
+            self._with_learned_modes_for_all,
             self._with_steps,
             self._with_rest_slack,
         ]
@@ -387,7 +392,13 @@ class Search:
 
     def cost(self, settings: Settings) -> tuple[float, np.ndarray]:
         """(bytes of a whole file, and of each level's streams in it) at these settings."""
-        varied = (
+        varied = self._key(settings)
+        if varied not in self._known:
+            self._known[varied] = self._try(settings)
+        return self._known[varied]
+
+    def _key(self, settings: Settings) -> tuple:
+        return (
             settings.step,
             settings.level_steps.tobytes(),
             *self._prelude_key(settings),
@@ -396,9 +407,6 @@ class Search:
             settings.learned_bases,
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
         )
-        if varied not in self._known:
-            self._known[varied] = self._try(settings)
-        return self._known[varied]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
         prelude = self.prelude(settings)
@@ -452,6 +460,22 @@ class Search:
         }
         self.required_saving, settings = self._cheapest_of(tried)
         return settings
+
+    def _with_learned_modes_for_all(self, settings: Settings) -> Settings:
+        """Learned modes beside what was found without them, or in its place: on stems of few vertices they serve the
+        motion that rotations and affine functions serve, which were chosen before learned modes were known."""
+        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
+        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
+        found = []
+        for start in {self._key(own): own for own in (settings, *bases)}.values():
+            chosen = self._with_learned_modes(start)
+            found.append((self.cost(chosen)[0], len(found), self.required_saving, chosen))
+        _, _, self.required_saving, settings = min(found)
+        return settings
+
+    def _short_stems(self) -> bool:
+        """Whether learned modes can stand for whole stems."""
+        return float(np.median(self.source.hierarchy.stem_count)) <= SHORT_STEM
 
     def _pieces_for_learned_modes(self, plain: Settings, required_savings: Sequence[float]) -> list[np.ndarray]:
         """(P,) bool for each required saving: pieces whose estimated bits shrink by that factor with learned modes."""
@@ -510,18 +534,20 @@ class Search:
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""
-        sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
-        if not self.source.sheet_like.any() or self.source.sheet_like.all():
-            sheets = sheets[1:]
         rotations = {settings.rotation_step_factors}
         if not any(settings.rotation_step_factors):
             rotations.add((2,) * self.levels)
         candidates = [
             replace(settings, sheet=sheet, rotation_step_factors=factors)
-            for sheet in sheets
+            for sheet in self._sheets()
             for factors in sorted(rotations)
         ]
         return replace(self._cheapest(candidates), rotation_step_factors=settings.rotation_step_factors)
+
+    def _sheets(self) -> list[np.ndarray]:
+        """Which branches may have the affine functions first."""
+        sheets = [self.source.sheet_like, np.zeros_like(self.source.sheet_like), np.ones_like(self.source.sheet_like)]
+        return sheets if self.source.sheet_like.any() and not self.source.sheet_like.all() else sheets[1:]
 
     def _with_level_steps(self, settings: Settings) -> Settings:
         """Coarser steps for levels whose vertices, and those that hang on them, may be further off."""

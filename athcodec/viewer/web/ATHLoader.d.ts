@@ -36,6 +36,10 @@ export class ATHLoader extends Loader<ATH> {
   /** The name of the clip to begin with (default, and null: the file's first). Loading fails where a file has none of
    * that name. */
   setClip(name: string | null): this;
+  /** The mesh that is the rest pose of files that do not hold one (`athcodec encode --rest host`): its positions as
+   * they were in the source, bit for bit and in that order, or a geometry that has them, as GLTFLoader gives it. Without it
+   * such a file fails with the codeName "NEEDS_HOST_MESH", with another mesh "WRONG_HOST_MESH"; other files pass it over. */
+  setHostMesh(mesh: Float32Array | BufferGeometry | null): this;
   /** Starts a worker before there is a file for it. */
   preload(): this;
   /** onLoad: at the first picture. onProgress: {loaded, total} bytes, as long as bytes come. */

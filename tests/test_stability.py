@@ -1,0 +1,100 @@
+"""Sizes follow the bound, and no level is worse than the level before."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from plants import blown_tree, plant
+
+import athcodec
+
+LOOSER = 1.02  # of the size of a file, with a looser bound
+RISE = 1.01  # of the RMS error of a level, over that of the level before
+PART = 0.01  # of the bound, beyond that
+
+
+def size_at(clip, bound: float, path) -> int:
+    return athcodec.encode(clip, path, rel_error=bound, attributes="none", ladder="none").bytes
+
+
+def check_sizes(clip, bounds, path) -> None:
+    """From the loosest bound on."""
+    largest = 0
+    for bound in bounds:
+        size = size_at(clip, bound, path)
+        assert largest <= LOOSER * size, (bound, largest, size)
+        largest = max(largest, size)
+
+
+@pytest.mark.parametrize("seed", [1, 11])
+def test_a_looser_bound_does_not_make_a_larger_file(seed, tmp_path):
+    check_sizes(blown_tree(seed, branches=70, frames=60), (1e-3, 4e-4, 1.5e-4, 8e-5, 5e-5, 2e-5), tmp_path / "a.ath")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_sizes_follow_the_bound_on_trees_blown_far_from_their_rest_pose(seed, tmp_path):
+    check_sizes(blown_tree(seed), np.geomspace(1e-3, 2e-5, 25), tmp_path / "a.ath")
+
+
+def rms_errors(decoder, source: np.ndarray) -> list[float]:
+    """Of every level, as decoded; source: (frames, vertices, 3) of the clip that plays."""
+    errors = []
+    for level in decoder.levels:
+        shown = [decoder.positions(frame, level.level) for frame in range(decoder.frame_count)]
+        errors.append(float(np.sqrt(((np.array(shown, np.float64) - source) ** 2).sum(axis=2).mean())))
+    return errors
+
+
+def check_levels(clip, path, **options) -> None:
+    bound = athcodec.encode(clip, path, attributes="none", **options).max_error_bound
+    with athcodec.open(path) as decoder:
+        for own, (start, stop) in zip(decoder.clips, clip.clip_range_frames):
+            for before, after in pairwise(rms_errors(decoder.play(own.name), clip.block(start, stop))):
+                assert after <= RISE * before + PART * bound, (own.name, before, after)
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("bound", [1e-3, 1e-4])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_no_level_is_worse_than_the_one_before_on_blown_trees(seed, bound, ladder, tmp_path):
+    clip = blown_tree(seed, branches=60, frames=40)
+    check_levels(clip, tmp_path / "a.ath", rel_error=bound, ladder=ladder)
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_level_is_worse_than_the_one_before_on_random_plants(seed, ladder, tmp_path):
+    clip = plant(seed, branches=30, longest=6, frames=24)
+    check_levels(clip, tmp_path / "a.ath", rel_error=1e-3, ladder=ladder)
+
+
+def test_no_level_of_several_clips_is_worse_than_the_one_before(tmp_path):
+    calm, wild = (blown_tree(4, branches=40, frames=30, sway=sway) for sway in (0.05, 0.3))
+    check_levels(athcodec.join({"calm": calm, "wild": wild}), tmp_path / "a.ath", rel_error=1e-3)
+
+
+@pytest.mark.parametrize("angle", [0.9 * math.pi, math.pi])
+def test_what_hangs_on_a_stem_that_has_turned_over_costs_no_more_than_on_one_that_stands(angle, tmp_path):
+    """A stem that sways about the opposite of its rest pose, and a tip on it."""
+
+    def swaying(turn: float) -> int:
+        time = np.arange(60) / 30
+        angles = turn + 0.1 * np.sin(2 * np.pi * time)
+        side = 0.1 * np.cos(2 * np.pi * time)
+        along = np.stack([np.sin(angles), np.cos(angles) * np.cos(side), np.cos(angles) * np.sin(side)], axis=1)
+        rest = np.array([[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 2.5, 0.1], [0, 3, 0.2]], np.float32)
+        positions = along[:, None, :] * rest[None, :, 1:2]
+        clip = athcodec.MotionClip(
+            positions.astype(np.float32),
+            time,
+            rest=rest,
+            vertex_branch=np.array([0, 0, 0, 1, 1], np.int32),
+            branch_parent=np.array([-1, 0], np.int32),
+        )
+        return size_at(clip, 1e-4, tmp_path / "a.ath")
+
+    assert swaying(angle) <= 1.25 * swaying(0.0)
