@@ -439,7 +439,7 @@ def prelude_by_document(spec: SimpleNamespace, header: container.Header, chunks:
     """Branches and the rest pose of the first layer."""
     branches, *_ = spec.decode_hierarchy(spec.content(chunks, 1)[8:], header.branch_count, header.vertex_count)
     rest = spec.content(chunks, 2)
-    return branches, spec.decode_rest(rest[17:], branches, spec.f32(rest, 13))
+    return branches, spec.decode_rest(rest[17:], branches, spec.f32(rest, 13), None, rest[0] & 8 != 0)
 
 
 @pytest.mark.parametrize("refines_rest", [False, True])
@@ -455,9 +455,10 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1))
     added, step = [], 2.0**-9
     if refines_rest:
-        stream = random_stream(spec, random, "decode_rest", branches, step, rest)
+        arguments = branches, step, rest, spec.content(chunks, container.REST)[0] & 8 != 0
+        stream = random_stream(spec, random, "decode_rest", *arguments)
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
-        made = outcome(spec, lambda stream: spec.decode_rest(stream, branches, step, rest), stream)
+        made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
         rest = rest if made == "invalid" else made
     refined, motion = spec.refined_plan(branches, rest.rest, level), spec.no_motion(plan, parts.header.frame_count)
     if seed % 3:
@@ -791,7 +792,7 @@ class HandMade:
     )
 
     def __init__(self, seed: int, is_float64: bool, exact: type | None, parts=BRANCHES):
-        self.random = np.random.default_rng(seed)
+        self.random, self.adaptive = np.random.default_rng(seed), seed % 2 == 1
         self.is_float64, self.exact, self.parts = is_float64, exact, parts
         self.bases = {1: (11, 3), 2: (8, 1), 4: (16, 18)}  # Basis_Bits, Basis_Rank
         self.excess = 0  # frequencies that rows code beyond the rank of their learned basis
@@ -859,8 +860,8 @@ class HandMade:
             self.plan.set_rest(pose.astype(np.float64) - self.origin)
             times = container.pack_time(streams.encode_times(self.random.random(self.FRAMES).cumsum()))
         else:
-            coded = streams.encode_rest(self.branches, 0.01, self.rest)
-            head.stream = coded.stream
+            coded = streams.encode_rest(self.branches, 0.01, self.rest, None, self.adaptive)
+            head.stream, head.adaptive = coded.stream, coded.adaptive
             self.plan.set_rest(coded.decoded)
         self.store.add(container.REST, container.pack_rest(head))
         self.store.add(container.TIME, times)

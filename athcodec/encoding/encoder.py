@@ -89,7 +89,7 @@ def encode(
     ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which a decoder can stop, each about that of a layer of precision: one file
         for every distance, a few percent larger than "none", a single layer for archives. "decades" is 1e-2, 1e-3 and
-        so on, down to the bound.
+        so on, down to the bound. A clip that stands still has a single layer in any case.
     jobs : int, optional
         Threads; by default one per core, at most 4, fewer for large meshes. The file is the same whatever their number,
         memory grows with it.

@@ -120,14 +120,16 @@ static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t 
 
 /* A rest pose that is not exact, and one of a refinement about it: the same bytes at a smaller step. */
 static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, double step,
-                              int32_t vertices, double *rest)
+                              int adaptive, int32_t vertices, double *rest)
 {
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
-    int result = ath_decode_rest(model, body.bytes, body.size, branches, count, step, NULL, NULL, steps, rest);
+    int result =
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step, adaptive, NULL, NULL, steps, rest);
     if (result == ATH_OK && all_finite(rest, numbers))
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, steps, rest, finer_steps, finer);
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, adaptive, steps, rest, finer_steps,
+                        finer);
     free(finer);
     free(finer_steps);
     free(steps);
@@ -138,7 +140,7 @@ static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, 
                        int32_t vertices, double *rest)
 {
     if (head[6] & 1) return ath_decode_exact_rest(model, body.bytes, body.size, branches, count, head[6] & 2, rest);
-    return decode_coarse_pose(model, body, branches, count, step_from(head + 6), vertices, rest);
+    return decode_coarse_pose(model, body, branches, count, step_from(head + 6), head[6] & 2, vertices, rest);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
