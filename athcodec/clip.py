@@ -192,11 +192,13 @@ class MotionClip:
         """(N, 3) rest pose in `rest_dtype`, as it was given."""
         return self.rest.astype(self.rest_dtype)
 
-    def replace(self, **changes: Any) -> MotionClip:
+    def replace(self, *, rest_given: bool | None = None, **changes: Any) -> MotionClip:
         """The clip with other values of some parameters; the rest pose keeps its dtype unless another pose is given.
 
         Parameters
         ----------
+        rest_given : bool, optional
+            Whether the rest pose counts as given; by default another one does, and the same one as it did.
         **changes
             Parameters of MotionClip.
 
@@ -211,8 +213,8 @@ class MotionClip:
             Where the changed structure is wrong.
         """
         clip = replace(self, **{"rest": self.source_rest} | changes)
-        if "rest" not in changes:
-            clip.rest_given = self.rest_given
+        if rest_given is not None or "rest" not in changes:
+            clip.rest_given = self.rest_given if rest_given is None else rest_given
         return clip
 
     @property

@@ -53,7 +53,7 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     closing = ExitStack()
     for part in parts:
         closing.callback(part.close)
-    return MotionClip(
+    joined = MotionClip(
         _joined([part.positions for part in parts]),
         np.concatenate([part.time for part in parts]),
         first.vertex_branch,
@@ -69,6 +69,8 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
         unchanged=_all_unchanged(parts),
         skin=first.skin,
     )
+    joined.rest_given = any(part.rest_given for part in parts)
+    return joined
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:

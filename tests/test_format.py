@@ -541,6 +541,17 @@ def stems(spec: SimpleNamespace, branches: np.ndarray) -> list:
     return [spec.Record(**{name: int(row[name]) for name in BRANCH.names}) for row in branches]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_rest_poses_about_reference_poses_mean_the_same_to_the_document_and_the_code(spec, seed):
+    file, random = HandMade(seed, False, None), np.random.default_rng(seed)
+    far = random.choice([0.01, 1.0, 30.0])
+    coded = streams.encode_source_rest(
+        file.branches, 0.01, file.rest, file.rest + far * random.normal(size=file.rest.shape)
+    )
+    got = spec.decode_source_rest(coded.stream, stems(spec, file.branches), 0.01, file.rest.tolist())
+    assert np.array(got).tobytes() == coded.decoded.tobytes()
+
+
 @pytest.mark.parametrize("dtype", NUMBERS)
 @pytest.mark.parametrize("seed", range(5))
 def test_exact_rest_poses_come_back_bit_for_bit_by_document_and_code(spec, seed, dtype):

@@ -241,8 +241,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--segment-frames",
         metavar="FRAMES",
         type=_argument(_segment_frames),
-        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}); what is "
-        "decoded at once, so shorter ones seek faster and make larger files",
+        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}, or all of a small "
+        "clip); what is decoded at once, so shorter ones seek faster and make larger files",
     )
     verb.add_argument(
         "--tam",
@@ -291,8 +291,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--rest",
         choices=("auto", "first", "mean"),
         default="auto",
-        help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all "
-        "(default auto)",
+        help="rest pose: the file's (the first frame where it has none), the first frame, or the mean of all, which "
+        "are not stored (default auto)",
     )
 
 

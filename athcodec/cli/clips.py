@@ -40,7 +40,7 @@ def clip_to_encode(paths: Sequence[str], args: argparse.Namespace) -> MotionClip
         clips: dict[str, MotionClip] = {}
         for name, (_, _, clip) in zip(names, parts):
             if args.rest != "auto" and clips:  # one that was made: the first clip's is as good for all
-                clip = clip.replace(rest=next(iter(clips.values())).source_rest)
+                clip = clip.replace(rest=next(iter(clips.values())).source_rest, rest_given=False)
             clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()

@@ -47,6 +47,7 @@ class _Trial:
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
         self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
+        self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option = option
 

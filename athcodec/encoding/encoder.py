@@ -70,7 +70,8 @@ def encode(
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
         within the bound.
     exact_rest : bool
-        Keep the rest pose bit for bit.
+        Keep the rest pose bit for bit. Else one that the clip was given comes back within the bound, or within 0.3 % of
+        the diagonal where motion is coded about another pose; one that was made is not stored.
     lossless : bool
         One more level holds the positions bit for bit, and the rest pose is kept likewise; the bound is that of the
         level before.

@@ -11,9 +11,9 @@ import numpy as np
 from athcodec.errors import BoundError
 
 DEAD_ZONE = 0.55
-NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of maps: step over the error that is theirs
-NODE_SHARE, NODE_BYTES = 0.041, 950  # of the file that the maps may take, whichever is more
-FEW_ROOTS = 4  # whose maps are a few bytes
+NODE_QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)  # of maps: step over the error that is theirs
+NODE_SHARE, NODE_BYTES = 0.02, 320  # of the file that the maps may take, whichever is more
+FEW_ROOTS, ROOT_QUALITY = 4, 0.7  # whose maps are a few bytes
 NODE_ERROR_TOLERANCE = 1.08  # times a level's own error that cheaper maps may have
 MODE_STEP = 0.1  # precision of a learned mode: what it moves in a frame (RMS), in steps
 LEAST_MODE = 0.12  # what a learned mode that is kept moves in a frame (RMS), in steps
@@ -23,7 +23,7 @@ SMALLEST_BOUND = 1e-35  # steps, in float32, are smaller still; squares of error
 LARGEST_EXTENT = 2.0**28  # extent over bound that corrections alone can still express
 REST_CAP = 1.6  # rest pose step over bound at which its own error reaches the bound
 SAFE_REST_CAP = 2 / 3**0.5  # the same for the worst possible rounding of a vertex
-SOURCE_REST_TOLERANCE = 2e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
+SOURCE_REST_TOLERANCE = 3e-3  # over the diagonal: how far a rest pose that is no reference pose may be off
 SOURCE_REST_STEP = 2.0  # over that, at first
 CORRECTION_STEP = 1.12  # over the limit: rounding a correction leaves at most sqrt(3)/2 of its step
 ROTATION_FACTORS = (0, 1, 2, 4, 8)

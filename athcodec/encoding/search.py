@@ -7,7 +7,7 @@ Bases, rotations, time bases and steps are searched one after the other, on a sa
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -37,6 +37,7 @@ from athcodec.encoding.segment import (
     thread_count,
 )
 from athcodec.errors import BoundError
+from athcodec.segmentation import DEFAULT_SEGMENT
 
 EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
@@ -65,14 +66,21 @@ def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
-        return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
+        return [SegmentSample(_middle(source.positions(middles[0])), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
     return [
-        SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups
+        SegmentSample(_middle(source.positions(middles[group[len(group) // 2]])), int(lengths[group].sum()))
+        for group in groups
     ]
+
+
+def _middle(positions: np.ndarray) -> np.ndarray:
+    """At most DEFAULT_SEGMENT frames of a segment: the search has the same work where segments are longer."""
+    first = max(0, positions.shape[2] - DEFAULT_SEGMENT) // 2
+    return np.ascontiguousarray(positions[:, :, first : first + DEFAULT_SEGMENT])
 
 
 def _moved(source: Source, segment: int) -> float:
@@ -223,29 +231,37 @@ class Search:
         if self.of_sample:
             first, candidates = self.best_of_sample(ratio)
         else:
-            best = self.best()
-            candidates = list(self.refinements(best, ratio))  # first: components are of the step that asks first
-            first = best if ratio == 1 else self.first_layer(best, ratio)
+            candidates = list(self.refinements(self.best, ratio))  # first: components are of the step that asks first
+            first = self.best if ratio == 1 else self.first_layer(self.best, ratio)
         self.report("search", 1.0)
         return first, candidates
 
-    def best(self) -> Settings:
+    @cached_property
+    def at_first_step(self) -> Settings:
+        """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         steps = [
             self._with_basis,
             self._with_rotations,
             self._with_learned_bases,
             self._with_basis,
             self._with_learned_modes,
-            self._with_steps,
         ]
         if self.effort == "fast":
             steps = [self._with_rotations]
         if self.source.weights is not None:
             steps.insert(0, self._with_level_steps)
-        elif self.effort == "best":
+        return self._after(steps, self.start)
+
+    @cached_property
+    def best(self) -> Settings:
+        """Settings of a file of one layer."""
+        steps = [] if self.effort == "fast" else [self._with_steps]
+        if self.effort == "best" and self.source.weights is None:
             steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
-        settings = self.start
-        for step in [*steps, self._with_node_steps]:
+        return self._after([*steps, self._with_node_steps], self.at_first_step)
+
+    def _after(self, steps: Sequence[Callable[[Settings], Settings]], settings: Settings) -> Settings:
+        for step in steps:
             settings = step(settings)
             self._report(WORTH.get(step.__name__, 0))
         return settings
@@ -274,21 +290,31 @@ class Search:
         self.report("search", min((len(self._known) + self._extra_trials) / self._trials, 0.99))
 
     def about_best_reference(self) -> Search:
-        """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file as far as the
-        first trials tell."""
+        """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
+        is tried with what was found about the rest pose, and goes on from there."""
         if self.effort == "fast":
             return self
+        other = self.about_mean_pose()
+        tried, its = self.of_sample or self, other.of_sample or other
+        found = its.like(tried, tried.at_first_step)
+        if its.cost(found)[0] >= tried.cost(tried.at_first_step)[0]:
+            return self
+        its.at_first_step = found
+        return other
+
+    def about_mean_pose(self) -> Search:
+        """The same about the mean pose of the motion, nothing found yet."""
         source = self.source.about(mean_pose(self.source, self.ath, self.start))
         ath = replace(self.ath, rest=source.rest + source.origin)
         start = first_settings(source, ath, self.start.bound, self.samples[-1])
-        other = Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, layered=self._layered)
-        return min(self, other, key=Search._first_cost)
+        return Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, layered=self._layered)
 
-    def _first_cost(self) -> float:
-        """Bytes of the file before anything is searched: without rotations or with some."""
-        search = self.of_sample or self
-        rotating = replace(search.start, rotation_step_factors=(2,) * self.levels)
-        return min(cost for cost, _ in search._costs([search.start, rotating]))
+    def like(self, other: Search, settings: Settings) -> Settings:
+        """Settings that were found about another reference pose, about this one."""
+        by_form = np.array_equal(settings.sheet, other.source.sheet_like)
+        sheet = self.source.sheet_like if by_form else settings.sheet
+        own = replace(settings, sheet=sheet, lags=self.start.lags, loose=self.start.loose, learned_pieces=None)
+        return own if settings.learned_pieces is None else self._with_learned_modes(own)
 
     @cached_property
     def of_sample(self) -> Search | None:
@@ -313,7 +339,7 @@ class Search:
     def best_of_sample(self, ratio: int) -> tuple[Settings, list[Settings]]:
         """The settings that are best for a sample of the plant; pieces with learned modes are chosen in all of it."""
         search, start = cast(Search, self.of_sample), self.start
-        found = search.best()
+        found = search.best
         candidates = [self._from_sample(search, own, start) for own in search.refinements(found, ratio)]
         if ratio == 1:
             return candidates[0], candidates
@@ -528,7 +554,7 @@ class Search:
         def costs_at(exponents) -> dict[int, float]:
             return dict(zip(exponents, (cost for cost, _ in self._costs([moved(e) for e in exponents]))))
 
-        costs = costs_at((-1, 0, 1))
+        costs = costs_at((-1, 0, 1, 2))  # a step to be coarse by far pays where one to be a little coarser does not
         while True:
             best = min(costs, key=costs.get)
             wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
@@ -548,7 +574,7 @@ class Search:
         for quality in qz.NODE_QUALITIES:
             steps = quality * errors
             if roots <= qz.FEW_ROOTS:
-                steps[0] = qz.NODE_QUALITIES[0] * errors[0]  # a few bytes: the roots' maps are never coarser
+                steps[0] = qz.ROOT_QUALITY * errors[0]
             segment.clear_nodes()
             segment.analyse_nodes(self.sample, steps, qz.DEAD_ZONE)
             if limits is None:

@@ -306,7 +306,8 @@ def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip
         clip.vertex_count,
         dtype,
     )
-    return clip.replace(positions=positions, rest=(clip.rest @ matrix.T).astype(clip.rest_dtype))
+    rest = (clip.rest @ matrix.T).astype(clip.rest_dtype)
+    return clip.replace(positions=positions, rest=rest, rest_given=clip.rest_given)
 
 
 def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> MotionClip:

@@ -51,7 +51,7 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             data = archive.ask(f"{start} {stop}")
             return np.frombuffer(data, np.float32).reshape(stop - start, shape[1], 3)
 
-        return MotionClip(
+        clip = MotionClip(
             Frames(frames, *shape),
             arrays["time"],
             rest=arrays["rest"],
@@ -61,6 +61,8 @@ def read_clip(path: str | PathLike[str], options: ReadOptions) -> MotionClip:
             unchanged=unchanged,
             **{name: arrays[name] for name in ARRAYS if name in arrays},
         )
+        clip.rest_given = bool(arrays["rest_given"])
+        return clip
 
 
 class _Archive:

@@ -97,7 +97,7 @@ def _described(clip: MotionClip) -> bytes:
     for name in ("time", "vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
         if getattr(clip, name) is not None:
             arrays[name] = getattr(clip, name)
-    arrays["rest"] = clip.source_rest
+    arrays["rest"], arrays["rest_given"] = clip.source_rest, np.array(clip.rest_given)
     arrays["metadata"] = np.frombuffer(json.dumps(clip.metadata).encode(), np.uint8)
     out = io.BytesIO()
     np.savez(out, **arrays)

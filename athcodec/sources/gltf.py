@@ -115,6 +115,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
             unchanged=file.unchanged,
             **branches,
         )
+        clips[name].rest_given = options.rest == "auto"
         rest = clips[name].source_rest  # of several, the same for all
     return join(clips) if options.takes else clips[""]
 

@@ -1,0 +1,110 @@
+"""Motion may be coded about another pose than the source's rest pose, which comes back all the same."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import container as ct
+from athcodec.encoding import encoder
+from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
+from athcodec.encoding.search import Search
+from athcodec.errors import BadChecksum
+
+OPTIONS = {"rel_error": 1e-4, "segment_frames": 16}
+
+
+@pytest.fixture(autouse=True)
+def about_mean(monkeypatch):
+    """Files are made about the mean pose, whether it pays or not."""
+    monkeypatch.setattr(Search, "about_best_reference", Search.about_mean_pose)
+
+
+def diagonal(clip):
+    return float(np.linalg.norm(np.ptp(clip.block(0, clip.frame_count).reshape(-1, 3), axis=0)))
+
+
+def distance(a, b):
+    return float(np.linalg.norm(np.asarray(a, float) - b, axis=-1).max())
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+def test_a_rest_pose_that_was_given_comes_back_within_its_tolerance(bushy_clip, tmp_path, ladder):
+    athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, **OPTIONS)
+    size = diagonal(bushy_clip)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert decoder.file.find(ct.SOURCE_REST)
+        assert distance(decoder.level_rest(), bushy_clip.rest) > 10 * 1e-4 * size  # the bound
+        assert distance(decoder.rest, bushy_clip.rest) <= SOURCE_REST_TOLERANCE * size
+        assert distance(decoder.positions(), bushy_clip.block(0, bushy_clip.frame_count)) <= 1e-4 * size
+        for level in range(decoder.level_count):
+            maps = decoder.affines(3, level)
+            node = int(np.argmin(maps.is_stem))
+            if maps.is_stem[node]:
+                continue
+            some = slice(maps.first_vertex[node], maps.first_vertex[node] + maps.vertex_count[node])
+            vertices = decoder.hierarchy.vertex_source[some]
+            moved = decoder.level_rest(level)[vertices] @ maps.matrices[node, :, :3].T + maps.matrices[node, :, 3]
+            assert distance(moved, decoder.positions(3, level)[vertices]) <= 1e-5 * size
+
+
+@pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])
+def test_exact_rest_poses_come_back_bit_for_bit(bushy_clip, tmp_path, options):
+    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options)
+    with athcodec.open(tmp_path / "a.ath", strict=True) as decoder:
+        assert decoder.rest.tobytes() == bushy_clip.source_rest.tobytes()
+        assert not np.array_equal(decoder.level_rest(), bushy_clip.rest)
+
+
+def test_a_rest_pose_that_was_made_is_not_stored(bushy_clip, tmp_path):
+    clip = athcodec.MotionClip(
+        bushy_clip.block(0, bushy_clip.frame_count), bushy_clip.time, bushy_clip.vertex_branch, bushy_clip.branch_parent
+    )
+    assert not clip.rest_given and not clip.replace(metadata={}).rest_given and bushy_clip.rest_given
+    athcodec.encode(clip, tmp_path / "a.ath", **OPTIONS)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert decoder.file.find(ct.SOURCE_REST) is None
+        assert np.array_equal(decoder.rest, np.float32(decoder.level_rest()))
+
+
+def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
+    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
+    for level in (0, 3):
+        athcodec.truncate(tmp_path / "a.ath", tmp_path / "cut.ath", level)
+        with athcodec.open(tmp_path / "cut.ath", strict=True) as cut, athcodec.open(tmp_path / "a.ath") as whole:
+            assert cut.file.payload(cut.file.find(ct.SOURCE_REST)) == whole.file.payload(
+                whole.file.find(ct.SOURCE_REST)
+            )
+            closest = distance(cut.level_rest(), whole.level_rest())
+            assert distance(cut.rest, whole.rest) <= 4 * closest + 1e-6
+
+
+def test_a_damaged_rest_pose_is_refused(bushy_clip, tmp_path):
+    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        chunk = decoder.file.find(ct.SOURCE_REST)
+    data = bytearray((tmp_path / "a.ath").read_bytes())
+    data[chunk.offset + chunk.length - 1] ^= 1
+    with pytest.raises(BadChecksum, match="SOURCE_REST"):
+        athcodec.open(BytesIO(data))
+
+
+def test_joined_clips_share_both_poses(medley_clips, tmp_path):
+    joined = athcodec.join(medley_clips)
+    athcodec.encode(joined, tmp_path / "a.ath", **OPTIONS)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        assert joined.rest_given == (decoder.file.find(ct.SOURCE_REST) is not None)
+        assert distance(decoder.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
+        for clip in decoder.clips:
+            assert np.array_equal(decoder.play(clip.name).level_rest(), decoder.level_rest())
+
+
+def test_drafts_hold_the_reference_pose(bushy_clip, tmp_path):
+    athcodec.encode(bushy_clip, tmp_path / "whole.ath", **OPTIONS)
+    draft = encoder.draft(bushy_clip, **OPTIONS)
+    coded = list(encoder.code_segments(bushy_clip, draft, range(draft.segment_count)))
+    encoder.write(bushy_clip, draft, coded, tmp_path / "steps.ath")
+    assert (tmp_path / "steps.ath").read_bytes() == (tmp_path / "whole.ath").read_bytes()
