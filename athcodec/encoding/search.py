@@ -43,6 +43,7 @@ EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
+MEAN_POSE_WORTH = 6  # trials, to find the mean pose and learned modes about it
 PRELUDES_KEPT = 6  # between trials
 WORTH = {"_with_learned_bases": 2, "_with_learned_modes": 6, "_with_node_steps": 4}  # trials, of other work in a step
 
@@ -296,8 +297,11 @@ class Search:
             return self
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other
+        tried._extra_trials += MEAN_POSE_WORTH
+        its._extra_trials = tried._extra_trials + len(tried._known)
         found = its.like(tried, tried.at_first_step)
         if its.cost(found)[0] >= tried.cost(tried.at_first_step)[0]:
+            tried._extra_trials += len(its._known)
             return self
         its.at_first_step = found
         return other
