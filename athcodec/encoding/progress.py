@@ -13,7 +13,7 @@ Progress = Callable[[str, float], None]
 
 # Microseconds of one thread for a vertex in a frame, as `python -m bench large` has them; only their ratios matter.
 SURVEY, TRIAL, MOTION = 0.11, 0.13, 0.24
-TRIALS = {"fast": 7, "default": 31, "best": 46}  # that a search is worth, for the effort
+TRIALS = {"fast": 7, "default": 31, "best": 50}  # that a search is worth, for the effort
 LAYER_TRIALS = {"fast": 3, "default": 24, "best": 10}  # beyond these where there are layers of precision
 BRANCHES = 0.5  # of all the rest, to find branches for a clip without
 SIZES = 6  # files that are made to meet a target size

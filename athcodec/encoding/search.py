@@ -7,7 +7,7 @@ Bases, rotations, time bases and steps are searched one after the other, on a sa
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -37,11 +37,13 @@ from athcodec.encoding.segment import (
     with_best_lags,
 )
 from athcodec.errors import BoundError
+from athcodec.segmentation import DEFAULT_SEGMENT
 
 EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
+MEAN_POSE_WORTH = 6  # trials, to find the mean pose and learned modes about it
 PRELUDES_KEPT = 6  # between trials
 REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
@@ -72,14 +74,21 @@ def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
     if len(middles) == 1:
-        return [SegmentSample(source.positions(middles[0]), source.clip.frame_count)]
+        return [SegmentSample(_middle(source.positions(middles[0])), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
     return [
-        SegmentSample(source.positions(middles[group[len(group) // 2]]), int(lengths[group].sum())) for group in groups
+        SegmentSample(_middle(source.positions(middles[group[len(group) // 2]])), int(lengths[group].sum()))
+        for group in groups
     ]
+
+
+def _middle(positions: np.ndarray) -> np.ndarray:
+    """At most DEFAULT_SEGMENT frames of a segment: the search has the same work where segments are longer."""
+    first = max(0, positions.shape[2] - DEFAULT_SEGMENT) // 2
+    return np.ascontiguousarray(positions[:, :, first : first + DEFAULT_SEGMENT])
 
 
 def _moved(source: Source, segment: int) -> float:
@@ -266,25 +275,31 @@ class Search:
         return first, candidates
 
     @cached_property
-    def best(self) -> Settings:
-        """Settings of a file of one layer."""
+    def at_first_step(self) -> Settings:
+        """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         steps = [
             self._with_basis,
             self._with_rotations,
             self._with_learned_bases,
             self._with_basis,
             self._with_learned_modes_for_all,
-            self._with_steps,
-            self._with_rest_slack,
         ]
         if self.effort == "fast":
             steps = [self._with_rotations]
         if self.source.weights is not None:
             steps.insert(0, self._with_level_steps)
-        elif self.effort == "best":
+        return self._after(steps, self.start)
+
+    @cached_property
+    def best(self) -> Settings:
+        """Settings of a file of one layer."""
+        steps = [] if self.effort == "fast" else [self._with_steps, self._with_rest_slack]
+        if self.effort == "best" and self.source.weights is None:
             steps += [self._with_rotations, self._with_learned_bases, self._with_finer_steps]
-        settings = self.start
-        for step in [*steps, self._with_node_steps]:
+        return self._after([*steps, self._with_node_steps], self.at_first_step)
+
+    def _after(self, steps: Sequence[Callable[[Settings], Settings]], settings: Settings) -> Settings:
+        for step in steps:
             settings = step(settings)
             self._report(WORTH.get(step.__name__, 0))
         return settings
@@ -314,15 +329,18 @@ class Search:
 
     def about_best_reference(self) -> Search:
         """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
-        is tried with the settings that are best about the rest pose, and goes on from there."""
+        is tried with what was found about the rest pose, and goes on from there."""
         if self.effort == "fast" or self.source.host_rest:
             return self
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other
-        found = its.like(tried, tried.best)
-        if its.cost(found)[0] >= tried.cost(tried.best)[0]:
+        tried._extra_trials += MEAN_POSE_WORTH
+        its._extra_trials = tried._extra_trials + len(tried._known)
+        found = its.like(tried, tried.at_first_step)
+        if its.cost(found)[0] >= tried.cost(tried.at_first_step)[0]:
+            tried._extra_trials += len(its._known)
             return self
-        its.best = its._with_node_steps(its._with_steps(found))
+        its.at_first_step = found
         return other
 
     def about_mean_pose(self) -> Search:
@@ -336,7 +354,14 @@ class Search:
         """Settings that were found about another reference pose, about this one."""
         by_form = np.array_equal(settings.sheet, other.source.sheet_like)
         sheet = self.source.sheet_like if by_form else settings.sheet
-        own = replace(settings, sheet=sheet, lags=self.start.lags, loose=self.start.loose, learned_pieces=None)
+        own = replace(
+            settings,
+            sheet=sheet,
+            lags=self.start.lags,
+            adaptive_rest=self.start.adaptive_rest,
+            loose=self.start.loose,
+            learned_pieces=None,
+        )
         return own if settings.learned_pieces is None else self._with_learned_modes(own)
 
     @cached_property
