@@ -320,8 +320,9 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
     for (int32_t d = 0; d <= level; d++)
         for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind = kind_after(kind))
             checks += checksum_steps(wanted_chunk(file, segment, level, kind, d));
-    int32_t predictions =
-        file->header.is_predicted ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment)) : 0;
+    int32_t predictions = file->header.is_predicted && level > 0
+                              ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment))
+                              : 0;
     return checks + heads + predictions + file->plan.piece_count + 1;
 }
 
