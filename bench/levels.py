@@ -160,7 +160,7 @@ class _Joints:
 
     def _squares(self, frame: int) -> np.ndarray:
         matrices = self.decoder.affines(frame, self.level).matrices[self._part]
-        rest = self.decoder.rest[self._attach].astype(np.float64)
+        rest = self.decoder.level_rest(self.level)[self._attach].astype(np.float64)
         by_child = (matrices[:, :, :3] @ rest[:, :, None])[..., 0] + matrices[:, :, 3]
         by_parent = self.decoder.positions(frame, self.level, np.float64)[self._attach]
         return ((by_child - by_parent) ** 2).sum(axis=1)

@@ -25,7 +25,6 @@ from athcodec.encoding.segment import CodedPrelude, Settings, Source, code_stems
 from athcodec.encoding.streams import encode_learned_modes
 from athcodec.hierarchy import hierarchy_of
 from athcodec.metrics import ErrorMeter
-from athcodec.segmentation import DEFAULT_SEGMENT
 from bench.clips import Encoded, encoded, measure
 
 TABLE_ENTRY, ERROR_ENTRY = 6, 2.5  # bytes of the front, about: of a chunk, and of the errors of a level in a segment
@@ -204,10 +203,12 @@ class _Recoding:
         seen = survey(clip, hierarchy)
         bound = rel_error * seen.diagonal
         self.name = str(clip)
-        self._source = Source(clip, hierarchy, seen, DEFAULT_SEGMENT, False)
+        source = Source(clip, hierarchy, seen, None, False)
         self._ath = seen.ath(Thresholds(bound, 0, bound, 0))
+        search = Search.of(source, self._ath, bound, "default", lambda stage, done: None)
+        self._search = search.about_best_reference()
+        self._source = self._search.source
         self._positions = [self._source.positions(i) for i in range(len(self._source.segments))]
-        self._search = Search.of(self._source, self._ath, bound, "default", lambda stage, done: None)
         _, (self.settings,) = self._search.found()
 
     def of_one_level(self) -> list[Settings]:

@@ -72,9 +72,9 @@ ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int
 }
 
 /* One number below 2^30 under a class of expected magnitudes. */
-ATH_INLINE uint32_t code_in_class(ath_coder *coder, number_model *model, int32_t class, uint32_t value)
+ATH_INLINE uint32_t code_in_class(ath_coder *coder, number_model *model, int32_t about, uint32_t value)
 {
-    ath_context *size = model->size[class];
+    ath_context *size = model->size[about];
     int32_t length = bit_length(value), coded = 0;
     while (coded < NUMBER_BINS && coder_bit(coder, &size[coded], coded < length)) coded++;
     if (coded == 0) return 0;
@@ -87,9 +87,9 @@ ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_
     return code_in_class(coder, model, number_class(expected), value);
 }
 
-ATH_INLINE int32_t code_signed_in_class(ath_coder *coder, number_model *model, int32_t class, int32_t value)
+ATH_INLINE int32_t code_signed_in_class(ath_coder *coder, number_model *model, int32_t about, int32_t value)
 {
-    uint32_t magnitude = code_in_class(coder, model, class, magnitude_of(value));
+    uint32_t magnitude = code_in_class(coder, model, about, magnitude_of(value));
     if (magnitude == 0) return 0;
     return coder_raw_bit(coder, value < 0) ? -(int32_t)magnitude : (int32_t)magnitude;
 }

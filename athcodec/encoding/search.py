@@ -31,6 +31,7 @@ from athcodec.encoding.segment import (
     analyse_finely,
     branch_records,
     code_stems,
+    lags,
     learned_bases,
     loose_branches,
     thread_count,
@@ -113,7 +114,7 @@ class Choice:
     predicted: int | None = None
 
 
-def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample) -> Settings:
+def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample, layered: bool = False) -> Settings:
     """The start of a search."""
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
@@ -135,6 +136,8 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         learned_pieces=None,
         node_steps=np.full(levels, step),
     )
+    if layered:  # adaptive rest poses are worth less to those that refine them
+        return replace(settings, lags=lags(source, rest_step))
     return with_best_lags(source, ath, settings)
 
 
@@ -222,7 +225,7 @@ class Search:
     ) -> Search:
         """For a whole plant."""
         samples = samples_of(source)
-        start = first_settings(source, ath, bound, samples[-1])
+        start = first_settings(source, ath, bound, samples[-1], layered)
         return cls(source, ath, start, samples, effort, report, jobs, layered=layered)
 
     def _level_errors(self, bound: float) -> np.ndarray:
@@ -347,7 +350,7 @@ class Search:
         """The same about the mean pose of the motion, nothing found yet."""
         source = self.source.about(mean_pose(self.source, self.ath, self.start))
         ath = replace(self.ath, rest=source.rest + source.origin)
-        start = first_settings(source, ath, self.start.bound, self.samples[-1])
+        start = first_settings(source, ath, self.start.bound, self.samples[-1], self._layered)
         return Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, layered=self._layered)
 
     def like(self, other: Search, settings: Settings) -> Settings:
@@ -614,7 +617,8 @@ class Search:
 
     def _with_rest_slack(self, settings: Settings) -> Settings:
         """A rest pose as far off as the motion leaves room for, where it is much of the file."""
-        if self.source.exact_rest or self._prelude_bytes(self.prelude(settings)) < REST_SHARE * self.cost(settings)[0]:
+        exact = self.source.reference_is_exact
+        if exact or self._layered or self._prelude_bytes(self.prelude(settings)) < REST_SHARE * self.cost(settings)[0]:
             return settings
         slacks = [part * float(np.min(settings.limit)) for part in qz.REST_SLACKS]
         return self._cheapest(
