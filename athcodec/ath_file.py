@@ -654,7 +654,10 @@ class AthFile:
     def rest(self) -> np.ndarray:
         """Rest pose of the source as decoded with the deepest complete level, (N, 3), float32 or float64 as the source
         had it; where the source gave none, the reference pose of that level."""
-        level = max(self._first_lacking - 1, 0)
+        return self.rest_at(max(self._first_lacking - 1, 0))
+
+    def rest_at(self, level: int) -> np.ndarray:
+        """The same as decoded with a level that is stored."""
         with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
             dtype = np.float64 if self.core.info.rest_is_float64 else np.float32
             with self._poses_read(level):

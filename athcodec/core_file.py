@@ -283,7 +283,7 @@ class File:
         with self._building:
             self._refine_size(level)
         out = np.empty((self.info.vertex_count, 3))
-        lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0])
+        self._check(lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0]))
         return out
 
     def chunks(self) -> np.ndarray:

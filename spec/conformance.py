@@ -263,10 +263,7 @@ def ask_package(decoder, item: str) -> bytes:
     if item in NO_ANSWER:
         return b""
     if item == "rest":
-        with np.errstate(over="ignore"):  # a pose beyond binary32 is infinite
-            return (
-                decoder.file.core.rest(0).astype("<f8" if decoder.file.core.info.rest_is_float64 else "<f4").tobytes()
-            )
+        return decoder.file.rest_at(0).tobytes()
     if item == "clips":
         return b"".join(clip_entry(clip) for clip in decoder.clips)
     if item != "static":

@@ -57,7 +57,7 @@ def test_the_version_of_the_format_is_the_same_everywhere():
 
 def test_chunks_have_the_same_kinds_and_names_everywhere():
     in_format = {name: int(kind, 16) for name, kind in re.findall(r"^\| ([A-Z_]+) \| (0x\w{4}) \|", FORMAT, flags=re.M)}
-    assert len(in_format) == 15 and in_format == {name: kind for kind, name in container.KIND_NAMES.items()}
+    assert len(in_format) == 16 and in_format == {name: kind for kind, name in container.KIND_NAMES.items()}
     for name, kind in in_format.items():
         assert C[name] == getattr(container, name) == kind and lib.ath_kind_name(kind) == name.encode()
     assert {kind for kind in range(1 << 16) if lib.ath_kind_name(kind)} == set(in_format.values())

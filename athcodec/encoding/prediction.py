@@ -17,7 +17,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.layers import Layer, Layers
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
-from athcodec.encoding.search import Choice
+from athcodec.encoding.search import Choice, SegmentSample, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
 from athcodec.errors import BoundError
 
@@ -79,19 +79,17 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     """None where that is above `most_bytes`, or the bound cannot be kept."""
     ath = one_map_each(source.seen)
     first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
-    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
-    samples = [source.positions(segment) for segment in some]
-    scale = source.clip.frame_count / sum(sample.shape[2] for sample in samples)
+    samples = _samples(source)
     prelude = CodedPrelude(source, ath, first, predicted=True)
 
     def size(prelude: CodedPrelude, settings: Settings, memory: int) -> FoundPrediction:
-        motion = sum(len(_predicted(prelude, settings, sample, memory)[0]) for sample in samples)
-        return FoundPrediction(
-            Choice(settings, settings, None, predicted=memory), motion * scale + prelude.prelude_bytes
+        motion = sum(
+            len(_predicted(prelude, settings, sample.positions, memory)[0]) * sample.scale for sample in samples
         )
+        return FoundPrediction(Choice(settings, settings, None, predicted=memory), motion + prelude.prelude_bytes)
 
     try:
-        if _begun(prelude, first, samples[len(samples) // 2]) * source.clip.frame_count > TOO_MANY * most_bytes:
+        if sum(_begun(prelude, first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
         found = [size(prelude, first, memory) for memory in MEMORIES]
         memory = min(found, key=lambda one: one.bytes).choice.predicted
@@ -103,11 +101,21 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     return best if best.bytes < most_bytes else None
 
 
-def _begun(prelude: CodedPrelude, settings: Settings, positions: np.ndarray) -> float:
-    """Bytes of a frame behind the first, as far as a few of them tell."""
-    some = positions[:, :, :TRIAL_FRAMES]
+def _samples(source: Source) -> list[SegmentSample]:
+    """A few segments spread over a clip; of several clips those that are typical."""
+    if len(source.clip_range_segments) > 1:
+        return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
+    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
+    positions = [source.positions(segment) for segment in some]
+    scale = source.clip.frame_count / sum(own.shape[2] for own in positions)
+    return [SegmentSample(own, scale * own.shape[2]) for own in positions]
+
+
+def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
+    """Bytes of the frames that a sample stands for, but for first ones, as far as a few of it tell."""
+    some = sample.positions[:, :, :TRIAL_FRAMES]
     coded, first = (len(_predicted(prelude, settings, part, MEMORIES[0])[0]) for part in (some, some[:, :, :1]))
-    return (coded - first) / some.shape[2]
+    return (coded - first) / some.shape[2] * sample.frames
 
 
 def _predicted(

@@ -61,7 +61,7 @@ class SegmentSample:
     """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
 
     positions: np.ndarray
-    frames: int
+    frames: float
 
     @property
     def scale(self) -> float:
@@ -73,17 +73,17 @@ class SegmentSample:
 
 def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
+    return [SegmentSample(_middle(source.positions(segment)), frames) for segment, frames in typical_segments(source)]
+
+
+def typical_segments(source: Source) -> list[tuple[int, int]]:
+    """Those that `samples_of` takes, and how many frames of the file each stands for."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
-    if len(middles) == 1:
-        return [SegmentSample(_middle(source.positions(middles[0])), source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
-    return [
-        SegmentSample(_middle(source.positions(middles[group[len(group) // 2]])), int(lengths[group].sum()))
-        for group in groups
-    ]
+    return [(middles[group[len(group) // 2]], int(lengths[group].sum())) for group in groups]
 
 
 def _middle(positions: np.ndarray) -> np.ndarray:

@@ -394,10 +394,7 @@ times() {
 return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
 }
 rest(order = "source", { out } = {}) {
-return this.#pose(out, order, (which, at) => {
-this.#c.ath_rest_float64(this.#at, which, at, 24);
-return OK;
-});
+return this.#pose(out, order, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
 }
 levelRest(level, order = "source", { out } = {}) {
 this.#refineSize(this.#level(level));

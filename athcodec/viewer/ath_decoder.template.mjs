@@ -465,10 +465,7 @@ export class AthFile {
   }
 
   rest(order = "source", { out } = {}) {
-    return this.#pose(out, order, (which, at) => {
-      this.#c.ath_rest_float64(this.#at, which, at, 24);
-      return OK;
-    });
+    return this.#pose(out, order, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
   }
 
   levelRest(level, order = "source", { out } = {}) {
