@@ -53,6 +53,7 @@ import numpy as np
 import athcodec
 from athcodec import container as ct
 from athcodec.encoding.layers import LADDERS
+from athcodec.segmentation import DEFAULT_SEGMENT
 from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program
 from bench.tables import table
@@ -133,7 +134,8 @@ class Unit:
 
     def bytes(self, levels: set[int]) -> int:
         """Bytes of motion that a player of these levels reads per loop."""
-        wanted = {ct.STEMS: range(max(levels) + 1), ct.AFFINES: levels, ct.CORRECTIONS: levels}
+        every = range(max(levels) + 1)
+        wanted = {ct.STEMS: every, ct.PREDICTED: every, ct.AFFINES: levels, ct.CORRECTIONS: levels}
         return sum(length for kind, level, length in self.facts["chunks"] if level in wanted.get(kind, ()))
 
     def bytes_per_s(self, levels: set[int]) -> float:
@@ -222,6 +224,7 @@ def _make_clips(args: argparse.Namespace, folder: Path, ladder: str) -> list[Pat
                 effort=args.effort,
                 attributes="none",
                 ladder=ladder,
+                segment_frames=DEFAULT_SEGMENT,
             )
     return files
 
@@ -273,7 +276,7 @@ def _output(program: Path, *words: object) -> Any:
 
 
 def _unit_rows(units: list[Unit]) -> Iterator[dict[str, Any]]:
-    for level in range(min(len(unit.pose_us) for unit in units)):
+    for level in range(min(min(len(unit.pose_us), len(unit.prepare_ms)) for unit in units)):
         yield {
             "clips": len(units),
             "level": level,
