@@ -6,7 +6,7 @@ from athcodec._native import PIECE_VERTICES, SEGMENT_FRAMES
 
 MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 128 << 20
-SMALL_BYTES = 8 << 20  # of the float32 positions of a clip that may be one segment of MAX_SEGMENT frames
+SMALL_BYTES = 32 << 20  # of the float32 positions of a clip that may be one segment of MAX_SEGMENT frames
 
 
 def decoding_bytes(vertex_count: int, frames: int) -> int:

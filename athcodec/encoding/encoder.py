@@ -66,7 +66,7 @@ def encode(
         Bytes: the file has the smallest bound that fits.
     segment_frames : int, optional
         Longest segment in frames, 16 to 256; default 128, or all frames of a clip of up to 256 whose float32 positions
-        take at most 8 MiB, or 256 where motion is predicted.
+        take at most 32 MiB, or 256 where motion is predicted.
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3); by default one map per frame stays
         within the bound. Where they are given, motion is not predicted, which has no such hierarchy.
