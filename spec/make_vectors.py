@@ -1508,6 +1508,7 @@ def everything() -> Draft:
         EVERYTHING,
         clips=(loop(rd.Clip(5, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0), rd.Clip(5, 1, "down")),
         rest=coded_rest(EVERYTHING, Chance(71), rest_type=1, origin=(10.0, -3.5, 0.25), step=0.01),
+        source_rest=bent(EVERYTHING, Chance(93, large=9)),
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
         vertex_source=random.permutation(vertices).tolist(),

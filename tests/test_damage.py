@@ -63,6 +63,15 @@ def parts(data) -> Parts:
 
 
 @pytest.fixture(scope="module")
+def fine_parts(full_clip, tmp_path_factory) -> Parts:
+    """Coded so finely that stems of level 2 happen to mean something without SHAPES, too."""
+    path = tmp_path_factory.mktemp("fine") / "full.ath"
+    tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
+    athcodec.encode(full_clip, path, rel_error=1e-5, segment_frames=16, tam=tam, ladder="none")
+    return Parts.of(path.read_bytes())
+
+
+@pytest.fixture(scope="module")
 def layered_parts(layered_ath) -> Parts:
     return Parts.of(layered_ath.read_bytes())
 
@@ -76,7 +85,15 @@ def medley_parts(medley_ath) -> Parts:
 @pytest.fixture(scope="module")
 def lossless_parts(full_clip, tmp_path_factory) -> Parts:
     path = tmp_path_factory.mktemp("lossless") / "full.ath"
-    athcodec.encode(full_clip, path, lossless=True, segment_frames=16, ladder="none")
+    tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
+    athcodec.encode(full_clip, path, lossless=True, segment_frames=16, tam=tam, ladder="none")
+    return Parts.of(path.read_bytes())
+
+
+@pytest.fixture(scope="module")
+def predicted_parts(full_clip, tmp_path_factory) -> Parts:
+    path = tmp_path_factory.mktemp("predicted") / "full.ath"
+    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, ladder="none")
     return Parts.of(path.read_bytes())
 
 
@@ -102,7 +119,6 @@ def use(data: bytes, **options) -> bool:
         lambda d: d.vertex_branch,
         lambda d: d.stem_index,
     ]
-    asks += [lambda d, level=level: d.positions(level=level) for level in range(3)]
     asks += [lambda d: [d.play(clip.name).positions() for clip in d.clips[1:]]]
     asks += [lambda d: d.edges, lambda d: d.faces, lambda d: d.metadata, lambda d: d.attributes]
     with np.errstate(all="ignore"):
@@ -112,7 +128,7 @@ def use(data: bytes, **options) -> bool:
             assert "\n" not in str(error)
             return False
         answered = True
-        for ask in asks:
+        for ask in asks + [lambda d, level=level: d.positions(level=level) for level in range(decoder.level_count)]:
             try:
                 ask(decoder)
             except REFUSED as error:
@@ -125,9 +141,8 @@ def use(data: bytes, **options) -> bool:
 
 def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, data):
     assert parts.file() == data and with_header(data) == data
-    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - {ct.CLIPS, ct.EXACT, ct.REFINED_REST}, (
-        "of a lossy clip"
-    )
+    others = {ct.CLIPS, ct.EXACT, ct.REFINED_REST, ct.PREDICTED}
+    assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - others, "of a lossy clip in modes"
     assert use(data)
 
 
@@ -180,7 +195,7 @@ def test_levels_before_a_damaged_chunk_still_play(parts, data, played):
 
 def test_damage_in_the_prelude_is_refused_even_when_partial_files_are_allowed(parts, data):
     for chunk, _ in parts.chunks:
-        if chunk.kind in (ct.HIERARCHY, ct.REST, ct.TIME):
+        if chunk.kind in (ct.HIERARCHY, ct.REST, ct.TIME, ct.SOURCE_REST):
             with pytest.raises(BadChecksum, match=ct.KIND_NAMES[chunk.kind]):
                 opened(flipped(data, chunk.offset + 3), allow_partial=True)
 
@@ -269,7 +284,7 @@ def test_a_header_field_out_of_range_is_refused(field, value, error, data):
         ("frame_count", []),
         ("segment_count", []),
         ("level_count", []),
-        ("full_level_count", [4]),
+        ("full_level_count", [5]),
         ("chunk_count", []),
         ("is_float64", [1]),
     ],
@@ -321,7 +336,7 @@ def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp
         assert np.array_equal(decoder.positions(), played[1])
 
 
-@pytest.mark.parametrize("kind", [8, 15, 40, 0x7FFF])
+@pytest.mark.parametrize("kind", [9, 15, 40, 0x7FFF])
 def test_an_unknown_required_chunk_is_refused_by_its_number(kind, parts):
     chunks = sorted([*parts.chunks, unknown(kind)], key=lambda entry: ct._order(entry[0]))
     with pytest.raises(UnknownChunk, match=f"{kind:#06x}"):
@@ -343,21 +358,21 @@ def test_chunks_out_of_order_or_twice_are_refused(parts):
 
 @pytest.mark.parametrize("change", [{"level": 4}, {"segment": 2}, {"level": 255}])
 def test_a_chunk_of_a_level_or_segment_that_does_not_exist_is_refused(change, parts):
-    last = parts.index(ct.CORRECTIONS, 2, 1)
+    last = parts.index(ct.CORRECTIONS, 3, 1)
     chunks = list(parts.chunks)
     chunks[last] = replace(chunks[last][0], **change), chunks[last][1]
     with pytest.raises(BadChunkTable):
         opened(parts.with_chunks(chunks))
 
 
-def test_a_chunk_that_must_be_there_is_missed_by_name(parts, played):
-    without_shapes = []
-    for i, (chunk, _) in enumerate(parts.chunks):
-        shorter = parts.with_chunks(parts.chunks[:i] + parts.chunks[i + 1 :])
+def test_a_chunk_that_must_be_there_is_missed_by_name(fine_parts, full_clip):
+    chunks, without_shapes = fine_parts.chunks, []
+    for i, (chunk, _) in enumerate(chunks):
+        shorter = fine_parts.with_chunks(chunks[:i] + chunks[i + 1 :])
         if chunk.kind == ct.SHAPES:  # nothing says that it was there: the stems mean something else, or nothing
             without_shapes.append(use(shorter))
-        elif chunk.kind & ct.OPTIONAL or chunk.kind == ct.CORRECTIONS:
-            assert opened(shorter, strict=True).positions().shape == played[-1].shape
+        elif chunk.kind & ct.OPTIONAL or chunk.kind in (ct.CORRECTIONS, ct.SOURCE_REST):
+            assert opened(shorter, strict=True).positions().shape == full_clip.positions.shape
         else:
             with pytest.raises(BadChunkTable, match=f"got no {ct.KIND_NAMES[chunk.kind]}"):
                 check(shorter)
@@ -370,7 +385,7 @@ def test_announced_errors_must_be_lengths(value, place, data):
     draft = draft_of(data)
     errors = list(draft.errors)
     errors[place] = value
-    with pytest.raises(BadChunkTable, match="error table: got an entry of level [02], segment [01]"):
+    with pytest.raises(BadChunkTable, match="error table: got an entry of level [03], segment [01]"):
         opened(replace(draft, errors=tuple(errors)).file())
 
 
@@ -581,7 +596,12 @@ STATIC = {"METADATA", "FACES", "EDGES", "ATTRIBUTE"}
 @pytest.fixture
 def parts_with(request, parts):
     """A function that gives a file with chunks of a kind, in parts."""
-    others = {"CLIPS": "medley_parts", "EXACT": "lossless_parts", "REFINED_REST": "layered_parts"}
+    others = {
+        "CLIPS": "medley_parts",
+        "EXACT": "lossless_parts",
+        "REFINED_REST": "layered_parts",
+        "PREDICTED": "predicted_parts",
+    }
     return lambda name: request.getfixturevalue(others[name]) if name in others else parts
 
 
@@ -760,7 +780,7 @@ NESTED = "[" * 900 + "]" * 900
     ],
 )
 def test_content_that_breaks_a_rule_is_refused(kind, corrupt, error, parts):
-    level = {ct.STEMS: 2, ct.AFFINES: 1, ct.CORRECTIONS: 2}.get(kind)
+    level = {ct.STEMS: 2, ct.AFFINES: 1, ct.CORRECTIONS: 3}.get(kind)
     with np.errstate(all="ignore"), pytest.raises(error) as caught:
         check(parts.with_payload(kind, corrupt(parts.payload(kind, level)), level))
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
@@ -779,6 +799,7 @@ def assert_whole_or_not_it(stream: bytes, whole: np.ndarray, decode) -> None:
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_an_exact_rest_pose_that_is_not_whole_is_refused_or_another(dtype, parts):
+    parts = Parts.of(parts.without(ct.SOURCE_REST))
     decoder = opened(parts.file())
     pose = np.random.default_rng(5).normal(size=(decoder.vertex_count, 3)).astype(dtype)
 
@@ -800,9 +821,9 @@ def test_uneven_times_that_are_not_whole_are_refused_or_others(parts):
 
 def with_step(parts: Parts, kind: int, step: float) -> bytes:
     """The file with another quantisation step in one chunk."""
-    level, at, packed = (None, 13, floats(step)) if kind == ct.REST else (2, 0, floats(step))
+    level, at = {ct.STEMS: (2, 0), ct.CORRECTIONS: (3, 0), ct.REST: (None, 13)}[kind]
     payload = parts.payload(kind, level)
-    return parts.with_payload(kind, payload[:at] + packed + payload[at + len(packed) :], level)
+    return parts.with_payload(kind, payload[:at] + floats(step) + payload[at + 4 :], level)
 
 
 @pytest.mark.parametrize("kind", [ct.STEMS, ct.CORRECTIONS, ct.REST])
@@ -811,7 +832,7 @@ def test_the_smallest_steps_play(kind, parts):
     assert use(data) and np.isfinite(opened(data).positions()).all()
 
 
-@pytest.mark.parametrize("kind, finite", [(ct.STEMS, [0, 1]), (ct.CORRECTIONS, [0, 1, 2]), (ct.REST, [])])
+@pytest.mark.parametrize("kind, finite", [(ct.STEMS, [0, 1]), (ct.CORRECTIONS, [0, 1, 2, 3]), (ct.REST, [])])
 def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matrices(kind, finite, parts):
     """The positions are no plant, but numbers or infinities."""
     decoder = opened(with_step(parts, kind, 1e38))
@@ -827,7 +848,7 @@ def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matri
             with pytest.raises(BadChunk, match="positions that no matrix fits"):
                 decoder.affines(0, level)
     assert found == finite
-    if finite == [0, 1, 2]:
+    if finite == [0, 1, 2, 3]:
         assert np.isfinite(decoder.residual(0, 0)).all()
     else:
         with pytest.raises(BadChunk, match="frame 0: got positions"):
@@ -842,7 +863,7 @@ def test_the_largest_steps_play_and_frames_with_infinite_positions_have_no_matri
         ("TIME", 1, None),
         ("STEMS", 8, 2),
         ("AFFINES", 0, 1),
-        ("CORRECTIONS", 4, 2),
+        ("CORRECTIONS", 4, 3),
         ("SHAPES", 0, 1),
     ],
 )
@@ -1050,5 +1071,5 @@ def test_every_error_of_the_format_can_happen_and_says_it_in_one_line(error, mak
 
 def test_the_codes_of_the_errors_are_those_of_the_format():
     classes = [c for c in vars(errors).values() if isinstance(c, type) and issubclass(c, FormatError)]
-    assert sorted(c.code for c in classes) == list(range(1, 12))
-    assert len({c.name for c in classes}) == 11
+    assert sorted(c.code for c in classes) == list(range(1, 14))
+    assert len({c.name for c in classes}) == 13

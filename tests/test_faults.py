@@ -314,9 +314,9 @@ def test_a_file_that_gives_a_few_bytes_at_a_time_is_read_all_the_same(full_ath):
         assert np.array_equal(slow.positions(), decoder.positions()) and slow.metadata == decoder.metadata
 
 
-def test_a_file_that_shrinks_while_it_is_played_is_truncated_where_it_is_read(bushy_ath, tmp_path):
+def test_a_file_that_shrinks_while_it_is_played_is_truncated_where_it_is_read(sample_ath, tmp_path):
     path = tmp_path / "shrinking.ath"
-    path.write_bytes(bushy_ath.read_bytes())
+    path.write_bytes(sample_ath.read_bytes())
     with athcodec.open(path) as decoder:
         coarse = decoder.positions(0, 0)
         os.truncate(path, decoder.levels[0].bytes)

@@ -125,7 +125,7 @@ def test_memory_that_fails_for_the_core_leaves_a_decoder_that_goes_on(sample_ath
             done = True
         except MemoryError:
             failures += 1
-    assert failures == 12, "the file, its work and bases; of two segments maps, positions and room to go on from them"
+    assert failures == 13, "the file, its work and bases; of two levels what segments share, one, and room to go on"
     for n in (1, 2):
         scarce.left = -1
         with athcodec.open(sample_ath) as decoder:

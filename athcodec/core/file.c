@@ -946,6 +946,16 @@ static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level,
     return all || kind != ATH_REFINED_REST || !file->layers[ath_layer_of(file, d)].rest_known;
 }
 
+/* SOURCE_REST, which is read again with each rest pose that refines another; null where no level beyond one and up to
+ * another asks for it. It came with the prelude, but may have been dropped. */
+static const ath_chunk *used_source_rest(const ath_file *file, int32_t from_level, int32_t level)
+{
+    for (int32_t d = from_level + 1; d <= level; d++)
+        if (is_used(file, ATH_REFINED_REST, d, level, 0) && ath_file_chunk(file, ATH_REFINED_REST, d, 0))
+            return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0);
+    return 0;
+}
+
 /* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
  * chunks for each. */
 int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
@@ -953,6 +963,7 @@ int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t leve
 {
     int32_t count = 0;
     uint64_t end = 0;
+    add_range(used_source_rest(file, from_level, level), 0, &end, ranges, capacity, &count);
     for (int32_t d = from_level + 1; d <= level; d++) {
         if (first_segment > 0) /* what all segments share stands with segment 0 */
             for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
@@ -976,6 +987,8 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
+    const ath_chunk *source_rest = used_source_rest(file, -1, level);
+    if (source_rest && !source_rest->bytes) return 0;
     for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!is_used(file, kind, d, level, 0)) continue;

@@ -324,12 +324,12 @@ static void code_lattice_point(ath_coder *coder, rest_model *model, const rest_m
 {
     const uint32_t *mean = model->predictor.all.mean, *own = phase->mean;
     for (int32_t k = 0; k < 3; k++) {
-        int32_t class = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
+        int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
                         / 2;
-        int32_t half = ath_max(class - 2, 0), odd = integers[0] & 1;
+        int32_t half = ath_max(about - 2, 0), odd = integers[0] & 1;
         if (k == 0) {
-            integers[0] = code_signed_in_class(coder, &model->lattice[0], class, integers[0]);
+            integers[0] = code_signed_in_class(coder, &model->lattice[0], about, integers[0]);
         } else if (!odd) {
             integers[k] = 2 * code_signed_in_class(coder, &model->lattice[1], half, integers[k] / 2);
         } else {
