@@ -50,6 +50,7 @@ LEVEL_0_STEP = 4  # of the rest pose of level 0, over that of the first layer
 RMS = MEASURES.index("rms")
 LEVEL_TOLERANCE = 1.005  # of the RMS error of a level, over that of the level before
 FINER_MAPS, COARSER_MAPS = 3, 16  # half octaves that steps of maps may move for that
+EVEN_SHARE = 0.05  # of the bytes of a segment, that corrections may take for that
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # of corrections for that
 LEVEL_0_SHARE = 1.03  # of the first layer's rest pose, that it may take together with that of level 0
 
@@ -291,13 +292,17 @@ class _SegmentCoder:
         return segment
 
     def _keep_last_level_best(self, layer: Layer, level: int) -> None:
-        """More corrections where the exact stems are worse than the maps before them."""
+        """More corrections where the exact stems are worse than the maps before them, as far as they are cheap."""
         decoded, before = self._uncorrected, self.errors[level - 1][RMS]
+        most = len(self.chunks.get((level, ct.CORRECTIONS), b"")) + EVEN_SHARE * sum(map(len, self.chunks.values()))
         for factor in TIGHTER_LIMITS:
             if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
                 break
             tighter = replace(layer.settings, limit=layer.settings.limit * factor)
-            self.decoded, chunk = self._corrected(decoded, tighter)
+            corrected, chunk = self._corrected(decoded, tighter)
+            if len(chunk) > most:
+                break
+            self.decoded = corrected
             if chunk:
                 self.chunks[level, ct.CORRECTIONS] = chunk
             self.errors[level] = self.error(self.decoded)
@@ -377,7 +382,8 @@ class _EvenLevels:
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
         for level in range(len(shown), 0, -1):
-            self._move(level - 1, level, len(shown), 2.0**0.5, COARSER_MAPS)
+            for coarser in range(level - 1, -1, -1):
+                self._move(coarser, level, len(shown), 2.0**0.5, COARSER_MAPS)
 
     def _is_worse(self, level: int) -> bool:
         return self.errors[level][RMS] > LEVEL_TOLERANCE * self.errors[level - 1][RMS]
