@@ -449,7 +449,8 @@ class Decoder:
         out = np.empty_like(full)
         for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
             rows = slice(first, first + count)
-            out[vertex_source[rows]] = (full[rows] - matrix[:, 3]) @ np.linalg.pinv(matrix[:, :3]).T
+            away = (full[rows] - matrix[:, 3]).T
+            out[vertex_source[rows]] = np.linalg.lstsq(matrix[:, :3], away, rcond=1e-15)[0].T
         return out
 
     def _checked_level(self, level: int | None) -> int:

@@ -299,7 +299,7 @@ class EncodingJob:
 
     @property
     def _long_segments(self) -> Source:
-        return dataclasses.replace(self.source, segment_frames=self.options.predicted_frames)
+        return self.source.in_segments(self.options.predicted_frames)
 
     def _predicted(self, choice: Choice) -> _Decided:
         source = self._long_segments

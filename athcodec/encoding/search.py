@@ -79,6 +79,8 @@ def samples_of(source: Source) -> list[SegmentSample]:
 def typical_segments(source: Source) -> list[tuple[int, int]]:
     """Those that `samples_of` takes, and how many frames of the file each stands for."""
     middles = [start + len(own) // 2 for start, own in zip(source.clip_range_starts, source.clip_range_segments)]
+    if len(middles) == 1:
+        return [(middles[0], source.clip.frame_count)]
     lengths = np.array([own[-1][1] - own[0][0] for own in source.clip_range_segments])
     groups = np.array_split(
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))

@@ -81,8 +81,17 @@ class Source:
         """The same about another reference pose."""
         if reference is None and self.reference is None:
             return self
-        source = replace(self, reference=reference)
+        source = self._changed(reference=reference)
         source.clip_range_segments, source.segments = self.clip_range_segments, self.segments
+        return source
+
+    def in_segments(self, frames: int) -> Source:
+        """The same in other segments, of at most so many frames."""
+        return self._changed(segment_frames=frames)
+
+    def _changed(self, **fields) -> Source:
+        source = replace(self, **fields)
+        source.still = self.still  # for which frames are read
         return source
 
     @property
