@@ -15,6 +15,7 @@ from athcodec import Thresholds
 from athcodec import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.layers import layer_ratios
+from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)
@@ -152,7 +153,7 @@ def test_poses_are_as_precise_as_the_deepest_level_that_is_there(layered_ath, bu
         poses = [whole.level_rest(level.level) for level in whole.levels]
         refined = [chunk.level for chunk in whole.file.chunks if chunk.kind == ct.REFINED_REST]
         deepest, diagonal = whole.rest, np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
-        assert np.linalg.norm(deepest - bushy_clip.rest, axis=1).max() <= 2e-3 * diagonal
+        assert np.linalg.norm(deepest - bushy_clip.rest, axis=1).max() <= SOURCE_REST_TOLERANCE * diagonal
     errors = [np.abs(pose - poses[-1]).max() for pose in poses]
     assert refined == [len(poses) - 2, len(poses) - 1]
     assert errors[0] == errors[refined[0] - 1] > 3 * errors[refined[0]] > errors[refined[1]] == 0
