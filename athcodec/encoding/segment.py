@@ -6,6 +6,7 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -239,12 +240,22 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
 
 def _rest_within(rest: np.ndarray, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
     """At the step of the settings, or the first finer one that keeps the bound."""
-    step = settings.rest_step
-    while True:
-        coded = streams.encode_rest(branches, step, rest, None, settings.adaptive_rest, settings.rest_slack)
-        if np.linalg.norm(coded.decoded - rest, axis=1).max() <= settings.bound:
-            return coded
+
+    def encode(step: float) -> streams.CodedRest:
+        return streams.encode_rest(branches, step, rest, None, settings.adaptive_rest, settings.rest_slack)
+
+    return _within(settings.bound, rest, encode, settings.rest_step)
+
+
+def _within(
+    limit: float, pose: np.ndarray, encode: Callable[[float], streams.CodedRest], step: float
+) -> streams.CodedRest:
+    """At a step, or the first finer one by which no vertex is further from the pose than the limit."""
+    coded = encode(step)
+    while not np.linalg.norm(coded.decoded - pose, axis=1).max() <= limit:
         step = qz.single(0.8 * step)
+        coded = encode(step)
+    return coded
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
@@ -288,11 +299,12 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
         return ct.pack_exact_source_rest(streams.encode_exact_rest(branches, pose))
     tolerance = max(bound, qz.SOURCE_REST_TOLERANCE * source.seen.diagonal)
-    step = qz.single(qz.SOURCE_REST_STEP * tolerance)
-    coded = streams.encode_source_rest(branches, step, reference, source.source_rest)
-    while np.linalg.norm(coded.decoded - source.source_rest, axis=1).max() > tolerance:
-        step = qz.single(0.8 * step)
-        coded = streams.encode_source_rest(branches, step, reference, source.source_rest)
+    pose = source.source_rest
+
+    def encode(step: float) -> streams.CodedRest:
+        return streams.encode_source_rest(branches, step, reference, pose)
+
+    coded = _within(tolerance, pose, encode, qz.single(qz.SOURCE_REST_STEP * tolerance))
     return ct.pack_source_rest(coded.step, coded.stream)
 
 
