@@ -21,7 +21,7 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
 from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
-from athcodec.metrics import ErrorMeter, compare_clips
+from athcodec.metrics import ErrorMeter, MotionMeter, compare_clips, edges_of, stem_links
 from athcodec.units import Length
 
 ROUNDING = 1e-6
@@ -184,7 +184,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
         weights = decoder.error_weights
-        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.levels]
+        meters = _meters(decoder, clip)
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
             for number, meter in enumerate(meters):
@@ -194,20 +194,31 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
     levels = [_measured(level, meter) for level, meter in zip(decoder.levels, meters, strict=True)]
     if weights is not None:
         promised = decoder.max_error_bound / float(weights.max())
-        levels[-1]["kept"] &= meters[-1].max_weighted_error <= promised * (1 + ROUNDING)
+        levels[-1]["kept"] &= meters[-1].error.max_weighted_error <= promised * (1 + ROUNDING)
     return levels
 
 
-def _measured(level: Level, meter: ErrorMeter) -> dict[str, Any]:
-    return {
-        "level": level.level,
-        "promised_max_error": level.max_error,
-        "max_error": meter.max_error,
-        "rms_error": meter.rms_error,
-        "kg_error_percent": meter.kg_error,
-        "motion_normalised_error": meter.motion_normalised_error,
-        "kept": meter.max_error <= level.max_error * (1 + ROUNDING),
-    }
+def _meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
+    """One for each level, whose bound is what it promises, but not less than the file does."""
+    edges = edges_of(clip)
+    if edges is None:
+        edges = stem_links(decoder.vertex_branch, decoder.stem_index)
+    return [
+        MotionMeter(
+            clip,
+            bound=max(level.max_error, decoder.max_error_bound),
+            weights=decoder.error_weights,
+            starts=[start for start, _ in decoder.segments],
+            loop=decoder.clip.loop,
+            edges=edges,
+        )
+        for level in decoder.levels
+    ]
+
+
+def _measured(level: Level, meter: MotionMeter) -> dict[str, Any]:
+    kept = meter.error.max_error <= level.max_error * (1 + ROUNDING)
+    return {"level": level.level, "promised_max_error": level.max_error} | meter.figures() | {"kept": kept}
 
 
 def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:
