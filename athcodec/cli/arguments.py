@@ -414,6 +414,13 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
+    verb.add_argument(
+        "--motion",
+        action="store_true",
+        help="decode every level as well, and say how much more it jerks near the seams between segments, and "
+        "near that of a loop, than in its median frame",
+    )
+    _host_mesh_argument(verb, ", which --motion takes")
     _stats_argument(verb)
     verb.add_argument("--json", action="store_true", help="print as JSON")
 

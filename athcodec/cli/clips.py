@@ -21,7 +21,7 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
 from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
-from athcodec.metrics import ErrorMeter, MotionMeter, compare_clips, edges_of, stem_links
+from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, edges_of, stem_links
 from athcodec.units import Length
 
 ROUNDING = 1e-6
@@ -198,6 +198,28 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
     return levels
 
 
+def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
+    """Of each clip, at each level that is complete, how much more it jerks near seams than in its median frame."""
+    ratios: list[list[float | None]] = []
+    with progress() as report:
+        for clip in decoder.clips:
+            played = decoder.play(clip.name)
+            meters = [SmoothnessMeter(clip.frame_count, **_seams(played)) for level in played.levels]
+            for start, stop in played.segments:
+                for number, meter in enumerate(meters[: decoder.deepest + 1]):
+                    frames = played.positions(slice(start, stop), number)
+                    meter.add(frames, frames)
+                if report:
+                    report("measure", (clip.first_frame + stop) / decoder.file.frame_count)
+            ratios.append([meter.tick_ratio for meter in meters])
+    return ratios
+
+
+def _seams(decoder: Decoder) -> dict[str, Any]:
+    """Where a clip has seams, for a SmoothnessMeter."""
+    return {"starts": [start for start, _ in decoder.segments], "loop": decoder.clip.loop}
+
+
 def _meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
     """One for each level, whose bound is what it promises, but not less than the file does."""
     edges = edges_of(clip)
@@ -208,9 +230,8 @@ def _meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
             clip,
             bound=max(level.max_error, decoder.max_error_bound),
             weights=decoder.error_weights,
-            starts=[start for start, _ in decoder.segments],
-            loop=decoder.clip.loop,
             edges=edges,
+            **_seams(decoder),
         )
         for level in decoder.levels
     ]

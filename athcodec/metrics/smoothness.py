@@ -164,7 +164,7 @@ def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
     if np.isnan(values).all():
         return None
     worst, median = float(np.nanmax(values)), float(np.nanmedian(acceleration))
-    return worst / median if median else inf if worst else 0.0
+    return worst / median if 0 < median < inf else inf if worst else 0.0
 
 
 def _squares(vectors: np.ndarray) -> np.ndarray:
