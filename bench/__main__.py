@@ -31,6 +31,7 @@ from bench import (
     report,
     scale,
     sizes,
+    smoothness,
     speed,
     tables,
     viewer,
@@ -58,6 +59,7 @@ VERBS = {
     "remote": remote,
     "fault-injection": fault_injection,
     "motions": motions,
+    "smoothness": smoothness,
 }
 
 
