@@ -30,6 +30,7 @@ from bench import (
     remote,
     report,
     scale,
+    side_by_side,
     sizes,
     smoothness,
     speed,
@@ -60,6 +61,7 @@ VERBS = {
     "fault-injection": fault_injection,
     "motions": motions,
     "smoothness": smoothness,
+    "compare": side_by_side,
 }
 
 
