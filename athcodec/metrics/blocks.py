@@ -31,7 +31,7 @@ def paired(reference: np.ndarray, decoded: np.ndarray, values: int = 0) -> Itera
 class Spread:
     """Root mean square and quantiles of values from 0 on, of which there may be any number; NaN counts as infinite.
 
-    Quantiles are at most 0.4 % too large: values are counted in bins, 256 for each power of two.
+    Quantiles are at most 0.4 % too large: values are counted in bins, 256 for each power of two, as float32.
 
     Attributes
     ----------

@@ -172,7 +172,8 @@ def _by_size(counts: np.ndarray, indices: np.ndarray) -> list[np.ndarray]:
 def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(k, F, 3) vectors along the normals, as long as the areas, of (F, size) faces; and (k, F) how far a face reaches
     from its first corner."""
-    spokes = [frames[:, faces[:, corner]] - frames[:, faces[:, 0]] for corner in range(1, faces.shape[1])]
+    first, *others = (frames.take(corners, axis=1) for corners in faces.T)
+    spokes = [corner - first for corner in others]
     vector = np.zeros_like(spokes[0])
     for one, other in zip(spokes, spokes[1:]):
         vector += np.cross(one, other)
@@ -182,7 +183,7 @@ def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """(k, E) lengths."""
-    along = frames[:, edges[:, 1]] - frames[:, edges[:, 0]]
+    along = frames.take(edges[:, 1], axis=1) - frames.take(edges[:, 0], axis=1)
     return np.sqrt(np.einsum("tei,tei->te", along, along))
 
 
