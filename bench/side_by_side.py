@@ -13,14 +13,14 @@ import html
 import json
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import athcodec
-from athcodec.metrics import MotionMeter, edges_of, second_differences, stem_links
+from athcodec.metrics import MotionMeter, edges_of, level_meters, second_differences, stem_links
 from bench.clips import add_effort, add_ladder, add_segment_frames, encoded
 from bench.tables import table
 
@@ -36,9 +36,11 @@ class Panel:
     name: str
     about: str
     positions: np.ndarray
-    seams: list[int] = field(default_factory=list)
-    bound: float | None = None
     meter: MotionMeter | None = None
+
+    @property
+    def seams(self) -> list[int]:
+        return self.meter.smoothness.seams if self.meter else []
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,59 +76,47 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         for rel_error in args.rel_error:
             how = {"effort": args.effort, "ladder": args.ladder, "segment_frames": args.segment_frames}
             with encoded(args.clip, rel_error, **how) as result:
-                panels += _levels(result.decoder, f"Bound {rel_error:g}", args.level)
+                panels += _levels(result.decoder, clip, f"Bound {rel_error:g}", args.level)
         for path in args.files:
-            panels += _of_file(path, clip, args)
-        links = _links(clip, panels[1:])
+            panels += _of_file(path, clip, source, args)
         for panel in panels[1:]:
-            panel.meter = _meter(clip, source, panel, links)
-        text = _page(args.clip.stem, clip, panels, links)
+            panel.meter.add(source, panel.positions)
+        text = _page(args.clip.stem, clip, panels)
     args.out.write_text(text, "utf-8")
     rows = [_row(panel) for panel in panels[1:]]
     return {"tables": [table(f"{args.out.name}: {len(text):,} bytes", rows)], "broken": []}
 
 
-def _levels(decoder: athcodec.Decoder, name: str, levels: Sequence[int] | None) -> Iterator[Panel]:
-    seams = [start for start, _ in decoder.segments[1:]] + ([0] if decoder.clip.loop else [])
+def _levels(
+    decoder: athcodec.Decoder, clip: athcodec.MotionClip, name: str, levels: Sequence[int] | None
+) -> Iterator[Panel]:
+    _check(name, (decoder.frame_count, decoder.vertex_count), clip)
+    meters = level_meters(decoder, clip)
     for number in levels or [decoder.deepest]:
         level = decoder.levels[number]
-        yield Panel(
-            f"{name}, level {number}",
-            f"{level.name}, {level.bytes:,} bytes",
-            decoder.positions(level=number, dtype=np.float64),
-            seams,
-            max(level.max_error, decoder.max_error_bound),
-        )
+        positions = decoder.positions(level=number, dtype=np.float64)
+        yield Panel(f"{name}, level {number}", f"{level.name}, {level.bytes:,} bytes", positions, meters[number])
 
 
-def _of_file(path: Path, clip: athcodec.MotionClip, args: argparse.Namespace) -> Iterator[Panel]:
+def _of_file(path: Path, clip: athcodec.MotionClip, source: np.ndarray, args: argparse.Namespace) -> Iterator[Panel]:
     if path.suffix == ".ath":
         with athcodec.open(path, host_mesh=clip) as decoder:
-            yield from _levels(decoder, path.name, args.level)
+            yield from _levels(decoder, clip, path.name, args.level)
         return
     with athcodec.read(path) as other:
-        yield Panel(path.name, f"{path.stat().st_size:,} bytes", other.block(0, other.frame_count).astype(np.float64))
+        _check(path.name, (other.frame_count, other.vertex_count), clip)
+        positions = other.block(0, other.frame_count).astype(np.float64)
+        bound = float(np.sqrt(((positions - source) ** 2).sum(axis=2).max()))  # it says none
+        yield Panel(path.name, f"{path.stat().st_size:,} bytes", positions, MotionMeter(clip, bound=bound or 1.0))
 
 
-def _links(clip: athcodec.MotionClip, panels: Sequence[Panel]) -> np.ndarray:
-    links = edges_of(clip)
-    if links is None:  # a clip without faces, edges and branches: its vertices in their order
-        links = stem_links(np.zeros(clip.vertex_count, np.int32))
-    return links
+def _check(name: str, got: tuple[int, int], clip: athcodec.MotionClip) -> None:
+    expected = clip.frame_count, clip.vertex_count
+    if got != expected:
+        raise SystemExit(f"{name}: got {got} frames and vertices, expected {expected} as of the source")
 
 
-def _meter(clip: athcodec.MotionClip, source: np.ndarray, panel: Panel, links: np.ndarray) -> MotionMeter:
-    if panel.positions.shape != source.shape:
-        raise SystemExit(f"{panel.name}: got shape {panel.positions.shape}, expected {source.shape} as of the source")
-    if panel.bound is None:
-        panel.bound = float(np.sqrt(((panel.positions - source) ** 2).sum(axis=2).max()))
-    loop = 0 in panel.seams
-    meter = MotionMeter(clip, bound=panel.bound or 1.0, starts=panel.seams, loop=loop, edges=links)
-    meter.add(source, panel.positions)
-    return meter
-
-
-def _page(title: str, clip: athcodec.MotionClip, panels: Sequence[Panel], links: np.ndarray) -> str:
+def _page(title: str, clip: athcodec.MotionClip, panels: Sequence[Panel]) -> str:
     source = panels[0].positions
     low = np.min([panel.positions.min(axis=(0, 1)) for panel in panels], axis=0)
     high = np.max([panel.positions.max(axis=(0, 1)) for panel in panels], axis=0)
@@ -141,7 +131,7 @@ def _page(title: str, clip: athcodec.MotionClip, panels: Sequence[Panel], links:
         "grid": GRID,
         "heat": HEAT,
         "triangles": _packed(_triangles(clip).astype("<u4")),
-        "links": _packed(links.astype("<u4")),
+        "links": _packed(_links(clip).astype("<u4")),
         "panels": [_panel_data(panel, source, middle, half) for panel in panels],
     }
     inside = json.dumps(data).replace("<", "\\u003c")
@@ -159,7 +149,7 @@ def _panel_data(panel: Panel, source: np.ndarray, middle: np.ndarray, half: floa
     }
     if panel.meter is None:
         return data | {"acceleration": _series(_rms(source))}
-    heat = _heat(panel.positions - source, panel.bound or 1.0, 0 in panel.seams)
+    heat = _heat(panel.positions - source, panel.meter.bounds, 0 in panel.seams)
     return data | {"acceleration": _series(panel.meter.smoothness.acceleration), "heat": _packed(heat)}
 
 
@@ -177,13 +167,19 @@ def _said(panel: Panel) -> Iterator[str]:
     yield f"edges stretched by {shape.stretch.rms:.2%}{angle}, RMS"
 
 
-def _heat(error: np.ndarray, bound: float, loop: bool) -> np.ndarray:
+def _heat(error: np.ndarray, bound: float | np.ndarray, loop: bool) -> np.ndarray:
     """(T, N) uint8: second differences of the error, HEAT for a bound."""
     around = np.concatenate([error[-1:], error, error[:1]]) if loop else np.pad(error, ((1, 1), (0, 0), (0, 0)))
     sizes = np.sqrt((second_differences(around) ** 2).sum(axis=2)) / bound
     if not loop:
         sizes[[0, -1]] = 0
     return np.minimum(np.rint(sizes * HEAT), 255).astype(np.uint8)
+
+
+def _links(clip: athcodec.MotionClip) -> np.ndarray:
+    """Lines to draw: those whose stretch is measured, or the vertices in their order."""
+    links = edges_of(clip)
+    return stem_links(np.zeros(clip.vertex_count, np.int32)) if links is None else links
 
 
 def _rms(frames: np.ndarray) -> np.ndarray:
@@ -220,7 +216,7 @@ def _row(panel: Panel) -> dict[str, Any]:
     return {
         "panel": panel.name,
         "what": panel.about,
-        "max/bound": figures["max_error"] / panel.bound if panel.bound else 0.0,
+        "max": figures["max_error"],
         "d2 max": figures["smoothness"]["max_second_difference"],
         "d2 RMS": figures["smoothness"]["rms_second_difference"],
         "tick ratio": figures["smoothness"]["tick_ratio"],

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.metrics import SmoothnessMeter
+from athcodec.ath_file import Level
+from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from bench import plots
 from bench.clips import Encoded, add_clips, add_effort, add_ladder, add_rel_error, add_segment_frames, encoded
 from bench.tables import table
@@ -19,7 +20,8 @@ NOTE = """
 d2: second difference over frames of the error, in bounds of the level: the largest error that it promises, at least
 the file's. Share: of vertices whose d2 is above 1, in the worst and in the median frame. Tick ratio: RMS over vertices
 of the decoded positions' second difference in the worst frame within two of a seam between segments, or of a loop's
-seam, over the median frame; beside it the source's own in the same frames.
+seam, over the median frame; beside it the source's own in the same frames. Stretch of edges, and degrees by which
+normals of faces are off: RMS.
 """
 
 
@@ -48,36 +50,35 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         tables.append(table(f"Smoothness: {title}", rows, NOTE))
         if args.picture and number == 0:
             names = [f"level {row['level']} ({row['name']})" for row in rows]
-            plots.save(_picture(meters, names, title), args.picture)
+            plots.save(_picture([meter.smoothness for meter in meters], names, title), args.picture)
     return {"tables": tables, "broken": []}
 
 
-def _measure(result: Encoded) -> list[SmoothnessMeter]:
+def _measure(result: Encoded) -> list[MotionMeter]:
     """One for each level."""
-    clip, decoder = result.clip, result.decoder
-    starts = [start for start, _ in decoder.segments]
-    meters = []
-    for level in decoder.levels:
-        bound = max(level.max_error, decoder.max_error_bound)
-        meter = SmoothnessMeter(clip.frame_count, bound, starts, decoder.clip.loop)
-        for start, block in decoder.blocks(level.level):
-            meter.add(clip.block(start, start + len(block)), block)
-        meters.append(meter)
+    meters = level_meters(result.decoder, result.clip)
+    for start, stop in result.decoder.segments:
+        source = result.clip.block(start, stop)
+        for number, meter in enumerate(meters):
+            meter.add(source, result.decoder.positions(slice(start, stop), number))
     return meters
 
 
-def _row(stored: Any, meter: SmoothnessMeter) -> dict[str, Any]:
+def _row(stored: Level, meter: MotionMeter) -> dict[str, Any]:
+    smoothness, figures = meter.smoothness, meter.figures()
     return {
         "level": stored.level,
         "name": stored.name,
         "bytes": stored.bytes,
-        "d2 max": meter.max_error_acceleration,
-        "in frame": meter.worst_frame,
-        "d2 RMS": meter.rms_error_acceleration,
-        "share": meter.worst_share,
-        "median share": meter.median_share,
-        "tick ratio": meter.tick_ratio,
-        "source's": meter.source_tick_ratio,
+        "d2 max": smoothness.max_error_acceleration,
+        "in frame": smoothness.worst_frame,
+        "d2 RMS": smoothness.rms_error_acceleration,
+        "share": smoothness.worst_share,
+        "median share": smoothness.median_share,
+        "tick ratio": smoothness.tick_ratio,
+        "source's": smoothness.source_tick_ratio,
+        "stretch": figures["shape"]["rms_stretch"],
+        "normals": figures["shape"]["rms_normal_angle"],
     }
 
 

@@ -21,7 +21,7 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
 from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
-from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, edges_of, stem_links
+from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.units import Length
 
 ROUNDING = 1e-6
@@ -184,7 +184,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
         weights = decoder.error_weights
-        meters = _meters(decoder, clip)
+        meters = level_meters(decoder, clip)
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
             for number, meter in enumerate(meters):
@@ -204,7 +204,8 @@ def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
     with progress() as report:
         for clip in decoder.clips:
             played = decoder.play(clip.name)
-            meters = [SmoothnessMeter(clip.frame_count, **_seams(played)) for level in played.levels]
+            starts = [start for start, _ in played.segments]
+            meters = [SmoothnessMeter(clip.frame_count, starts=starts, loop=clip.loop) for _ in played.levels]
             for start, stop in played.segments:
                 for number, meter in enumerate(meters[: decoder.deepest + 1]):
                     frames = played.positions(slice(start, stop), number)
@@ -213,28 +214,6 @@ def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
                     report("measure", (clip.first_frame + stop) / decoder.file.frame_count)
             ratios.append([meter.tick_ratio for meter in meters])
     return ratios
-
-
-def _seams(decoder: Decoder) -> dict[str, Any]:
-    """Where a clip has seams, for a SmoothnessMeter."""
-    return {"starts": [start for start, _ in decoder.segments], "loop": decoder.clip.loop}
-
-
-def _meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
-    """One for each level, whose bound is what it promises, but not less than the file does."""
-    edges = edges_of(clip)
-    if edges is None:
-        edges = stem_links(decoder.vertex_branch, decoder.stem_index)
-    return [
-        MotionMeter(
-            clip,
-            bound=max(level.max_error, decoder.max_error_bound),
-            weights=decoder.error_weights,
-            edges=edges,
-            **_seams(decoder),
-        )
-        for level in decoder.levels
-    ]
 
 
 def _measured(level: Level, meter: MotionMeter) -> dict[str, Any]:

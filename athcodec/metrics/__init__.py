@@ -8,7 +8,7 @@ vertex crumples faces. `SmoothnessMeter` and `ShapeMeter` measure that, `MotionM
 
 from athcodec.metrics.blocks import Spread
 from athcodec.metrics.error import ErrorMeter, bits_per_vertex_frame, compare_clips
-from athcodec.metrics.motion import MotionMeter
+from athcodec.metrics.motion import MotionMeter, level_meters
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter, second_differences, tick_ratio
 
@@ -21,6 +21,7 @@ __all__ = [
     "bits_per_vertex_frame",
     "compare_clips",
     "edges_of",
+    "level_meters",
     "second_differences",
     "stem_links",
     "tick_ratio",

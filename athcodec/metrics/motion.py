@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.metrics.error import ErrorMeter
-from athcodec.metrics.shape import ShapeMeter, edges_of
+from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter
+
+if TYPE_CHECKING:
+    from athcodec.decoder import Decoder
 
 TAIL = 0.999
 """The quantile of edges and faces that is given: one in a thousand is worse."""
@@ -35,6 +38,8 @@ class MotionMeter:
 
     Attributes
     ----------
+    bounds : float or (N,) array
+        The bound of all vertices, or of each.
     error : ErrorMeter
     smoothness : SmoothnessMeter
     shape : ShapeMeter
@@ -50,9 +55,9 @@ class MotionMeter:
         loop: bool = False,
         edges: np.ndarray | None = None,
     ) -> None:
-        bounds = bound if weights is None else bound * weights / weights.max()
+        self.bounds = bound if weights is None else bound * weights / weights.max()
         self.error = ErrorMeter(clip.rest, weights)
-        self.smoothness = SmoothnessMeter(clip.frame_count, bounds, starts, loop)
+        self.smoothness = SmoothnessMeter(clip.frame_count, self.bounds, starts, loop)
         self.shape = ShapeMeter(edges_of(clip) if edges is None else edges, clip.polygons)
 
     def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
@@ -110,6 +115,38 @@ class MotionMeter:
             "tail_excess_turn": shape.excess_turn.quantile(TAIL),
         }
         return _or_none(edges, shape.edge_count) | _or_none(faces, shape.face_count)
+
+
+def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
+    """An empty meter for each level of a decoder, to which the frames of all segments are to be added.
+
+    The bound of a level is the largest error that it promises, but not less than the file's bound.
+
+    Parameters
+    ----------
+    decoder : Decoder
+    clip : MotionClip
+        Its source.
+
+    Returns
+    -------
+    list of MotionMeter
+        In the order of ``decoder.levels``.
+    """
+    edges = edges_of(clip)
+    if edges is None:
+        edges = stem_links(decoder.vertex_branch, decoder.stem_index)
+    return [
+        MotionMeter(
+            clip,
+            bound=max(level.max_error, decoder.max_error_bound),
+            weights=decoder.error_weights,
+            starts=[start for start, _ in decoder.segments],
+            loop=decoder.clip.loop,
+            edges=edges,
+        )
+        for level in decoder.levels
+    ]
 
 
 def _or_none(figures: dict[str, Any], count: int) -> dict[str, Any]:
