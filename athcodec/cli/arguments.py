@@ -432,7 +432,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
         "--against",
         metavar="SOURCE",
         action="append",
-        help="the source: measure the error of every level; of several clips all, in the file's order",
+        help="the source: measure error, smoothness and shape of every level; of several clips all, in order",
     )
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _host_mesh_argument(verb, " (default: the first SOURCE; without any, only checksums are compared)")
