@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from athcodec import errors
+from athcodec import errors, metrics
 from athcodec.ath import Ath, Thresholds, build_ath
 from athcodec.ath_file import AthFile
 from athcodec.clip import MotionClip
@@ -34,6 +34,7 @@ __all__ = [
     "find_branches",
     "join",
     "looped",
+    "metrics",
     "open",
     "read",
     "read_hdf5",

@@ -30,7 +30,9 @@ from bench import (
     remote,
     report,
     scale,
+    side_by_side,
     sizes,
+    smoothness,
     speed,
     tables,
     viewer,
@@ -58,6 +60,8 @@ VERBS = {
     "remote": remote,
     "fault-injection": fault_injection,
     "motions": motions,
+    "smoothness": smoothness,
+    "compare": side_by_side,
 }
 
 

@@ -63,6 +63,12 @@ def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:
     )
 
 
+def add_segment_frames(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--segment-frames", type=int, metavar="FRAMES", help="longest segment (default: the encoder's own choice)"
+    )
+
+
 def add_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--of",
@@ -79,13 +85,18 @@ def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> Non
 
 @contextmanager
 def encoded(
-    path: Path, rel_error: float, effort: str = "default", ladder: Sequence[float] = (), host_rest: bool = False
+    path: Path,
+    rel_error: float,
+    effort: str = "default",
+    ladder: Sequence[float] = (),
+    host_rest: bool = False,
+    segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
     """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
-        summary = athcodec.encode(clip, file, rel_error=rel_error, **settings)
+        summary = athcodec.encode(clip, file, rel_error=rel_error, segment_frames=segment_frames, **settings)
         with athcodec.open(file, strict=True, host_mesh=clip) as decoder:
             yield Encoded(clip, summary, decoder)
 

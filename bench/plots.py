@@ -39,8 +39,10 @@ def draw(contents: dict[str, list[dict[str, Any]]], clip: str, folder: Path, pre
     return [save(figure, folder / file_name(prefix + clip, what)) for what, figure in pictures.items()]
 
 
-def pyplot(inches: tuple[float, float]):
-    """A function that makes a figure of this size and its axes, without a display. Raises NoPlots."""
+def pyplot(inches: tuple[float, float], rows: int = 1):
+    """A function that makes a figure of this size and its axes, or an array of them below each other, without a
+    display. Raises NoPlots.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -50,7 +52,7 @@ def pyplot(inches: tuple[float, float]):
     def figure_of():
         figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
-        return figure, figure.add_subplot()
+        return figure, figure.subplots(rows, sharex=True)
 
     return figure_of
 

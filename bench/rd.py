@@ -64,10 +64,12 @@ POINTS_NOTE = """
 Bound: largest distance of any vertex in any frame, over the diagonal of the bounding box of all frames; each
 codec tuned itself for the fewest bytes within it, everything that decoding needs counted. Bits: per vertex
 and frame. Max and RMS over the diagonal, KG in per cent, motion: RMS error over the RMS distance from the
-rest pose, all measured on what another process decoded from the bytes. Encode: seconds with all tuning,
-median of 3 runs, or a single run ('runs' 1) of a codec that takes more than a second. Decode: median of 3
-to 7 runs after one that does not count. MB (1,000,000 bytes): peak memory of the whole process, Python and
-imports included; when encoding with the clip in memory.
+rest pose, all measured on what another process decoded from the bytes. d2: second difference over frames of
+the error, in bounds, of the worst vertex and frame and RMS; stretch: how much longer or shorter edges are
+than in the source; normals: the angle by which faces are turned, degrees; RMS and what one in a thousand exceeds.
+Encode: seconds with all tuning, median of 3 runs, or a single run ('runs' 1) of a codec that takes more
+than a second. Decode: median of 3 to 7 runs after one that does not count. MB (1,000,000 bytes): peak
+memory of the whole process, Python and imports included; when encoding with the clip in memory.
 """
 
 SAVINGS_NOTE = """
@@ -355,10 +357,19 @@ def _row(point: dict[str, Any]) -> dict[str, Any]:
         row |= {"decode s": point["decode_s"], "decode MB": point["decode_peak_bytes"] / 1e6, "bits": point["bits"]}
     if "max" in point:
         row |= {"max": point["max"], "RMS": point["rms"], "KG %": point["kg"], "motion": point["motion"]}
+    row |= {column: point.get("looks", {}).get(name) for column, name in LOOKS.items()}
     settings = point["settings"] if point["status"] == OK else f"{point['status'].upper()}: {point['why']}"
     return _ordered(row | {"settings": settings.replace("|", "/")})
 
 
+LOOKS = {
+    "d2 max": "max_second_difference",
+    "d2 RMS": "rms_second_difference",
+    "stretch": "rms_stretch",
+    "stretch 99.9 %": "tail_stretch",
+    "normals": "rms_normal_angle",
+    "normals 99.9 %": "tail_normal_angle",
+}
 COLUMNS = (
     "codec",
     "bound",
@@ -368,6 +379,7 @@ COLUMNS = (
     "RMS",
     "KG %",
     "motion",
+    *LOOKS,
     "encode s",
     "runs",
     "decode s",

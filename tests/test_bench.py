@@ -21,7 +21,7 @@ from athcodec.container import KIND_NAMES
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
-from bench import charts, codec_registry, compare, paper, plots  # noqa: E402
+from bench import charts, codec_registry, compare, paper, plots, rd, tables  # noqa: E402
 from bench.curves import Curve, mean_saving  # noqa: E402
 from bench.store import Store, read  # noqa: E402
 
@@ -229,11 +229,23 @@ def test_a_failure_of_a_codec_is_reported_in_its_row(tmp_path, bushy_file):
         "absent": "missing",
     }
     assert 0 < points["rounded"]["max"] <= 1e-3 < points["too coarse"]["max"]
+    assert 0 < points["rounded"]["looks"]["rms_second_difference"] < 4
+    assert points["too coarse"]["looks"]["max_second_difference"] > points["rounded"]["looks"]["max_second_difference"]
+    assert float(cells_of(text, "Rate and distortion: bushy")["d2 max"]) > 0
     assert "sizes: got 3, expected 4" in points["raising"]["why"]
     assert all(
         f"{point['status'].upper()}: {point['why']}" in text for name, point in points.items() if name != "rounded"
     )
     assert "\nBROKEN" not in text  # of programs; a baseline that breaks its bound is our own mistake
+
+
+def test_results_from_before_a_measure_print_without_it():
+    old = point("athcodec", "athcodec", 1e-3, 100, 0.1) | {"clip": "oak", "cpu": "any", "settings": "", "bits": 1.0}
+    times = {"encode_s": 1.0, "encode_runs": 1, "encode_peak_bytes": 1, "decode_s": 1.0, "decode_peak_bytes": 1}
+    contents = {"clips": [], "points": [old | times | {"motion": 0.1}], "curves": [], "costs": []}
+    text = tables.as_text({"command": "", "machine": {}, "versions": {}} | rd.summary(contents, ["oak"], None))
+    row = cells_of(text, rd.title("oak"))
+    assert [row[name] for name in rd.LOOKS] == ["-"] * len(rd.LOOKS) and row["bytes"] == "100"
 
 
 def test_a_baseline_that_breaks_its_bound_fails_the_run(tmp_path, bushy_file):

@@ -17,6 +17,7 @@ import pytest
 
 import athcodec
 from athcodec import cli
+from athcodec.cli.clips import tick_ratios
 from athcodec.metrics import compare_clips
 from athcodec.sources import read_hdf5, sample_path
 
@@ -247,6 +248,57 @@ def test_verify_accepts_a_whole_file_and_measures_it(encoded, capsys):
         distance = np.linalg.norm(decoder.positions(level=2) - clip.block(0, 120).astype(float), axis=2)
     assert found["clips"][0]["levels"][2]["max_error"] == pytest.approx(distance.max())
     assert found["clips"][0]["levels"][2]["rms_error"] == pytest.approx(np.sqrt((distance**2).mean()))
+
+
+def test_verify_measures_smoothness_and_shape_of_every_level(sample_ath, capsys):
+    assert run("verify", sample_ath, "--against", SAMPLE, "--json") == 0
+    levels = json.loads(capsys.readouterr().out)["clips"][0]["levels"]
+    with athcodec.open(sample_ath) as decoder, read_hdf5(SAMPLE) as clip:
+        source, bound = clip.block(0, 120).astype(float), decoder.max_error_bound
+        decoded = [decoder.positions(level=number).astype(float) for number in range(decoder.level_count)]
+        edges = clip.edges
+    jerk = np.linalg.norm(np.diff(decoded[-1] - source, 2, axis=0), axis=2) / bound
+    looks = levels[-1]["smoothness"]
+    assert looks["max_second_difference"] == pytest.approx(jerk.max())
+    assert looks["rms_second_difference"] == pytest.approx(np.sqrt((jerk**2).mean()))
+    assert looks["worst_share_above_bound"] == pytest.approx((jerk > 1).mean(axis=1).max())
+    assert looks["median_share_above_bound"] == pytest.approx(np.median((jerk > 1).mean(axis=1)))
+    near = np.array([38, 39, 40, 41, 78, 79, 80, 81]) - 1  # of segments of 40 frames
+    for level, positions in zip(levels, decoded, strict=True):
+        rms = np.sqrt((np.diff(positions, 2, axis=0) ** 2).sum(axis=2).mean(axis=1))
+        assert level["smoothness"]["tick_ratio"] == pytest.approx(rms[near].max() / np.median(rms))
+        one, other = (np.linalg.norm(np.diff(x[:, edges], axis=2)[:, :, 0], axis=2) for x in (source, positions))
+        assert level["shape"]["rms_stretch"] == pytest.approx(np.sqrt(((other / one - 1) ** 2).mean()), rel=1e-4)
+        assert level["shape"]["tail_stretch"] == pytest.approx(np.quantile(np.abs(other / one - 1), 0.999), rel=0.01)
+    assert levels[0]["smoothness"]["tick_ratio"] > levels[-1]["smoothness"]["tick_ratio"]
+
+    assert run("verify", sample_ath, "--against", SAMPLE) == 0
+    out = capsys.readouterr().out
+    assert "Smoothness: " in out and "Shape: 1,000 edges" in out
+    assert "normals" not in out, "the sample has no faces"
+
+
+def test_info_tells_ticks_at_seams_without_the_source(sample_ath, medley_ath, capsys):
+    assert run("verify", sample_ath, "--against", SAMPLE, "--json") == 0
+    measured = json.loads(capsys.readouterr().out)["clips"][0]["levels"]
+    assert run("info", sample_ath, "--motion", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    expected = [level["smoothness"]["tick_ratio"] for level in measured]
+    assert [level["tick_ratio"] for level in found["levels"]] == found["clips"][0]["tick_ratios"] == expected
+    assert run("info", sample_ath, "--motion") == 0
+    assert f"{expected[0]:.3g}" in capsys.readouterr().out
+    with athcodec.open(medley_ath) as decoder:
+        for clip, ratios in zip(decoder.clips, tick_ratios(decoder), strict=True):
+            has_seams = clip.segment_count > 1 or clip.loop
+            assert [ratio is not None for ratio in ratios] == [has_seams] * decoder.level_count
+
+
+def test_info_decodes_nothing_unless_asked(encoded, facts, tmp_path, capsys):
+    assert "tick_ratio" not in facts["levels"][0]
+    part = cut(encoded, tmp_path / "cut.ath", facts["levels"][2]["bytes"])
+    assert run("info", part, "--motion", "--json") == 0
+    ratios = [level["tick_ratio"] for level in json.loads(capsys.readouterr().out)["levels"]]
+    assert [ratio is None for ratio in ratios] == [False] * 3 + [True] * 3
 
 
 @pytest.mark.parametrize("place", [0.0, 0.01, 0.1, 0.5, 0.9, 0.9999])

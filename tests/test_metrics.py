@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from athcodec import metrics
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-from athcodec.metrics import ErrorMeter, compare_clips
+from athcodec.metrics import ErrorMeter, blocks, compare_clips
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.integers(1, 9), st.integers(1, 12), st.integers(3, 60))
@@ -21,13 +20,13 @@ def test_streamed_figures_equal_their_definitions(seed, frames, vertices, block,
     x = rng.normal(size=(frames, vertices, 3)) + 50
     y = x + rng.normal(size=x.shape) * 1e-3
     rest = x[0] + 1
-    whole, metrics._SLICE_VALUES = metrics._SLICE_VALUES, slice_values
+    whole, blocks.SLICE_VALUES = blocks.SLICE_VALUES, slice_values
     try:
         meter = ErrorMeter(rest)
         for start in range(0, frames, block):
             meter.add(x[start : start + block], y[start : start + block])
     finally:
-        metrics._SLICE_VALUES = whole
+        blocks.SLICE_VALUES = whole
     distance = np.linalg.norm(x - y, axis=2)
     assert meter.max_error == pytest.approx(distance.max())
     assert (meter.worst_frame, meter.worst_vertex) == np.unravel_index(distance.argmax(), distance.shape)

@@ -414,6 +414,13 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
+    verb.add_argument(
+        "--motion",
+        action="store_true",
+        help="decode every level as well, and say how much more it jerks near the seams between segments, and "
+        "near that of a loop, than in its median frame",
+    )
+    _host_mesh_argument(verb, ", which --motion takes")
     _stats_argument(verb)
     verb.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -425,7 +432,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
         "--against",
         metavar="SOURCE",
         action="append",
-        help="the source: measure the error of every level; of several clips all, in the file's order",
+        help="the source: measure error, smoothness and shape of every level; of several clips all, in order",
     )
     verb.add_argument("--clip", metavar="NAME", help="compare this clip only")
     _host_mesh_argument(verb, " (default: the first SOURCE; without any, only checksums are compared)")

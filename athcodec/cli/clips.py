@@ -21,7 +21,7 @@ from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
 from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
-from athcodec.metrics import ErrorMeter, compare_clips
+from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
 from athcodec.units import Length
 
 ROUNDING = 1e-6
@@ -184,7 +184,7 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
         if got != expected:
             raise ClipError(f"got {got} frames and vertices, expected {expected} as in the .ath file")
         weights = decoder.error_weights
-        meters = [ErrorMeter(clip.rest, weights) for _ in decoder.levels]
+        meters = level_meters(decoder, clip)
         for start, stop in decoder.segments:
             reference = clip.block(start, stop)
             for number, meter in enumerate(meters):
@@ -194,20 +194,31 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dic
     levels = [_measured(level, meter) for level, meter in zip(decoder.levels, meters, strict=True)]
     if weights is not None:
         promised = decoder.max_error_bound / float(weights.max())
-        levels[-1]["kept"] &= meters[-1].max_weighted_error <= promised * (1 + ROUNDING)
+        levels[-1]["kept"] &= meters[-1].error.max_weighted_error <= promised * (1 + ROUNDING)
     return levels
 
 
-def _measured(level: Level, meter: ErrorMeter) -> dict[str, Any]:
-    return {
-        "level": level.level,
-        "promised_max_error": level.max_error,
-        "max_error": meter.max_error,
-        "rms_error": meter.rms_error,
-        "kg_error_percent": meter.kg_error,
-        "motion_normalised_error": meter.motion_normalised_error,
-        "kept": meter.max_error <= level.max_error * (1 + ROUNDING),
-    }
+def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
+    """Of each clip, at each level that is complete, how much more it jerks near seams than in its median frame."""
+    ratios: list[list[float | None]] = []
+    with progress() as report:
+        for clip in decoder.clips:
+            played = decoder.play(clip.name)
+            starts = [start for start, _ in played.segments]
+            meters = [SmoothnessMeter(clip.frame_count, starts=starts, loop=clip.loop) for _ in played.levels]
+            for start, stop in played.segments:
+                for number, meter in enumerate(meters[: decoder.deepest + 1]):
+                    frames = played.positions(slice(start, stop), number)
+                    meter.add(frames, frames)
+                if report:
+                    report("measure", (clip.first_frame + stop) / decoder.file.frame_count)
+            ratios.append([meter.tick_ratio for meter in meters])
+    return ratios
+
+
+def _measured(level: Level, meter: MotionMeter) -> dict[str, Any]:
+    kept = meter.error.max_error <= level.max_error * (1 + ROUNDING)
+    return {"level": level.level, "promised_max_error": level.max_error} | meter.figures() | {"kept": kept}
 
 
 def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -28,13 +28,54 @@ JUMP = 3
 
 LEVEL_COLUMNS = ["level", "", "nodes", "bytes", "share"]
 MEASURES = ["promised_max_error", "max_error", "rms_error", "kg_error_percent", "motion_normalised_error"]
+LEFT_OUT = {"left_out_edges": "an edge", "left_out_faces": "a face"}
 _TABLE_WIDTH = 250  # wider than any table here: a narrow terminal wraps its lines, nothing is left out
 
 Report = Callable[[str, float], None]
 
 
-def print_file(path: str, decoder: Decoder, as_json: bool) -> None:
+class Column(NamedTuple):
+    """How a measure is shown in a table."""
+
+    head: str
+    format: str = ".3g"
+
+    def cell(self, value: float | None) -> str:
+        return "" if value is None else f"{value:{self.format}}"
+
+
+TICK_RATIO = Column("tick ratio")
+LOOKS = {
+    "smoothness": {
+        "max_second_difference": Column("max"),
+        "rms_second_difference": Column("RMS"),
+        "worst_share_above_bound": Column("vertices above 1", ".1%"),
+        "median_share_above_bound": Column("in the median frame", ".1%"),
+        "tick_ratio": TICK_RATIO,
+        "source_tick_ratio": Column("source's own"),
+    },
+    "shape": {
+        "rms_stretch": Column("RMS stretch", ".2%"),
+        "tail_stretch": Column("99.9 %", ".2%"),
+        "rms_normal_angle": Column("RMS angle of normals (deg)"),
+        "tail_normal_angle": Column("99.9 % (deg)"),
+        "tail_excess_turn": Column("more turn per frame, 99.9 % (deg)"),
+        "degenerate_faces": Column("degenerate", ","),
+    },
+}
+"""What is shown of a level beside its errors, by the names of MotionMeter.figures."""
+
+
+def print_file(
+    path: str, decoder: Decoder, as_json: bool, tick_ratios: Sequence[Sequence[float | None]] | None = None
+) -> None:
+    """tick_ratios: of each clip at each level, where they were measured."""
     facts = facts_of(path, decoder)
+    if tick_ratios is not None:
+        for clip, ratios in zip(facts["clips"], tick_ratios, strict=True):
+            clip["tick_ratios"] = list(ratios)
+        for level, ratios in zip(facts["levels"], zip(*tick_ratios), strict=True):
+            level["tick_ratio"] = max((ratio for ratio in ratios if ratio is not None), default=None)
     if as_json:
         print_json(facts)
     else:
@@ -110,6 +151,10 @@ def _print_levels(facts: dict[str, Any]) -> None:
     cells = [
         [f"{level['bytes']:,}", *(f"{level[field]:.3g}" for field in measures.values())] for level in facts["levels"]
     ]
+    if "tick_ratio" in facts["levels"][0]:
+        columns.append(TICK_RATIO.head)
+        for row, level in zip(cells, facts["levels"], strict=True):
+            row.append(TICK_RATIO.cell(level["tick_ratio"]))
     print_table([*LEVEL_COLUMNS, *columns], _level_rows(facts, cells))
 
 
@@ -148,17 +193,41 @@ def print_verdict(result: dict[str, Any]) -> None:
     for clip in result["clips"]:
         if clip["name"]:
             print(f"{clip['name']}, against {clip['against']}:")
-        lengths = [_head(name, result["unit"]) for name in ("promised", "max", "RMS")]
-        rows = []
-        for level in clip["levels"]:
-            measures = [f"{level[name]:.4g}" for name in MEASURES]
-            rows.append([f"{level['level']}", *measures, "yes" if level["kept"] else "NO"])
-        print_table(["level", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
+        _print_errors(clip["levels"], result["unit"])
+        _print_looks(clip["levels"])
     if result["ok"]:
         sources = ", ".join(clip["against"] for clip in result["clips"])
         more = f"; every level is as close to {sources} as the file says" if sources else ""
         decodes = "every level decodes" if result["decoded"] else "nothing was decoded, which takes --host-mesh"
         print(f"{result['file']}: whole, all checksums match, {decodes}{more}")
+
+
+def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
+    lengths = [_head(name, unit) for name in ("promised", "max", "RMS")]
+    rows = [
+        [f"{level['level']}", *(f"{level[name]:.4g}" for name in MEASURES), "yes" if level["kept"] else "NO"]
+        for level in levels
+    ]
+    print_table(["level", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
+
+
+def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
+    """Smoothness and shape, each with the columns that the clip has something for."""
+    shape = levels[0]["shape"]
+    captions = {
+        "smoothness": "second differences over frames, of the error in bounds; tick ratio: those of the motion near "
+        "seams over those of its median frame",
+        "shape": " and ".join(f"{shape[name]:,} {name}" for name in ("edges", "faces") if shape[name]),
+    }
+    for part, columns in LOOKS.items():
+        shown = [name for name in columns if any(level[part][name] is not None for level in levels)]
+        rows = [[f"{level['level']}", *(columns[name].cell(level[part][name]) for name in shown)] for level in levels]
+        if shown:
+            print(f"{part.capitalize()}: {captions[part]}")
+            print_table(["level", *(columns[name].head for name in shown)], rows)
+    left_out = [f"{one} {shape[name]:,} times" for name, one in LEFT_OUT.items() if shape[name]]
+    if left_out:
+        print(f"Left out where the source has no extent: {', '.join(left_out)}.")
 
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:

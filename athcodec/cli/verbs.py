@@ -26,6 +26,7 @@ from athcodec.cli.clips import (
     read_clip,
     refuse_broken_promises,
     thresholds,
+    tick_ratios,
     view_to_decode,
     what_is_missing,
     with_branches,
@@ -193,8 +194,8 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def info(args: argparse.Namespace) -> int:
-    with open_file(args.file, args.stats) as decoder:
-        print_file(args.file, decoder, args.json)
+    with open_file(args.file, args.stats, host_mesh=args.host_mesh) as decoder:
+        print_file(args.file, decoder, args.json, tick_ratios(decoder) if args.motion else None)
     return 0
 
 

@@ -1,7 +1,7 @@
 """The error of decoded motion against its source: maximum, RMS, Karni-Gotsman and motion-normalised error.
 
-Blocks of frames are accumulated in float64, so clips larger than memory can be measured. The Karni-Gotsman error is
-that of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004. Positions alone are measured.
+The Karni-Gotsman error is that of "Compression of soft-body animation sequences", Computers & Graphics 28(1), 2004.
+Positions alone are measured.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ import numpy as np
 
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
-
-_SLICE_VALUES = 1 << 20
+from athcodec.metrics.blocks import paired
 
 
 class ErrorMeter:
@@ -62,14 +61,8 @@ class ErrorMeter:
         ValueError
             Where their shapes differ.
         """
-        reference, decoded = np.asarray(reference), np.asarray(decoded)
-        if reference.shape != decoded.shape or reference.ndim != 3 or reference.shape[2] != 3:
-            shapes = f"{reference.shape} and {decoded.shape}"
-            raise ValueError(f"blocks: got shapes {shapes}, expected two equal ones (k, N, 3)")
-        length = max(1, _SLICE_VALUES // max(1, reference.shape[1] * 3))
-        for start in range(0, len(reference), length):
-            part = slice(start, start + length)
-            self._add(reference[part].astype(np.float64), decoded[part].astype(np.float64))
+        for pair in paired(reference, decoded):
+            self._add(*pair)
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
         square = ((reference - decoded) ** 2).sum(axis=2)

@@ -1,0 +1,174 @@
+"""How smooth decoded motion is over frames: its second differences, those of its error, and jumps at seams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, nan, sqrt
+
+import numpy as np
+
+from athcodec.metrics.blocks import paired
+
+NEAR_SEAM = 2
+"""Frames on either side of a seam that count as near it."""
+
+
+class SmoothnessMeter:
+    """Accumulates second differences over frames: of the source, of what is decoded, and of the error between them.
+
+    The second difference at frame t is x(t - 1) - 2 x(t) + x(t + 1), in length per frame squared; clips whose frames
+    are not evenly spaced in time are taken as if they were. The first and the last frame have one in loops only.
+
+    Parameters
+    ----------
+    frame_count : int
+        Number of frames that will be added, T.
+    bound : float or (N,) array, optional
+        The error bound, of all vertices or of each, in which the figures of the error are given.
+    starts : sequence of int, optional
+        The first frame of each segment; where two of them meet is a seam.
+    loop : bool, optional
+        Whether the first frame follows the last, which is a seam too.
+
+    Attributes
+    ----------
+    source_acceleration, acceleration, error_acceleration : (T,) arrays
+        At each frame the RMS over vertices of the second difference, in the unit of the positions: of the source, as
+        decoded, of the error. NaN where there is none.
+    share : (T,) array
+        At each frame the share of vertices whose error's second difference is above the bound.
+    max_error_acceleration : float
+        Largest second difference of the error of any vertex in any frame, in bounds.
+    worst_frame, worst_vertex : int
+        Where that is.
+    """
+
+    def __init__(
+        self, frame_count: int, bound: float | np.ndarray = 1.0, starts: Sequence[int] = (), loop: bool = False
+    ) -> None:
+        self.seams = [start for start in starts if start > 0] + ([0] if loop else [])
+        self.source_acceleration, self.acceleration, self.error_acceleration, self.share = np.full(
+            (4, frame_count), nan
+        )
+        self.max_error_acceleration = 0.0
+        self.worst_frame = self.worst_vertex = 0
+        self._bound, self._loop = np.asarray(bound, np.float64), loop
+        self._square = 0.0
+        self._points = self._added = 0
+        self._first = self._last = np.empty((2, 0, 0, 3))  # of source and decoded, two frames at most
+
+    def add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        """Add the next frames.
+
+        Parameters
+        ----------
+        reference, decoded : (k, N, 3) float arrays
+
+        Raises
+        ------
+        ValueError
+            Where their shapes differ, or there are more frames than expected.
+        """
+        for pair in paired(reference, decoded):
+            both = np.stack(pair)
+            if self._added + both.shape[1] > len(self.acceleration):
+                raise ValueError(f"frames: got more than {len(self.acceleration)}, expected so many")
+            if not self._added:
+                self._first = self._last = both[:, :0]
+            first_known = self._added - self._last.shape[1] + 1
+            near = np.concatenate([self._last, both], axis=1)
+            self._measure(first_known, near)
+            self._first = np.concatenate([self._first, both[:, :2]], axis=1)[:, :2]
+            self._last = near[:, -2:]
+            self._added += both.shape[1]
+            if self._loop and self._added == len(self.acceleration) > 1:
+                around = np.concatenate([self._last, self._first], axis=1)
+                self._measure(self._added - 1, around)
+
+    def _measure(self, first: int, frames: np.ndarray) -> None:
+        """Measure at all of the (2, k, N, 3) frames but the first and the last, from frame number `first` on."""
+        if frames.shape[1] < 3:
+            return
+        source, decoded = second_differences(frames, axis=1)
+        with np.errstate(invalid="ignore"):
+            error = decoded - source
+        rows = np.arange(first, first + error.shape[0]) % len(self.acceleration)
+        for series, values in (
+            (self.source_acceleration, source),
+            (self.acceleration, decoded),
+            (self.error_acceleration, error),
+        ):
+            series[rows] = np.sqrt(_squares(values).mean(axis=1))
+        in_bounds = np.sqrt(_squares(error)) / self._bound
+        self.share[rows] = (in_bounds > 1).mean(axis=1)
+        frame, vertex = np.unravel_index(in_bounds.argmax(), in_bounds.shape)
+        if in_bounds[frame, vertex] > self.max_error_acceleration:
+            self.max_error_acceleration = float(in_bounds[frame, vertex])
+            self.worst_frame, self.worst_vertex = int(rows[frame]), int(vertex)
+        self._square += float((in_bounds**2).sum())
+        self._points += in_bounds.size
+
+    @property
+    def rms_error_acceleration(self) -> float:
+        """Root mean square over vertices and frames of the second difference of the error, in bounds."""
+        return sqrt(self._square / self._points) if self._points else 0.0
+
+    @property
+    def worst_share(self) -> float:
+        """`share` in the frame where it is largest; 0 without second differences."""
+        return float(np.nanmax(self.share)) if self._points else 0.0
+
+    @property
+    def median_share(self) -> float:
+        """`share` in the median frame; 0 without second differences."""
+        return float(np.nanmedian(self.share)) if self._points else 0.0
+
+    @property
+    def tick_ratio(self) -> float | None:
+        """What is decoded near seams, see `tick_ratio`."""
+        return tick_ratio(self.acceleration, self.seams)
+
+    @property
+    def source_tick_ratio(self) -> float | None:
+        """The source in the same frames: it may jerk itself."""
+        return tick_ratio(self.source_acceleration, self.seams)
+
+
+def second_differences(frames: np.ndarray, axis: int = 0) -> np.ndarray:
+    """x(t - 1) - 2 x(t) + x(t + 1) along an axis, which gets shorter by two."""
+    with np.errstate(invalid="ignore"):
+        return np.diff(frames, 2, axis=axis)
+
+
+def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
+    """How much more a motion jerks at its seams than usually: the largest acceleration near a seam over the median.
+
+    Parameters
+    ----------
+    acceleration : (T,) array
+        RMS over vertices of the second difference at each frame, NaN where there is none.
+    seams : sequence of int
+        The frames that begin behind a seam; 0 is the seam of a loop. Near are two frames on either side.
+
+    Returns
+    -------
+    float or None
+        None where no seam has a second difference near it; of a motion that stands still at the median frame infinite,
+        or 0 where it does near seams too.
+    """
+    near = (np.asarray(seams, int)[:, None] + np.arange(-NEAR_SEAM, NEAR_SEAM)).ravel()
+    loops = 0 in seams
+    count = len(acceleration)
+    near = near % count if loops else near[(near >= 0) & (near < count)]
+    values = acceleration[near]
+    if np.isnan(values).all():
+        return None
+    worst, median = float(np.nanmax(values)), float(np.nanmedian(acceleration))
+    return worst / median if 0 < median < inf else inf if worst else 0.0
+
+
+def _squares(vectors: np.ndarray) -> np.ndarray:
+    """Squared lengths of (..., 3) vectors, infinite where they are NaN."""
+    squares = np.einsum("...i,...i->...", vectors, vectors)
+    squares[np.isnan(squares)] = inf
+    return squares
