@@ -124,6 +124,7 @@ _PLAYING = {  # core/ath.h
     "ath_build": (c_int, [c_void_p, c_void_p, c_size_t]),
     "ath_refine_size": (c_int, [c_void_p, c_int32, c_void_p, c_void_p]),
     "ath_refine": (c_int, [c_void_p, c_int32, c_void_p, c_size_t]),
+    "ath_read_rest": (c_int, [c_void_p, c_void_p]),
     "ath_level_rest": (c_int, [c_void_p, c_int32, c_int, c_void_p, c_size_t]),
     "ath_get_info": (None, [c_void_p, c_void_p]),
     "ath_branches": (c_void_p, [c_void_p]),
