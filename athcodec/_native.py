@@ -170,7 +170,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_principal": (None, [c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_principal": (None, [c_int32, c_int32, *[c_void_p] * 4]),
     "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
     "ath_cosine_basis": (None, [c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
@@ -194,6 +194,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         None,
         [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_int32, c_void_p, c_int, c_void_p],
     ),
+    "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, *[c_void_p] * 6]),
     "ath_find_corrections": (
         c_int64,

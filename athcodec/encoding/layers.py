@@ -234,8 +234,8 @@ class _TimeBases:
     """The time bases of the layers of one segment: one, learned for the last layer, with more rows in each."""
 
     def __init__(self, last: Layer, positions: np.ndarray):
-        found = time_components(last.plan, last.settings, positions)
-        self._components = found.get(last.plan.level_count - 1)
+        level, learning = last.plan.level_count - 1, last.settings.learning_levels
+        self._components = time_components(last.plan, last.settings, positions, learning[-1:]).get(level)
         self._before: tuple[int, StreamBasis] | None = None
 
     def first(self, layer: Layer) -> dict[int, StreamBasis]:

@@ -27,16 +27,19 @@ from athcodec.encoding.segment import (
     CodedPrelude,
     Settings,
     Source,
+    StreamBasis,
     analyse,
     analyse_finely,
     branch_records,
     code_stems,
     lags,
-    learned_bases,
+    level_bases,
     loose_branches,
     thread_count,
+    time_components,
     with_best_lags,
 )
+from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
 from athcodec.segmentation import DEFAULT_SEGMENT
 
@@ -168,10 +171,6 @@ def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) 
     return with_best_lags(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
 
 
-def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: LearnedModes | None) -> SegmentMotion:
-    return analyse(plan, settings, positions, modes, learned_bases(plan, settings, positions))
-
-
 def _coarser(settings: Settings, ratio: int) -> Settings:
     """The same, so many times as coarse; the rest pose half of that."""
     return replace(
@@ -210,6 +209,7 @@ class Search:
         self.required_saving: float | None = None  # of REQUIRED_SAVINGS: the one that made the smallest file
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
+        self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
         self._layered = layered
         self._extra_trials, self._trials = 0, trials(effort, layered)
@@ -442,7 +442,7 @@ class Search:
         prelude = self.prelude(settings)
         learned_modes = self.learned_modes(prelude.plan, settings)
         try:
-            levels = sum(self._level_bytes(prelude, settings, learned_modes, sample) for sample in self.samples)
+            levels = sum(self._level_bytes(prelude, settings, learned_modes, i) for i in range(len(self.samples)))
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
         mode_bytes = 0.0
@@ -451,10 +451,11 @@ class Search:
         return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
 
     def _level_bytes(
-        self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, sample: SegmentSample
+        self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, number: int
     ) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
-        coded = code_stems(prelude, settings, sample.positions, learned_modes)
+        sample = self.samples[number]
+        coded = code_stems(prelude, settings, sample.positions, learned_modes, self._bases(settings, number))
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
@@ -467,11 +468,39 @@ class Search:
     def _prelude_bytes(self, prelude: CodedPrelude) -> float:
         return prelude.prelude_bytes * self.extrapolation.vertices
 
+    def _analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
+        """A sample in its integers."""
+        plan, positions = self.prelude(settings).plan, self.samples[number].positions
+        return analyse(plan, settings, positions, modes, self._bases(settings, number))
+
+    def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
+        """The time bases of the levels that learn theirs."""
+        if not any(settings.learned_bases):
+            return {}
+        step, components = self._learn_time(settings)
+        some = {level: own for level, own in components[number].items() if settings.learned_bases[level]}
+        return level_bases(some, settings.step / step)
+
+    def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
+        """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they
+        hardly depend on it."""
+        known = *self._turning(settings), settings.level_steps.tobytes()
+        if known not in self._time_components:
+            plan = self.prelude(settings).plan
+            levels = [level for level in range(self.levels) if plan.has_stems(level)]
+            found = [time_components(plan, settings, sample.positions, levels) for sample in self.samples]
+            self._time_components[known] = settings.step, found
+        return self._time_components[known]
+
+    def _turning(self, settings: Settings) -> tuple:
+        """What decides what is left for the modes of a piece."""
+        return settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
+
     def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
         """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
         if settings.learned_pieces is None and not everywhere:
             return None
-        known = settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
+        known = self._turning(settings)
         if known not in self._components:
             prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
@@ -515,12 +544,12 @@ class Search:
         modes, tracks = (
             sum(
                 estimated_bits(
-                    _analysed(prelude.plan, plain, sample.positions, some).coefficients,
+                    self._analysed(plain, number, some).coefficients,
                     pieces,
                     len(learned_modes.counts),
                 )
                 * sample.scale
-                for sample in self.samples
+                for number, sample in enumerate(self.samples)
             )
             for some in (None, learned_modes)
         )
@@ -538,6 +567,9 @@ class Search:
         some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
             list(pool.map(self.prelude, some.values()))
+            for settings in candidates:  # one after the other: the first one's step is that of all like it
+                if any(settings.learned_bases):
+                    self._learn_time(settings)
             costs = []
             for cost in pool.map(self.cost, candidates):
                 costs.append(cost)
@@ -656,7 +688,7 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment = _analysed(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
