@@ -64,7 +64,7 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
         for pieces, total in groups:
             for part in _parts(pieces, segment.frames * total.shape[1]):
                 rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
-                total[part] += rows @ rows.transpose(0, 2, 1)
+                total[part] += np.einsum("pif,pjf->pij", rows, rows)  # without NumPy's threads, see principal()
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
 

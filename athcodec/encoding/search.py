@@ -51,6 +51,8 @@ MEAN_POSE_WORTH = 6  # trials, to find the mean pose and learned modes about it
 PRELUDES_KEPT = 6  # between trials
 REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
+FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those of tips, save no more than that
+MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 WORTH = {
     "_with_learned_bases": 2,
@@ -311,7 +313,7 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels)
+        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
@@ -322,10 +324,18 @@ class Search:
         if ratio == 1 or not any(settings.rotation_step_factors):
             yield settings
             return
-        factor = settings.rotation_step_factors[self.prelude(settings).plan.main_level]
+        factor, least = settings.rotation_step_factors[self.prelude(settings).plan.main_level], math.inf
         for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, True), (0, False)]):
             candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
-            yield candidate if self.effort == "fast" else self._with_learned_modes(candidate)
+            if self.effort != "fast":
+                plain = replace(candidate, learned_pieces=None)
+                if self.cost(plain)[0] > MODES_SAVE * least:
+                    continue
+                candidate = self._with_learned_modes(candidate)
+                least = min(least, self.cost(candidate)[0])
+                if self.cost(candidate)[0] > LAYERS_SAVE * least:
+                    continue
+            yield candidate
 
     def _report(self, worth: int = 0) -> None:
         """Reports progress after work that counts as `worth` trials in addition to those made."""
@@ -621,12 +631,23 @@ class Search:
         return self._cheapest([settings, *candidates])
 
     def _with_rotations(self, settings: Settings) -> Settings:
-        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
-        candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
-        per_level = np.array([levels for _, levels in self._costs(candidates)])
-        mixed = replace(settings, rotation_step_factors=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
-        best = self._cheapest([settings, mixed, *candidates])
-        tips = [replace(own, only_tips=True) for own in (best, *candidates[1:]) if any(own.rotation_step_factors)]
+        def turning(factors: Sequence[int]) -> dict[int, Settings]:
+            return {k: replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors}
+
+        candidates = turning((0, 2) if self.effort == "fast" else FIRST_FACTORS)
+        unturned, *turned = (cost for cost, _ in self._costs(list(candidates.values())))
+        if self.effort != "fast" and min(turned) <= HOPELESS * unturned:
+            candidates = turning(qz.ROTATION_FACTORS)
+        factors = list(candidates)
+        per_level = np.array([levels for _, levels in self._costs(list(candidates.values()))])
+        mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
+        best = self._cheapest([settings, mixed, *candidates.values()])
+        most = HOPELESS * self.cost(best)[0]
+        tips = [
+            replace(own, only_tips=True)
+            for own in (best, *candidates.values())
+            if any(own.rotation_step_factors) and self.cost(own)[0] <= most
+        ]
         return self._cheapest([best, *tips])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
@@ -661,23 +682,25 @@ class Search:
 
     def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
         """Walks step and rest step in turn to the cheapest on geometric grids."""
-        for _ in range(WALKS):
-            before, settings = settings, self._walk(settings, "step", factor, math.inf)
+        for again in range(WALKS):
+            before, settings = settings, self._walk(settings, "step", factor, math.inf, again > 0)
             if self.source.reference_is_exact:
                 break
-            settings = self._walk(settings, "rest_step", rest_factor, self.extrapolation.rest_cap * settings.bound)
+            cap = self.extrapolation.rest_cap * settings.bound
+            settings = self._walk(settings, "rest_step", rest_factor, cap, again > 0)
             if (settings.step, settings.rest_step) == (before.step, before.rest_step):
                 break
         return settings
 
-    def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
+    def _walk(self, settings: Settings, name: str, factor: float, cap: float, again: bool) -> Settings:
         def moved(exponent: int) -> Settings:
             return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
 
         def costs_at(exponents) -> dict[int, float]:
             return dict(zip(exponents, (cost for cost, _ in self._costs([moved(e) for e in exponents]))))
 
-        costs = costs_at((-1, 0, 1, 2))  # a step to be coarse by far pays where one to be a little coarser does not
+        # at first: a step to be coarse by far may pay where one to be a little coarser does not
+        costs = costs_at((-1, 0, 1) if again else (-1, 0, 1, 2))
         while True:
             best = min(costs, key=costs.get)
             wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
