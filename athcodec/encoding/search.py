@@ -553,11 +553,7 @@ class Search:
         pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
         modes, tracks = (
             sum(
-                estimated_bits(
-                    self._analysed(plain, number, some).coefficients,
-                    pieces,
-                    len(learned_modes.counts),
-                )
+                estimated_bits(self._analysed(plain, number, some).coefficients, pieces, len(learned_modes.counts))
                 * sample.scale
                 for number, sample in enumerate(self.samples)
             )

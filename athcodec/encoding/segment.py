@@ -224,7 +224,6 @@ class CodedPrelude:
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
-        self.rest_slack = settings.rest_slack
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
 
 
