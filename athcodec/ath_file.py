@@ -160,6 +160,7 @@ class AthFile:
         self.bytes_read = 0
         self._lock = threading.Lock()
         self._rests_read = 0  # those of layers up to this level's
+        self._rest_read = -1, np.empty(0)  # the level that gave it
         self._owned = not hasattr(path, "read")
         self._source = _opened(path) if self._owned else cast(Any, path)
         try:
@@ -676,8 +677,12 @@ class AthFile:
             raise Truncated(
                 f"SOURCE_REST: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
             )
-        with self._poses_read(level, [ct.SOURCE_REST]):
-            return self._as_rest(self.core.rest(level))
+        known, pose = self._rest_read
+        if known != level:
+            with self._poses_read(level, [ct.SOURCE_REST]):
+                pose = self._as_rest(self.core.rest(level))
+            self._rest_read = level, pose
+        return pose.copy()
 
     def _as_rest(self, pose: np.ndarray) -> np.ndarray:
         """Of the source's type; beyond float32 infinite, as FORMAT.md rounds."""
