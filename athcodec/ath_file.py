@@ -9,7 +9,7 @@ from __future__ import annotations
 import builtins
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -160,6 +160,7 @@ class AthFile:
         self.bytes_read = 0
         self._lock = threading.Lock()
         self._rests_read = 0  # those of layers up to this level's
+        self._rest_read = -1, np.empty(0)  # the level that gave it
         self._owned = not hasattr(path, "read")
         self._source = _opened(path) if self._owned else cast(Any, path)
         try:
@@ -297,6 +298,10 @@ class AthFile:
             One of `chunks`.
         """
         return chunk.offset + chunk.length <= self.available_length
+
+    def _lacks(self, kind: int) -> bool:
+        """Whether the file was cut off before a chunk of this kind."""
+        return not all(map(self.is_available, self._chunks_of(kind)))
 
     def payload(self, chunk: Chunk) -> bytes:
         """A chunk's bytes as stored.
@@ -489,8 +494,12 @@ class AthFile:
             parts.append(f"level {level}: " + (f"segments {first}-{last}" if first < last else f"segment {first}"))
         if self._damaged_from < self.level_count:
             parts.append(f"damaged from level {self._damaged_from}")
-        if not self.complete and not parts:
+        if not parts and self._lacks(ct.ATTRIBUTE):
             parts.append("attributes behind the motion")
+        if self.rest_is_missing:
+            parts.append("rest pose of the source")
+        if not self.complete and not parts:
+            parts.append("what is behind the motion")
         return "; ".join(parts)
 
     def _level_end(self, level: int) -> int:
@@ -653,15 +662,32 @@ class AthFile:
     @property
     def rest(self) -> np.ndarray:
         """Rest pose of the source as decoded with the deepest complete level, (N, 3), float32 or float64 as the source
-        had it; where the source gave none, the reference pose of that level."""
-        return self.rest_at(max(self._first_lacking - 1, 0))
+        had it; where the source gave none, or `rest_is_missing`, the reference pose of that level."""
+        level = max(self._first_lacking - 1, 0)
+        return self._as_rest(self.level_rest(level)) if self.rest_is_missing else self.rest_at(level)
+
+    @property
+    def rest_is_missing(self) -> bool:
+        """Whether the file was cut off before the rest pose of the source, which stands behind the motion."""
+        return self._lacks(ct.SOURCE_REST)
 
     def rest_at(self, level: int) -> np.ndarray:
-        """The same as decoded with a level that is stored."""
-        with np.errstate(over="ignore"):  # a pose beyond float32 is infinite, as FORMAT.md rounds
-            dtype = np.float64 if self.core.info.rest_is_float64 else np.float32
-            with self._poses_read(level):
-                return self.core.rest(level).astype(dtype, copy=False)
+        """The rest pose as decoded with a level that is stored. Raises Truncated where it is missing."""
+        if self.rest_is_missing:
+            raise Truncated(
+                f"SOURCE_REST: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+            )
+        known, pose = self._rest_read
+        if known != level:
+            with self._poses_read(level, [ct.SOURCE_REST]):
+                pose = self._as_rest(self.core.rest(level))
+            self._rest_read = level, pose
+        return pose.copy()
+
+    def _as_rest(self, pose: np.ndarray) -> np.ndarray:
+        """Of the source's type; beyond float32 infinite, as FORMAT.md rounds."""
+        with np.errstate(over="ignore"):
+            return pose.astype(np.float64 if self.core.info.rest_is_float64 else np.float32, copy=False)
 
     def level_rest(self, level: int, order: int = core_file.SOURCE_ORDER) -> np.ndarray:
         """The reference pose of a level, which its maps move: the source's rest pose, or another that the motion is
@@ -690,10 +716,12 @@ class AthFile:
             return self.core.level_rest(level, order)
 
     @contextmanager
-    def _poses_read(self, level: int) -> Iterator[None]:
-        """The core has, or can read, the reference poses up to a level's for as long as this lasts."""
+    def _poses_read(self, level: int, kinds: Sequence[int] = ()) -> Iterator[None]:
+        """The core has, or can read, the reference poses up to a level's for as long as this lasts, and has the chunks
+        of these kinds."""
         with self._lock:
             chunks = [chunk for chunk in self._chunks_of(ct.REFINED_REST) if self._rests_read < chunk.level <= level]
+            chunks += [chunk for kind in kinds for chunk in self._chunks_of(kind)]
             with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"reference pose of level {level}"):
                 yield
             self._rests_read = max(self._rests_read, level)
@@ -941,8 +969,10 @@ class AthFile:
             _ = self.metadata, self.faces, self.edges, self.attributes
         except ClipError as error:
             raise BadChunk(f"static data: {error}") from None
-        ready = None
-        for segment in range(self.segment_count if decode else 0):
+        if not decode:
+            return
+        _, ready = self.rest, None
+        for segment in range(self.segment_count):
             for level in range(self.level_count):
                 ready = self.prepare(segment, level, ready)
 

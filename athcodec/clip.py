@@ -146,6 +146,7 @@ class MotionClip:
     rest_dtype: np.dtype = field(init=False)
     rest_given: bool = field(init=False, default=False)
     _checked_rest: np.ndarray | None = field(init=False, default=None)
+    _stands_still: bool | None = field(init=False, default=None)  # None: not known yet
 
     def __post_init__(self) -> None:
         if not (hasattr(self.positions, "shape") and hasattr(self.positions, "dtype")):
@@ -215,6 +216,8 @@ class MotionClip:
         clip = replace(self, **{"rest": self.source_rest} | changes)
         if rest_given is not None or "rest" not in changes:
             clip.rest_given = self.rest_given if rest_given is None else rest_given
+        if not changes.keys() & {"positions", "rest"}:
+            clip._stands_still = self._stands_still
         return clip
 
     @property
@@ -617,6 +620,8 @@ def _point(point: np.ndarray) -> str:
 
 
 def stands_still(clip: MotionClip) -> bool:
-    """Whether all frames are the rest pose."""
-    frames = (clip.block(frame, frame + 1)[0] for frame in range(clip.frame_count))
-    return all(np.array_equal(frame, clip.source_rest) for frame in frames)
+    """Whether all frames are the rest pose; they are read once for a clip."""
+    if clip._stands_still is None:
+        frames = (clip.block(frame, frame + 1)[0] for frame in range(clip.frame_count))
+        clip._stands_still = all(np.array_equal(frame, clip.source_rest) for frame in frames)
+    return clip._stands_still

@@ -280,10 +280,11 @@ class File:
 
     def rest(self, level: int, order: int = SOURCE_ORDER) -> np.ndarray:
         """(N, 3) float64: the rest pose of the source, as close as the reference poses up to a level bring it."""
+        out, fault = np.empty((self.info.vertex_count, 3)), Fault()
         with self._building:
             self._refine_size(level)
-        out = np.empty((self.info.vertex_count, 3))
-        self._check(lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0]))
+            self._check(lib.ath_read_rest(self._file, byref(fault)), fault)
+            self._check(lib.ath_rest_float64(self._file, order, out.ctypes.data, out.strides[0]))
         return out
 
     def chunks(self) -> np.ndarray:

@@ -103,8 +103,8 @@ class _Handler(BaseHTTPRequestHandler):
             for at in range(0, len(body) if entry else 0, PACKET):
                 packet = body[at : at + PACKET]
                 self.server.wait(len(packet))
+                entry[2] += len(packet)  # before the client can have it, and ask
                 self.wfile.write(packet)
-                entry[2] += len(packet)
         except ConnectionError:
             self.close_connection = True
 

@@ -1155,8 +1155,8 @@ valid(
         Entry(0x8018, FUTURE, 1, 1),
         Entry(0x801F, FUTURE, 1, 1),
         Entry(0x801F, b"", 2, 0),
-        Entry(0x8021, FUTURE),
-        Entry(0x8021, FUTURE),
+        Entry(0x8022, FUTURE),
+        Entry(0x8022, FUTURE),
         Entry(0xFFFF, FUTURE),
         Entry(0xFFFF, b""),
     ),
@@ -2069,7 +2069,7 @@ for kind, level, why in (
     (0x0000, 255, "kind 0"),
     (0x0009, 255, "in the prelude"),
     (0x0018, 0, "of motion"),
-    (0x0021, 255, "behind the motion"),
+    (0x0022, 255, "behind the motion"),
     (0x7FFF, 255, "the last one"),
 ):
     table(
@@ -2085,7 +2085,7 @@ for kind, level, name in (
     (0x8013, 1, "SHAPES"),
     (0x8015, 1, "REFINED_REST"),
     (0x8007, 255, "CLIPS"),
-    (0x8008, 255, "SOURCE_REST"),
+    (0x8021, 255, "SOURCE_REST"),
     (0x0020, 255, "ATTRIBUTE"),
 ):
     table(
@@ -2274,6 +2274,13 @@ invalid(
     lambda: cut(lambda d: end_of(d, rd.AFFINES, 0, 1)),
 )
 invalid("cut-in-last-level", "TRUNCATED", 2, "the last byte is missing", lambda: cut(lambda d: len(d.file()) - 1))
+invalid(
+    "cut-in-source-rest",
+    "TRUNCATED",
+    "rest",
+    "all motion has arrived and plays, the rest pose of the source has not",
+    lambda: forked(source_rest=bent(FORK, Chance(206))).file()[:-1],
+)
 invalid(
     "cut-in-attributes",
     "TRUNCATED",
@@ -2503,12 +2510,16 @@ invalid(
 
 
 def source_rest(
-    name: str, reason: str, content: bytes | Callable[[], bytes], plant: Callable[..., Plant] = forked
+    name: str,
+    reason: str,
+    content: bytes | Callable[[], bytes],
+    plant: Callable[..., Plant] = forked,
+    item: str = "rest",
 ) -> None:
     def make() -> Plant:
         return plant(source_rest=content() if callable(content) else content)
 
-    invalid(f"source-rest-{name}", "BAD_CHUNK", "open", reason, make)
+    invalid(f"source-rest-{name}", "BAD_CHUNK", item, reason, make)
 
 
 source_rest("empty", "no bytes", b"")
@@ -2535,11 +2546,12 @@ source_rest(
     "REST is exact",
     lambda: bent(FORK, []),
     lambda **fields: forked(rest=exact_of_fork([0.0] * 15, False), **fields),
+    "open",
 )
 invalid(
     "source-rest-damaged",
     "BAD_CHECKSUM",
-    "open",
+    "rest",
     "a bit of SOURCE_REST is flipped",
     lambda: forked(source_rest=bent(FORK, Chance(206))).draft().change(rd.SOURCE_REST, checksum=0),
 )

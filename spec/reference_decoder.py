@@ -99,9 +99,9 @@ SEGMENT_FRAMES, MOST_LEVELS, MOST_LAYERS, MOST_CLIPS, NO_LEVEL = 256, 32, 8, 255
 OPTIONAL = 0x8000
 HIERARCHY, REST, TIME = 1, 2, 3
 IS_HOST = 4  # of REST's Method
-METADATA, FACES, EDGES, CLIPS, SOURCE_REST = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7, 8
+METADATA, FACES, EDGES, CLIPS = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6, 7
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
-ATTRIBUTE = OPTIONAL | 32
+ATTRIBUTE, SOURCE_REST = OPTIONAL | 32, 33
 KINDS = {
     HIERARCHY: "HIERARCHY",
     REST: "REST",
@@ -2892,8 +2892,6 @@ class AthFile:
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
             self._read_rest(self.content(REST))
-            if self.find(SOURCE_REST):
-                self.rest()
             self.times = frame_times(self.content(TIME), self.clips)
 
     def _check_length(self, strict: bool) -> None:
@@ -2977,6 +2975,10 @@ class AthFile:
         known = REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE
         require(chunk[0] == IS_HOST or chunk[0] & ~known == 0, "Method has reserved bits, or others beside Is_Host")
         require(chunk[0] & REST_EXACT == 0 or chunk[0] & REST_ADAPTIVE == 0, "a rest pose is exact and adaptive")
+        require(
+            chunk[0] & (REST_EXACT | IS_HOST) == 0 or not self.find(SOURCE_REST),
+            "there is a second rest pose, though the first is exact",
+        )
         self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
         step = f32(chunk, 13)
         require(np.isfinite(self.origin).all() and finite(step) and step > 0.0, "Origin or Rest_Step is out of range")
@@ -3061,7 +3063,6 @@ class AthFile:
         if not self.find(SOURCE_REST):
             return self.level_rest(level)
         chunk = self.content(SOURCE_REST)
-        require(self._rests != [], "there is a second rest pose, though the first is exact")
         require(len(chunk) >= 1 and chunk[0] <= 1, "Method has reserved bits")
         if chunk[0] == 1:
             with np.errstate(over="ignore"):

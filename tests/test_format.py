@@ -739,7 +739,7 @@ def test_no_stream_that_the_hierarchy_does_not_ask_for_may_be_in_the_table(spec,
 
 def test_unknown_optional_kinds_are_skipped(spec):
     file = HandMade(1, False, None)
-    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8018, 0), (0x801F, 1), (0x8021, 255), (0xFFFF, 255)):
+    for kind, level in ((0x8000, 255), (0x800F, 255), (0x8018, 0), (0x801F, 1), (0x8022, 255), (0xFFFF, 255)):
         file.store.add(kind, b"from the future", level)
     assert_same_bits(spec, file.file())
 

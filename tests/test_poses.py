@@ -12,7 +12,7 @@ from athcodec import container as ct
 from athcodec.encoding import encoder
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
-from athcodec.errors import BadChecksum
+from athcodec.errors import BadChecksum, Truncated
 
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 
@@ -82,14 +82,33 @@ def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
             assert distance(cut.rest, whole.rest) <= 4 * closest + 1e-6
 
 
-def test_a_damaged_rest_pose_is_refused(bushy_clip, tmp_path):
+def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_path):
     athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
     with athcodec.open(tmp_path / "a.ath") as decoder:
         chunk = decoder.file.find(ct.SOURCE_REST)
     data = bytearray((tmp_path / "a.ath").read_bytes())
     data[chunk.offset + chunk.length - 1] ^= 1
-    with pytest.raises(BadChecksum, match="SOURCE_REST"):
-        athcodec.open(BytesIO(data))
+    with athcodec.open(BytesIO(data)) as decoder:
+        assert decoder.positions(3).shape == decoder.level_rest().shape
+        with pytest.raises(BadChecksum, match="SOURCE_REST"):
+            decoder.rest  # noqa: B018
+        with pytest.raises(BadChecksum, match="SOURCE_REST"):
+            decoder.file.check()
+
+
+def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bushy_clip, tmp_path):
+    athcodec.encode(bushy_clip, tmp_path / "a.ath", **OPTIONS)
+    data = (tmp_path / "a.ath").read_bytes()
+    with athcodec.open(tmp_path / "a.ath") as whole:
+        assert not whole.file.rest_is_missing and not whole.missing
+        end, motion = whole.file.levels[-1].bytes, whole.positions()
+        assert end <= whole.file.find(ct.SOURCE_REST).offset
+    with athcodec.open(BytesIO(data[:end])) as cut:
+        assert cut.file.rest_is_missing and cut.missing == "rest pose of the source"
+        assert np.array_equal(cut.positions(), motion)
+        assert np.array_equal(cut.rest, cut.level_rest().astype(cut.rest.dtype))
+        with pytest.raises(Truncated, match="SOURCE_REST"):
+            cut.file.rest_at(0)
 
 
 def test_joined_clips_share_both_poses(medley_clips, tmp_path):

@@ -97,7 +97,6 @@ enum {
     ATH_FACES = ATH_OPTIONAL | 5,
     ATH_EDGES = ATH_OPTIONAL | 6,
     ATH_CLIPS = 7,
-    ATH_SOURCE_REST = 8,
     ATH_STEMS = 16,
     ATH_AFFINES = 17,
     ATH_CORRECTIONS = 18,
@@ -105,7 +104,8 @@ enum {
     ATH_EXACT = 20,
     ATH_REFINED_REST = 21, /* of all segments, in segment 0 */
     ATH_PREDICTED = 22,
-    ATH_ATTRIBUTE = ATH_OPTIONAL | 32
+    ATH_ATTRIBUTE = ATH_OPTIONAL | 32,
+    ATH_SOURCE_REST = 33
 };
 
 enum { ATH_NO_LEVEL = 255 }; /* level of a chunk that is of no level */
@@ -299,10 +299,15 @@ ATH_API const double *ath_times(const ath_file *file);
 
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
+/* Reads the rest pose of the source where it has a chunk of its own, SOURCE_REST, which stands behind all motion: no
+ * player needs it. It is coded about a reference pose, the finest one that ath_refine_size has read; read again with a
+ * finer one it comes out closer to the source's. Files without the chunk need nothing read: ATH_OK. ATH_MISSING,
+ * ATH_BAD_CHECKSUM, ATH_BAD_CHUNK. */
+ATH_API int ath_read_rest(ath_file *file, ath_fault_info *fault);
 /* The rest pose of the source, for binding, normals and the like: vertex_count positions, `stride` bytes apart. Where
- * the source gave none it is the finest reference pose, see below, that ath_refine_size has read;
- * with each of these a rest pose that is coded about it comes out closer to the source's. Where info.rest_is_float64 is
- * 0 the source's numbers were floats: what the file's arithmetic has as doubles is rounded to them. ATH_NEEDS_HOST_MESH. */
+ * the source gave none it is the finest reference pose, see below, that ath_refine_size has read. Where
+ * info.rest_is_float64 is 0 the source's numbers were floats: what the file's arithmetic has as doubles is rounded to them.
+ * ATH_NEEDS_HOST_MESH; ATH_MISSING: ath_read_rest has not read it. */
 ATH_API int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride);
 ATH_API int ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride);
 /* The reference pose of a level, which it moves and which its matrices apply to: the rest pose of the source, or another

@@ -4,13 +4,13 @@
 
 #define PI 3.14159265358979323846
 
-enum { MOST_PROBES = 64 };
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). */
 static void tridiagonalise(int32_t n, double *a, double *q, double *d, double *e)
 {
-    double v[ATH_PIECE_VERTICES], p[ATH_PIECE_VERTICES];
+    double v[MOST_ROWS], p[MOST_ROWS];
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = 0; j < n; j++) q[i * n + j] = i == j ? 1.0 : 0.0;
     for (int32_t k = 0; k + 2 < n; k++) {
@@ -104,7 +104,7 @@ static void diagonalise(int32_t n, double *d, double *e, double *q)
 /* Eigenvalues in descending order, and a row for the vector of each, its last number not negative. Destroys `a`. */
 static void eigenvectors(int32_t n, double *a, double *q, double *values, double *vectors)
 {
-    double d[ATH_PIECE_VERTICES], e[ATH_PIECE_VERTICES];
+    double d[MOST_ROWS], e[MOST_ROWS];
     tridiagonalise(n, a, q, d, e);
     diagonalise(n, d, e, q);
     for (int32_t m = 0; m < n; m++) {
@@ -138,11 +138,10 @@ static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough
     eigenvectors(n, a, q, s, basis);
 }
 
-void ath_principal(int32_t count, int32_t n, double *matrices, double *values, double *vectors)
+void ath_principal(int32_t count, int32_t n, double *matrices, double *work, double *values, double *vectors)
 {
-    double q[ATH_PIECE_VERTICES * ATH_PIECE_VERTICES];
     for (int32_t i = 0; i < count; i++, matrices += n * n, values += n, vectors += n * n)
-        eigenvectors(n, matrices, q, values, vectors);
+        eigenvectors(n, matrices, work, values, vectors);
 }
 
 void ath_rest_basis(int32_t n, double *basis, double *work)

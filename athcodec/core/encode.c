@@ -377,12 +377,7 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
     p->head = ath_predicted_head_of(step, settings);
-    p->rest = plan->rest;
-    p->origin = origin;
-    p->positions = positions;
-    p->is_float64 = is_float64;
-    p->vertex_count = plan->vertex_count;
-    start_prediction(p, plan->branches, plan->branch_count);
+    start_prediction(p, plan, origin, is_float64, positions);
     for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
     return written(&coder, valid);
 }

@@ -99,6 +99,11 @@ ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *moti
 /* Steps of the first ATH_SHAPE_MODES modes of a branch with such flags, over that of their stream. */
 ATH_ENCODER_API void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES]);
 
+/* Adds the second moments over time of rows of integers, each of `frames`, to the lower half of `moments`, frames x frames:
+ * of the rows whose squares add up to more than `least`. Returns how many these are. */
+ATH_ENCODER_API int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least,
+                                        double *moments);
+
 /* Largest distance and sum of squared distances between positions and source (plus origin). histogram:
  * ATH_SHORT_FLOATS counts, to which each distance is added, rounded up as in the error table. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,

@@ -351,6 +351,7 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     file->adaptive_rest = head.adaptive;
     file->info.rest_is_host = head.is_host;
     file->rest_is_exact = head.exact || head.is_host;
+    if (file->rest_is_exact && has_source_rest(file)) return ATH_BAD_CHUNK;
     if (head.is_host) {
         memcpy(file->info.host_checksum, head.host_checksum, sizeof head.host_checksum);
     } else if (head.exact) {
@@ -362,26 +363,6 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
                                  head.step, head.adaptive, 0, 0, file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
-    return result;
-}
-
-/* The rest pose of the source about a reference pose, where the file has one that is another. */
-static int read_source_rest(ath_file *file, const double *reference, ath_fault_info *fault)
-{
-    ath_bytes chunk, body;
-    ath_source_rest_head head;
-    double *turns = (double *)(void *)((uint8_t *)file->scratch + turns_place());
-    if (!has_source_rest(file)) return ATH_OK;
-    int result = load(file, ATH_SOURCE_REST, &chunk, fault);
-    if (result == ATH_OK) result = file->rest_is_exact ? ATH_BAD_CHUNK : ath_parse_source_rest(chunk, &head, &body);
-    if (result != ATH_OK) return result;
-    if (head.exact)
-        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
-                                     file->info.rest_is_float64, file->source_rest);
-    result = ath_decode_source_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
-                                    head.step, reference, turns, file->source_rest);
-    for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
-        file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];
     return result;
 }
 
@@ -466,7 +447,6 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     plan_layers(file);
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
-    if ((result = read_source_rest(file, file->rest, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
     if (!file->info.rest_is_host) know_rest(file);
     return ATH_OK;
@@ -681,9 +661,7 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);
     if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes);
-    result = read_source_rest(file, layer->rest, fault);
-    fault->code = result;
-    return result;
+    return ATH_OK;
 }
 
 int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
@@ -788,6 +766,42 @@ static const double *finest_reference(const ath_file *file)
     return reference;
 }
 
+/* The rest pose of the source, of which SOURCE_REST says how the reference pose bends into it. */
+static int read_source_rest(ath_file *file, ath_fault_info *fault)
+{
+    ath_bytes chunk, body;
+    ath_source_rest_head head;
+    double *turns = (double *)(void *)((uint8_t *)file->scratch + turns_place());
+    int result = load(file, ATH_SOURCE_REST, &chunk, fault);
+    if (result == ATH_OK) result = ath_parse_source_rest(chunk, &head, &body);
+    if (result != ATH_OK) return result;
+    if (head.exact)
+        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+                                     file->info.rest_is_float64, file->source_rest);
+    result = ath_decode_source_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+                                    head.step, finest_reference(file), turns, file->source_rest);
+    for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
+        file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];
+    return result;
+}
+
+int ath_read_rest(ath_file *file, ath_fault_info *fault)
+{
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    why->code = ATH_OK;
+    if (!has_source_rest(file)) return ATH_OK;
+    why->code = read_source_rest(file, why);
+    file->source_rest_known = why->code == ATH_OK;
+    return why->code;
+}
+
+/* ATH_OK where ath_rest can give it. */
+static int rest_is_there(const ath_file *file)
+{
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    return has_source_rest(file) && !file->source_rest_known ? ATH_MISSING : ATH_OK;
+}
+
 static double rest_number(const ath_file *file, const double *reference, size_t i)
 {
     return file->source_rest ? file->source_rest[i] : reference[i] + file->info.origin[i % 3];
@@ -795,7 +809,8 @@ static double rest_number(const ath_file *file, const double *reference, size_t 
 
 int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
 {
-    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    int result = rest_is_there(file);
+    if (result != ATH_OK) return result;
     const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         float *out = (float *)(void *)((char *)xyz + place_of(file, order, v) * stride);
@@ -806,7 +821,8 @@ int ath_rest(const ath_file *file, ath_order order, float *xyz, size_t stride)
 
 int ath_rest_float64(const ath_file *file, ath_order order, double *xyz, size_t stride)
 {
-    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    int result = rest_is_there(file);
+    if (result != ATH_OK) return result;
     const double *reference = finest_reference(file);
     for (size_t v = 0; v < file->header.vertex_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
@@ -946,16 +962,6 @@ static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level,
     return all || kind != ATH_REFINED_REST || !file->layers[ath_layer_of(file, d)].rest_known;
 }
 
-/* SOURCE_REST, which is read again with each rest pose that refines another; null where no level beyond one and up to
- * another asks for it. It came with the prelude, but may have been dropped. */
-static const ath_chunk *used_source_rest(const ath_file *file, int32_t from_level, int32_t level)
-{
-    for (int32_t d = from_level + 1; d <= level; d++)
-        if (is_used(file, ATH_REFINED_REST, d, level, 0) && ath_file_chunk(file, ATH_REFINED_REST, d, 0))
-            return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0);
-    return 0;
-}
-
 /* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
  * chunks for each. */
 int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
@@ -963,7 +969,6 @@ int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t leve
 {
     int32_t count = 0;
     uint64_t end = 0;
-    add_range(used_source_rest(file, from_level, level), 0, &end, ranges, capacity, &count);
     for (int32_t d = from_level + 1; d <= level; d++) {
         if (first_segment > 0) /* what all segments share stands with segment 0 */
             for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
@@ -987,8 +992,6 @@ int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, i
 
 static int is_ready(const ath_file *file, int32_t segment, int32_t level)
 {
-    const ath_chunk *source_rest = used_source_rest(file, -1, level);
-    if (source_rest && !source_rest->bytes) return 0;
     for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind++)
         for (int32_t d = 0; d <= level; d++) {
             if (!is_used(file, kind, d, level, 0)) continue;

@@ -42,6 +42,7 @@ struct ath_file {
     double *cosines[ATH_SEGMENT_FRAMES + 1]; /* of segments of so many frames; null where there are none */
     uint64_t bases_count;
     int32_t rest_known;                 /* 0 until the host gives it */
+    int32_t source_rest_known;          /* 0 until SOURCE_REST has been read */
     int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
     int32_t rest_is_exact;              /* the reference pose is in the very numbers of source_rest */
     int32_t longest;                    /* frames of the longest segment */

@@ -43,6 +43,26 @@ void ath_differences(int32_t vertex_count, int32_t frames, int32_t piece_count, 
         }
 }
 
+int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least, double *moments)
+{
+    int64_t kept = 0;
+    for (int64_t i = 0; i < count; i++, rows += frames) {
+        double row[ATH_SEGMENT_FRAMES], squares = 0.0;
+        for (int32_t t = 0; t < frames; t++) {
+            row[t] = (double)rows[t];
+            squares += row[t] * row[t];
+        }
+        if (!(squares > least)) continue;
+        kept++;
+        for (int32_t a = 0; a < frames; a++) {
+            double *out = moments + (size_t)a * (size_t)frames;
+            if (rows[a] == 0) continue;
+            for (int32_t b = 0; b <= a; b++) out[b] += row[a] * row[b];
+        }
+    }
+    return kept;
+}
+
 void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_source, int32_t source_count,
                 int is_float64, const void *source, const double origin[3], double *out)
 {

@@ -76,8 +76,9 @@ ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t 
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
 void ath_rest_basis(int32_t n, double *basis, double *work);
 /* Eigenvalues, in descending order, and eigenvectors, a row each, of symmetric n x n matrices, which are destroyed;
- * n: at most ATH_PIECE_VERTICES. */
-ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, double *values, double *vectors);
+ * n: at most ATH_SEGMENT_FRAMES. work: n x n. */
+ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, double *work, double *values,
+                                   double *vectors);
 /* Completes the nodes, once the rest pose is known. */
 ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
 

@@ -31,12 +31,7 @@ int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *
     ath_bytes body;
     carve(p, plan->vertex_count, (uint8_t *)p);
     if (ath_parse_predicted(chunk, &segment->head, &body) != ATH_OK) return ATH_BAD_CHUNK;
-    segment->rest = plan->rest;
-    segment->origin = origin;
-    segment->positions = positions;
-    segment->is_float64 = is_float64;
-    segment->vertex_count = plan->vertex_count;
-    start_prediction(segment, plan->branches, plan->branch_count);
+    start_prediction(segment, plan, origin, is_float64, positions);
     coder_start(&p->coder, body.bytes, body.size);
     p->frames = frames;
     p->vertex = 0;

@@ -389,13 +389,18 @@ static void follow_twins(prediction *p)
     }
 }
 
-/* rest, origin and what follows of `p` are set. */
-static void start_prediction(prediction *p, const ath_branch *branches, int32_t branch_count)
+/* Its arrays and its head are there. */
+static void start_prediction(prediction *p, const ath_plan *plan, const double *origin, int is_float64, void *positions)
 {
+    p->rest = plan->rest;
+    p->origin = origin;
+    p->positions = positions;
+    p->is_float64 = is_float64;
+    p->vertex_count = plan->vertex_count;
     predicted_model_init(&p->model);
     p->frame = 0;
     memset(p->vertices, 0, (size_t)p->vertex_count * sizeof *p->vertices);
-    follow_stems(p, branches, branch_count);
+    follow_stems(p, plan->branches, plan->branch_count);
     follow_twins(p);
     for (int32_t v = 0; v < p->vertex_count; v++) {
         predicted_vertex *vertex = p->vertices + v;

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, cast
 
 import numpy as np
 
@@ -177,6 +177,7 @@ class _Decided:
     prelude: CodedPrelude
     layers: Layers
     source: Source
+    tried: CodedSegment | None = None  # one that was coded to compare
 
     @property
     def segment_count(self) -> int:
@@ -308,9 +309,10 @@ class EncodingJob:
 
     def _bytes_like_the_middle(self, decided: _Decided) -> int:
         """Of the motion of a file whose segments are all like the one in the middle."""
-        positions = self.source.positions(self.segment_count // 2)
-        chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions)
-        return self.segment_count * sum(map(len, chunks.values())) + decided.shared_bytes
+        middle = self.segment_count // 2
+        decided.tried = self._code(decided, middle, self.source.block(middle))
+        lossy = (data for (_, kind), data in decided.tried.chunks.items() if kind != ct.EXACT)
+        return self.segment_count * sum(map(len, lossy)) + decided.shared_bytes
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
         """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy; of one where the
@@ -480,17 +482,19 @@ class EncodingJob:
 
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
-            positions, exact = self._positions(blocks.pop())  # not held any longer
-            if decided.choice.predicted is not None:
-                return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
-            return CodedSegment(
-                index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact)
-            )
+            return self._code(decided, index, blocks.pop()) if blocks else cast(CodedSegment, decided.tried)
 
-        source = decided.source
+        source, known = decided.source, None if decided.tried is None else decided.tried.index
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
-        return pool.ordered(code, ((index, [source.block(index)]) for index in segments), at_once)
+        items = ((index, [] if index == known else [source.block(index)]) for index in segments)
+        return pool.ordered(code, items, at_once)
+
+    def _code(self, decided: _Decided, index: int, block: np.ndarray) -> CodedSegment:
+        positions, exact = self._positions(block)
+        if decided.choice.predicted is not None:
+            return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
+        return CodedSegment(index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact))
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""

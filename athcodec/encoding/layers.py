@@ -190,23 +190,22 @@ def _rests(
     if source.exact_rest or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
-    coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive)
+    coded = _first_rests(prelude.plan, first_step, source.rest)
     for step in steps:
-        slack = prelude.rest_slack if step == rest.step else 0.0
-        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1], rest.adaptive, slack))
+        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1]))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
     return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
 
 
-def _first_rests(plan: Plan, step: float, rest: np.ndarray, adaptive: bool) -> list[streams.CodedRest]:
+def _first_rests(plan: Plan, step: float, rest: np.ndarray) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    at_once = streams.encode_rest(plan.branches, step, rest, None, adaptive)
+    at_once = streams.encode_rest(plan.branches, step, rest)
     if not plan.level_0_stands_alone:
         return [at_once]
-    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, adaptive)
-    refined = streams.encode_rest(plan.branches, step, rest, level_0, adaptive)
+    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest)
+    refined = streams.encode_rest(plan.branches, step, rest, level_0)
     both = len(level_0.stream) + len(refined.stream)
     return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
 
@@ -234,8 +233,8 @@ class _TimeBases:
     """The time bases of the layers of one segment: one, learned for the last layer, with more rows in each."""
 
     def __init__(self, last: Layer, positions: np.ndarray):
-        found = time_components(last.plan, last.settings, positions)
-        self._components = found.get(last.plan.level_count - 1)
+        level, learning = last.plan.level_count - 1, last.settings.learning_levels
+        self._components = time_components(last.plan, last.settings, positions, learning[-1:]).get(level)
         self._before: tuple[int, StreamBasis] | None = None
 
     def first(self, layer: Layer) -> dict[int, StreamBasis]:

@@ -16,6 +16,7 @@ import numpy as np
 from athcodec._native import SHAPE_MODES, SHEET, address, lib
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.time_bases import principal
 
 NUMBERS = 3 * SHAPE_MODES
 
@@ -63,13 +64,12 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
         for pieces, total in groups:
             for part in _parts(pieces, segment.frames * total.shape[1]):
                 rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
-                total[part] += rows @ rows.transpose(0, 2, 1)
+                total[part] += np.einsum("pif,pjf->pij", rows, rows)  # without NumPy's threads, see principal()
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
 
 def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
-    lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in (moments, values, vectors)))
+    values, vectors = principal(moments)
     return np.sqrt(np.maximum(values, 0.0)), vectors
 
 

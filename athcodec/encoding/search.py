@@ -27,16 +27,19 @@ from athcodec.encoding.segment import (
     CodedPrelude,
     Settings,
     Source,
+    StreamBasis,
     analyse,
     analyse_finely,
     branch_records,
     code_stems,
     lags,
-    learned_bases,
+    level_bases,
     loose_branches,
     thread_count,
+    time_components,
     with_best_lags,
 )
+from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
 from athcodec.segmentation import DEFAULT_SEGMENT
 
@@ -48,6 +51,8 @@ MEAN_POSE_WORTH = 6  # trials, to find the mean pose and learned modes about it
 PRELUDES_KEPT = 6  # between trials
 REST_SHARE = 0.25  # of a file, from which on its rest pose is tried with slack
 STILL_STEP = 1024.0  # over what nothing is to be left of
+FIRST_FACTORS, HOPELESS = (0, 2, 8), 1.3  # of rotations; the others, and those of tips, save no more than that
+MODES_SAVE, LAYERS_SAVE = 1.5, 1.05  # of a single layer's bytes, at most: learned modes, what suits refinements better
 SHORT_STEM = 3  # vertices of a stem whose learned modes are tried in place of rotations and in any basis
 WORTH = {
     "_with_learned_bases": 2,
@@ -168,10 +173,6 @@ def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) 
     return with_best_lags(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
 
 
-def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: LearnedModes | None) -> SegmentMotion:
-    return analyse(plan, settings, positions, modes, learned_bases(plan, settings, positions))
-
-
 def _coarser(settings: Settings, ratio: int) -> Settings:
     """The same, so many times as coarse; the rest pose half of that."""
     return replace(
@@ -210,6 +211,7 @@ class Search:
         self.required_saving: float | None = None  # of REQUIRED_SAVINGS: the one that made the smallest file
         self._known: dict[tuple, tuple[float, np.ndarray]] = {}
         self._components: dict[tuple, Components] = {}
+        self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
         self._layered = layered
         self._extra_trials, self._trials = 0, trials(effort, layered)
@@ -311,7 +313,7 @@ class Search:
 
     def first_layer(self, settings: Settings, ratio: int) -> Settings:
         """Settings of a layer whose step is `ratio` times that of the given ones."""
-        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels)
+        first = replace(_coarser(settings, ratio), learned_bases=(False,) * self.levels, learned_pieces=None)
         for step in (self._with_rotations, self._with_learned_bases, self._with_learned_modes):
             first = first if self.effort == "fast" else step(first)
         return self._with_node_steps(first)
@@ -322,10 +324,18 @@ class Search:
         if ratio == 1 or not any(settings.rotation_step_factors):
             yield settings
             return
-        factor = settings.rotation_step_factors[self.prelude(settings).plan.main_level]
+        factor, least = settings.rotation_step_factors[self.prelude(settings).plan.main_level], math.inf
         for own, only_tips in dict.fromkeys([(factor, settings.only_tips), (factor, True), (0, False)]):
             candidate = replace(settings, rotation_step_factors=(own,) * self.levels, only_tips=only_tips)
-            yield candidate if self.effort == "fast" else self._with_learned_modes(candidate)
+            if self.effort != "fast":
+                plain = replace(candidate, learned_pieces=None)
+                if self.cost(plain)[0] > MODES_SAVE * least:
+                    continue
+                candidate = self._with_learned_modes(candidate)
+                least = min(least, self.cost(candidate)[0])
+                if self.cost(candidate)[0] > LAYERS_SAVE * least:
+                    continue
+            yield candidate
 
     def _report(self, worth: int = 0) -> None:
         """Reports progress after work that counts as `worth` trials in addition to those made."""
@@ -442,7 +452,7 @@ class Search:
         prelude = self.prelude(settings)
         learned_modes = self.learned_modes(prelude.plan, settings)
         try:
-            levels = sum(self._level_bytes(prelude, settings, learned_modes, sample) for sample in self.samples)
+            levels = sum(self._level_bytes(prelude, settings, learned_modes, i) for i in range(len(self.samples)))
         except BoundError:
             return math.inf, np.full(self.levels, math.inf)
         mode_bytes = 0.0
@@ -451,10 +461,11 @@ class Search:
         return levels.sum() + mode_bytes + self._prelude_bytes(prelude), levels
 
     def _level_bytes(
-        self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, sample: SegmentSample
+        self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, number: int
     ) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
-        coded = code_stems(prelude, settings, sample.positions, learned_modes)
+        sample = self.samples[number]
+        coded = code_stems(prelude, settings, sample.positions, learned_modes, self._bases(settings, number))
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
@@ -467,11 +478,39 @@ class Search:
     def _prelude_bytes(self, prelude: CodedPrelude) -> float:
         return prelude.prelude_bytes * self.extrapolation.vertices
 
+    def _analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
+        """A sample in its integers."""
+        plan, positions = self.prelude(settings).plan, self.samples[number].positions
+        return analyse(plan, settings, positions, modes, self._bases(settings, number))
+
+    def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
+        """The time bases of the levels that learn theirs."""
+        if not any(settings.learned_bases):
+            return {}
+        step, components = self._learn_time(settings)
+        some = {level: own for level, own in components[number].items() if settings.learned_bases[level]}
+        return level_bases(some, settings.step / step)
+
+    def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
+        """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they
+        hardly depend on it."""
+        known = *self._turning(settings), settings.level_steps.tobytes()
+        if known not in self._time_components:
+            plan = self.prelude(settings).plan
+            levels = [level for level in range(self.levels) if plan.has_stems(level)]
+            found = [time_components(plan, settings, sample.positions, levels) for sample in self.samples]
+            self._time_components[known] = settings.step, found
+        return self._time_components[known]
+
+    def _turning(self, settings: Settings) -> tuple:
+        """What decides what is left for the modes of a piece."""
+        return settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
+
     def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
         """Of the pieces that `settings` gives some, or of all, learned from segments spread over the clip."""
         if settings.learned_pieces is None and not everywhere:
             return None
-        known = settings.rotation_step_factors, settings.only_tips, settings.sheet.tobytes()
+        known = self._turning(settings)
         if known not in self._components:
             prelude, count = self.prelude(settings), len(self.source.segments)
             some = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
@@ -514,13 +553,9 @@ class Search:
         pieces = np.repeat(np.arange(len(learned_modes.counts)), prelude.plan.pieces["count"])
         modes, tracks = (
             sum(
-                estimated_bits(
-                    _analysed(prelude.plan, plain, sample.positions, some).coefficients,
-                    pieces,
-                    len(learned_modes.counts),
-                )
+                estimated_bits(self._analysed(plain, number, some).coefficients, pieces, len(learned_modes.counts))
                 * sample.scale
-                for sample in self.samples
+                for number, sample in enumerate(self.samples)
             )
             for some in (None, learned_modes)
         )
@@ -538,6 +573,9 @@ class Search:
         some = {self._prelude_key(settings): settings for settings in candidates}  # by prelude, each to be made once
         with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
             list(pool.map(self.prelude, some.values()))
+            for settings in candidates:  # one after the other: the first one's step is that of all like it
+                if any(settings.learned_bases):
+                    self._learn_time(settings)
             costs = []
             for cost in pool.map(self.cost, candidates):
                 costs.append(cost)
@@ -589,12 +627,23 @@ class Search:
         return self._cheapest([settings, *candidates])
 
     def _with_rotations(self, settings: Settings) -> Settings:
-        factors = (0, 2) if self.effort == "fast" else qz.ROTATION_FACTORS
-        candidates = [replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors]
-        per_level = np.array([levels for _, levels in self._costs(candidates)])
-        mixed = replace(settings, rotation_step_factors=tuple(int(factors[i]) for i in per_level.argmin(axis=0)))
-        best = self._cheapest([settings, mixed, *candidates])
-        tips = [replace(own, only_tips=True) for own in (best, *candidates[1:]) if any(own.rotation_step_factors)]
+        def turning(factors: Sequence[int]) -> dict[int, Settings]:
+            return {k: replace(settings, rotation_step_factors=(k,) * self.levels) for k in factors}
+
+        candidates = turning((0, 2) if self.effort == "fast" else FIRST_FACTORS)
+        unturned, *turned = (cost for cost, _ in self._costs(list(candidates.values())))
+        if self.effort != "fast" and min(turned) <= HOPELESS * unturned:
+            candidates = turning(qz.ROTATION_FACTORS)
+        factors = list(candidates)
+        per_level = np.array([levels for _, levels in self._costs(list(candidates.values()))])
+        mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
+        best = self._cheapest([settings, mixed, *candidates.values()])
+        most = HOPELESS * self.cost(best)[0]
+        tips = [
+            replace(own, only_tips=True)
+            for own in (best, *candidates.values())
+            if any(own.rotation_step_factors) and self.cost(own)[0] <= most
+        ]
         return self._cheapest([best, *tips])
 
     def _cheapest(self, candidates: list[Settings]) -> Settings:
@@ -629,23 +678,25 @@ class Search:
 
     def _walk_steps(self, settings: Settings, factor: float, rest_factor: float) -> Settings:
         """Walks step and rest step in turn to the cheapest on geometric grids."""
-        for _ in range(WALKS):
-            before, settings = settings, self._walk(settings, "step", factor, math.inf)
+        for again in range(WALKS):
+            before, settings = settings, self._walk(settings, "step", factor, math.inf, again > 0)
             if self.source.reference_is_exact:
                 break
-            settings = self._walk(settings, "rest_step", rest_factor, self.extrapolation.rest_cap * settings.bound)
+            cap = self.extrapolation.rest_cap * settings.bound
+            settings = self._walk(settings, "rest_step", rest_factor, cap, again > 0)
             if (settings.step, settings.rest_step) == (before.step, before.rest_step):
                 break
         return settings
 
-    def _walk(self, settings: Settings, name: str, factor: float, cap: float) -> Settings:
+    def _walk(self, settings: Settings, name: str, factor: float, cap: float, again: bool) -> Settings:
         def moved(exponent: int) -> Settings:
             return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
 
         def costs_at(exponents) -> dict[int, float]:
             return dict(zip(exponents, (cost for cost, _ in self._costs([moved(e) for e in exponents]))))
 
-        costs = costs_at((-1, 0, 1, 2))  # a step to be coarse by far pays where one to be a little coarser does not
+        # at first: a step to be coarse by far may pay where one to be a little coarser does not
+        costs = costs_at((-1, 0, 1) if again else (-1, 0, 1, 2))
         while True:
             best = min(costs, key=costs.get)
             wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= 10]
@@ -656,7 +707,7 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment = _analysed(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        segment = self._analysed(settings, len(self.samples) // 2, self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)

@@ -6,14 +6,14 @@ predicted from what the decoder will have, corrections are found on what it will
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from athcodec import container as ct
-from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE
+from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, address, lib
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
@@ -192,6 +192,11 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
 
+    @property
+    def learning_levels(self) -> list[int]:
+        """Levels that learn their time bases."""
+        return [level for level, learned in enumerate(self.learned_bases) if learned]
+
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
         return qz.single(self.step * self.level_steps[level])
@@ -219,7 +224,6 @@ class CodedPrelude:
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
-        self.rest_slack = settings.rest_slack
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
 
 
@@ -380,14 +384,14 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
             start = low if np.isscalar(low) else low[piece]
             slots.append(np.arange(pieces["first"][piece] + start, pieces["first"][piece] + high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
-    moments, count = np.zeros((segment.frames, segment.frames)), 0
+    lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     for part in (*parts, segment.tracks[segment.plan.base_level == level]):
-        rows = part.reshape(-1, segment.frames) / FINER
-        rows = rows[(rows**2).sum(axis=1) > qz.DEAD_ZONE**2]
-        moments += rows.T @ rows
-        count += len(rows)
-    return segment.cosines.T @ moments @ segment.cosines, count
+        rows = part.reshape(-1, segment.frames)
+        into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
+        count += lib.ath_add_moments(len(rows), segment.frames, *into)
+    moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.cosines
+    return np.einsum("ka,kb->ab", waves, np.einsum("kl,lb->kb", moments, waves)), count  # without NumPy's threads
 
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
@@ -398,19 +402,25 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
     return segment
 
 
-def time_components(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, TimeComponents]:
-    """Of the levels that learn their time bases, from a finer pass with cosines."""
-    levels = [level for level, learned in enumerate(settings.learned_bases) if learned]
+def time_components(
+    plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int]
+) -> dict[int, TimeComponents]:
+    """Of some levels, from a finer pass with cosines."""
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
     return {level: TimeComponents(*_level_moments(segment, level)) for level in levels}
 
 
-def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
-    """Each level's own."""
-    bases = {level: found.basis() for level, found in time_components(plan, settings, positions).items()}
+def level_bases(components: dict[int, TimeComponents], ratio: float = 1.0) -> dict[int, StreamBasis]:
+    """Each level's own, for steps `ratio` times those of the components."""
+    bases = {level: found.basis(ratio) for level, found in components.items()}
     return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+
+
+def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
+    """Of the levels that learn theirs."""
+    return level_bases(time_components(plan, settings, positions, settings.learning_levels))
 
 
 @dataclass
@@ -500,10 +510,15 @@ def correct(
 
 
 def code_stems(
-    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, learned_modes: LearnedModes | None
+    prelude: CodedPrelude,
+    settings: Settings,
+    positions: np.ndarray,
+    learned_modes: LearnedModes | None,
+    bases: dict[int, StreamBasis] | None = None,
 ) -> Coded:
-    """Streams of the stems of a single layer and the corrections that keep the limit."""
-    bases = learned_bases(prelude.plan, settings, positions)
+    """Streams of the stems of a single layer and the corrections that keep the limit. bases: None: to be learned."""
+    if bases is None:
+        bases = learned_bases(prelude.plan, settings, positions)
     segment = analyse(prelude.plan, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)

@@ -234,7 +234,8 @@ export class AthFile {
   /** Seconds, one per frame, increasing within a clip. */
   times(): Float64Array;
   /** The rest pose of the source, 3 numbers per vertex; order "source" by default. Where the source gave none it is the
-   * finest reference pose that has been read; after levelRest() of a deeper level it is closer to the source's. */
+   * finest reference pose that has been read; after levelRest() of a deeper level it is closer to the source's. Throws
+   * MISSING where its chunk, SOURCE_REST, which stands behind the motion, is still to come: no player needs it. */
   rest(order?: Order): Float32Array;
   rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
   /** The reference pose of a level, which it moves and which its matrices apply to. It is the same for all levels with

@@ -465,6 +465,7 @@ export class AthFile {
   }
 
   rest(order = "source", { out } = {}) {
+    this.#checkFault((fault) => this.#c.ath_read_rest(this.#at, fault));
     return this.#pose(out, order, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
   }
 

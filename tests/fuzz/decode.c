@@ -186,6 +186,7 @@ static void rest(user *u, int32_t argument)
     size_t vertices = (size_t)u->info.vertex_count;
     double *doubles = fuzz_memory(3 * vertices * sizeof *doubles, 0);
     float *floats = fuzz_memory(3 * vertices * sizeof *floats, 0);
+    ath_read_rest(u->file, NULL);
     ath_rest_float64(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, doubles, 3 * sizeof *doubles);
     ath_rest(u->file, argument & 1 ? ATH_SOURCE_ORDER : ATH_FILE_ORDER, floats, 3 * sizeof *floats);
     for (size_t i = 0; i < 3 * vertices; i++)
