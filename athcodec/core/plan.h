@@ -81,10 +81,10 @@ ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, d
 /* Completes the nodes, once the rest pose is known. */
 ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
 
-/* frames x frames: row k is the k-th function of the orthonormal DCT-II. */
-ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
+/* frames x frames, orthonormal: row k is the k-th mode of a free beam or, where `periodic` is set, of a Fourier series. */
+ATH_ENCODER_API void ath_waves(int32_t frames, int32_t periodic, double *waves);
 
-/* tan(x / 2) for 0 <= x < pi, by the series of the cosines. */
+/* tan(x / 2) for 0 <= x < pi, by the series of sine and cosine. */
 double ath_tan_of_half(double x);
 
 ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex) { return plan->rest + 3 * (size_t)vertex; }
@@ -96,6 +96,13 @@ ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *
 }
 
 ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level) { return node->level <= level && level <= node->last; }
+
+/* What a vertex of a piece counts in the products of its modes, which are orthonormal so: errors of a cantilever are
+ * largest at its end, where others hang. */
+ATH_INLINE double ath_vertex_weight(int32_t flags, int32_t count, int32_t i)
+{
+    return !(flags & ATH_SHEET) && count > 1 && i == count - 1 ? 2.0 : 1.0;
+}
 
 ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
 {

@@ -308,8 +308,11 @@ class EncodingJob:
 
     def _bytes_like_the_middle(self, decided: _Decided) -> int:
         """Of the motion of a file whose segments are all like the one in the middle."""
-        positions = self.source.positions(self.segment_count // 2)
-        chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions)
+        middle = self.segment_count // 2
+        positions, whole_loop = self.source.positions(middle), self.source.is_whole_loop(middle)
+        chunks, _ = code_segment(
+            decided.prelude, decided.layers, self.segment_count, positions, whole_loop=whole_loop
+        )
         return self.segment_count * sum(map(len, chunks.values())) + decided.shared_bytes
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
@@ -406,7 +409,7 @@ class EncodingJob:
 
     def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
-        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors)
+        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
@@ -483,8 +486,9 @@ class EncodingJob:
             positions, exact = self._positions(blocks.pop())  # not held any longer
             if decided.choice.predicted is not None:
                 return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
+            whole_loop = source.is_whole_loop(index)
             return CodedSegment(
-                index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact)
+                index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact, whole_loop)
             )
 
         source = decided.source
@@ -530,6 +534,7 @@ def _summary(
         "rotations": list(settings.rotation_step_factors),
         "learned": list(settings.learned_bases),
         "sheets": int(settings.sheet.sum()),
+        "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
     }
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12

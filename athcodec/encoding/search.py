@@ -58,22 +58,27 @@ WORTH = {
 
 @dataclass(frozen=True, eq=False)
 class SegmentSample:
-    """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
+    """(N, 3, T) positions of a segment in file order, how many frames of the clip it stands for, and whether it is all
+    of a loop."""
 
     positions: np.ndarray
     frames: float
+    whole_loop: bool = False
 
     @property
     def scale(self) -> float:
         return self.frames / self.positions.shape[2]
 
     def of_plant(self, sample: PlantSample) -> SegmentSample:
-        return SegmentSample(self.positions[sample.vertices], self.frames)
+        return replace(self, positions=self.positions[sample.vertices])
 
 
 def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
-    return [SegmentSample(_middle(source.positions(segment)), frames) for segment, frames in typical_segments(source)]
+    return [
+        SegmentSample(_middle(source.positions(segment)), frames, source.is_whole_loop(segment))
+        for segment, frames in typical_segments(source)
+    ]
 
 
 def typical_segments(source: Source) -> list[tuple[int, int]]:
@@ -168,8 +173,9 @@ def with_rest_slack(source: Source, ath: Ath, settings: Settings, slack: float) 
     return with_best_lags(source, ath, replace(settings, rest_step=rest_step, rest_slack=slack))
 
 
-def _analysed(plan: Plan, settings: Settings, positions: np.ndarray, modes: LearnedModes | None) -> SegmentMotion:
-    return analyse(plan, settings, positions, modes, learned_bases(plan, settings, positions))
+def _analysed(plan: Plan, settings: Settings, sample: SegmentSample, modes: LearnedModes | None) -> SegmentMotion:
+    own = settings.of_segment(sample.whole_loop)
+    return analyse(plan, own, sample.positions, modes, learned_bases(plan, own, sample.positions))
 
 
 def _coarser(settings: Settings, ratio: int) -> Settings:
@@ -293,6 +299,8 @@ class Search:
             steps = [self._with_rotations]
         if self.source.weights is not None:
             steps.insert(0, self._with_level_steps)
+        if any(sample.whole_loop for sample in self.samples):
+            steps.append(self._with_periodic_waves)
         return self._after(steps, self.start)
 
     @cached_property
@@ -411,6 +419,7 @@ class Search:
             rotation_step_factors=found.rotation_step_factors,
             only_tips=found.only_tips,
             learned_bases=found.learned_bases,
+            periodic=found.periodic,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
@@ -434,6 +443,7 @@ class Search:
             *self._prelude_key(settings),
             settings.rotation_step_factors,
             settings.only_tips,
+            settings.periodic,
             settings.learned_bases,
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
         )
@@ -454,7 +464,7 @@ class Search:
         self, prelude: CodedPrelude, settings: Settings, learned_modes: LearnedModes | None, sample: SegmentSample
     ) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
-        coded = code_stems(prelude, settings, sample.positions, learned_modes)
+        coded = code_stems(prelude, settings.of_segment(sample.whole_loop), sample.positions, learned_modes)
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
@@ -515,7 +525,7 @@ class Search:
         modes, tracks = (
             sum(
                 estimated_bits(
-                    _analysed(prelude.plan, plain, sample.positions, some).coefficients,
+                    _analysed(prelude.plan, plain, sample, some).coefficients,
                     pieces,
                     len(learned_modes.counts),
                 )
@@ -611,6 +621,11 @@ class Search:
         mixed = replace(settings, learned_bases=tuple((learned < cosines).tolist()))
         return mixed if any(mixed.learned_bases) and self.cost(mixed)[0] < cost else settings
 
+    def _with_periodic_waves(self, settings: Settings) -> Settings:
+        """Loops that are one segment by waves that go on across their seam: those of a motion that does not are
+        larger so."""
+        return self._cheapest([replace(settings, periodic=True), settings])
+
     def _with_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.15, 1.4)
 
@@ -656,7 +671,7 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment = _analysed(prelude.plan, settings, self.sample, self.learned_modes(prelude.plan, settings))
+        segment = _analysed(prelude.plan, settings, self.samples[len(self.samples) // 2], self.learned_modes(prelude.plan, settings))
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)
