@@ -167,7 +167,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 4]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
     "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),

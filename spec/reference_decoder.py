@@ -199,7 +199,9 @@ class Clip:
     def entry(self) -> bytes:
         """What CLIPS says of it."""
         name, seams = self.name.encode("utf-8"), self.seams or ()
-        head = struct.pack("<IIBB", self.frames, self.segments, (self.seams is not None) | self.periodic << 1, len(name))
+        head = struct.pack(
+            "<IIBB", self.frames, self.segments, (self.seams is not None) | self.periodic << 1, len(name)
+        )
         return head + name + struct.pack(f"<{len(seams)}f", *seams)
 
 
@@ -1834,7 +1836,7 @@ class Plan:
     def basis(self, piece: Piece) -> np.ndarray:
         """(modes, count): functions over the piece's vertices."""
         if piece.number not in self._bases:
-            modes = cantilever(piece_gaps(self, piece), 0.1, 0.001, vertex_weight(0, piece.count, piece.count - 1))
+            modes = cantilever(piece_gaps(self, piece), 0.1, 0.001, tip_weight(self, piece))
             self._bases[piece.number] = sheet(self, piece, modes) if piece.flags & SHEET else modes
         return self._bases[piece.number]
 
@@ -1889,8 +1891,7 @@ def in_order(terms: np.ndarray) -> np.ndarray:
 def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
     """Distances along a piece in quarters of their mean, 1 to 64."""
     before = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices][:-1]])
-    x, y, z = (plan.rest[piece.vertices] - before).T
-    lengths = np.sqrt(x * x + y * y + z * z)
+    lengths = distances(plan.rest[piece.vertices], before)
     if piece.flags & SHEET:
         lengths[:] = 0.0
     total = in_order(lengths)
@@ -1898,9 +1899,16 @@ def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
     return tuple(64 if q >= 64.0 else int(q) if q >= 1.0 else 1 for q in quarters.tolist())
 
 
-def vertex_weight(flags: int, count: int, i: int) -> float:
-    """What a vertex counts in products of the modes of its piece."""
-    return 2.0 if not flags & SHEET and count > 1 and i == count - 1 else 1.0
+def tip_weight(plan: Plan, piece: Piece) -> float:
+    """What the last vertex counts in products of the modes of its piece."""
+    points = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices]])
+    way, chord = in_order(distances(points[1:], points[:-1])), distances(points[-1], points[0])
+    return 2.0 if not piece.flags & SHEET and piece.count > 1 and 2.0 * way <= 3.0 * chord else 1.0
+
+
+def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    x, y, z = (a - b).T
+    return np.sqrt(x * x + y * y + z * z)
 
 
 @cache
@@ -2749,7 +2757,7 @@ class Refinement(Pose):
         c, R = self.turned_frames(piece)
         local = mat_vec(R.transpose(1, 0, 2), self.before.placed[piece.vertices] - c)
         local = local - plan.from_attach(piece)[:, :, None]
-        weights = np.array([vertex_weight(piece.flags, piece.count, i) for i in range(piece.count)])
+        weights = np.append(np.ones(piece.count - 1), tip_weight(plan, piece))
         tracks = np.array([in_order((mode * weights)[:, None, None] * local) for mode in basis[:known]])
         for m in range(known):
             track = tracks[m]

@@ -242,15 +242,31 @@ static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
     return 1;
 }
 
-/* Pieces with equal gaps share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
+double ath_tip_weight(const ath_piece *piece, const double *rest)
+{
+    const double *base = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first), *before = base;
+    double way = 0.0;
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *here = rest + 3 * (size_t)(piece->first + i);
+        way = way + distance(here, before);
+        before = here;
+    }
+    return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2.0 : 1.0;
+}
+
+/* Pieces with equal gaps and weights share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
  * made so that all of them collide: after MOST_PROBES a piece gets a basis to itself, which holds the same numbers. */
-static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, uint8_t *gaps, int32_t *table, uint32_t mask)
+static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const double *rest, const uint8_t *gaps,
+                              int32_t *table, uint32_t mask)
 {
     const uint8_t *mine = gaps + pieces[p].first;
+    double tip = ath_tip_weight(pieces + p, rest);
     uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
     for (int32_t probe = 0; table[at] >= 0; probe++) {
         const ath_piece *other = pieces + table[at];
-        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)) return table[at];
+        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)
+            && ath_tip_weight(other, rest) == tip)
+            return table[at];
         if (probe == MOST_PROBES) return p;
         at = (at + 1) & mask;
     }
@@ -273,7 +289,7 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     for (int32_t p = 0; p < piece_count; p++) {
         ath_piece *piece = pieces + p;
         piece_gaps(piece, rest, gaps + piece->first);
-        int32_t owner = owner_of_basis(pieces, p, gaps, table, (uint32_t)size - 1);
+        int32_t owner = owner_of_basis(pieces, p, rest, gaps, table, (uint32_t)size - 1);
         piece->rank = piece->count;
         piece->modes = owner == p ? next : pieces[owner].modes;
         if (owner == p) next += (int64_t)piece->count * piece->count;
@@ -286,16 +302,16 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
-void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps, double *work,
-                     double *bases)
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                     double *work, double *bases)
 {
     int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
     for (int32_t p = 0; p < stop; p++) {
         const ath_piece *piece = pieces + p;
         int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
         if (p >= first && piece->modes >= laid_out)
-            cantilever(piece->count, gaps + piece->first, 0.1, 0.001,
-                       ath_vertex_weight(0, piece->count, piece->count - 1), bases + piece->modes, work);
+            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, ath_tip_weight(piece, rest), bases + piece->modes,
+                       work);
         last += (int64_t)piece->count * piece->count;
         if (last > laid_out) laid_out = last;
     }
@@ -310,7 +326,7 @@ void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const doub
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases)
 {
-    ath_basis_modes(pieces, 0, piece_count, gaps, work, bases);
+    ath_basis_modes(pieces, 0, piece_count, rest, gaps, work, bases);
     ath_basis_sheets(pieces, 0, piece_count, rest, bases);
 }
 

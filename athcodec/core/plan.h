@@ -64,13 +64,16 @@ ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, 
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
                                          int32_t *table);
+/* What the last vertex of a piece counts in the products of its modes, which are orthonormal so: twice in a cantilever that
+ * is not far from straight, whose errors are largest there. */
+double ath_tip_weight(const ath_piece *piece, const double *rest);
 /* work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases);
 /* The same by ranges of pieces, in two passes: the sheets of one need the modes of any. */
-ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps,
-                                     double *work, double *bases);
+ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
+                                     const uint8_t *gaps, double *work, double *bases);
 ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
                                       double *bases);
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
@@ -96,13 +99,6 @@ ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *
 }
 
 ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level) { return node->level <= level && level <= node->last; }
-
-/* What a vertex of a piece counts in the products of its modes, which are orthonormal so: errors of a cantilever are
- * largest at its end, where others hang. */
-ATH_INLINE double ath_vertex_weight(int32_t flags, int32_t count, int32_t i)
-{
-    return !(flags & ATH_SHEET) && count > 1 && i == count - 1 ? 2.0 : 1.0;
-}
 
 ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
 {

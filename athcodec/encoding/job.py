@@ -310,9 +310,7 @@ class EncodingJob:
         """Of the motion of a file whose segments are all like the one in the middle."""
         middle = self.segment_count // 2
         positions, whole_loop = self.source.positions(middle), self.source.is_whole_loop(middle)
-        chunks, _ = code_segment(
-            decided.prelude, decided.layers, self.segment_count, positions, whole_loop=whole_loop
-        )
+        chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions, whole_loop=whole_loop)
         return self.segment_count * sum(map(len, chunks.values())) + decided.shared_bytes
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:

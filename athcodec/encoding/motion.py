@@ -42,8 +42,8 @@ RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 @lru_cache(16)
 def waves_over_time(frames: int, periodic: bool = False) -> np.ndarray:
-    """The modes of a free beam or, if periodic, of a Fourier series: orthonormal rows, (frames, frames) float64, bit for
-    bit those of the decoder."""
+    """The modes of a free beam or, if periodic, a Fourier series: orthonormal rows, (frames, frames) float64, bit for bit
+    those of the decoder."""
     waves = np.empty((frames, frames))
     lib.ath_waves(frames, periodic, waves.ctypes.data)
     waves.setflags(write=False)
@@ -115,7 +115,7 @@ class Plan:
         def fill_modes(first: int, stop: int) -> None:
             work = np.empty(2 * PIECE_VERTICES**2)
             lib.ath_basis_modes(
-                self.pieces.ctypes.data, first, stop, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
+                self.pieces.ctypes.data, first, stop, at, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
             )
 
         def fill_sheets(first: int, stop: int) -> None:

@@ -525,9 +525,7 @@ class Search:
         modes, tracks = (
             sum(
                 estimated_bits(
-                    _analysed(prelude.plan, plain, sample, some).coefficients,
-                    pieces,
-                    len(learned_modes.counts),
+                    _analysed(prelude.plan, plain, sample, some).coefficients, pieces, len(learned_modes.counts)
                 )
                 * sample.scale
                 for sample in self.samples
@@ -671,7 +669,9 @@ class Search:
     def _with_node_steps(self, settings: Settings) -> Settings:
         """Maps of inner nodes that keep to their share of the file, no finer than the levels' errors ask for."""
         prelude, errors = self.prelude(settings), self._level_errors(settings.bound)
-        segment = _analysed(prelude.plan, settings, self.samples[len(self.samples) // 2], self.learned_modes(prelude.plan, settings))
+        segment = _analysed(
+            prelude.plan, settings, self.samples[len(self.samples) // 2], self.learned_modes(prelude.plan, settings)
+        )
         rest = self.cost(settings)[1].sum() + self._prelude_bytes(prelude)
         scale = self.source.clip.frame_count / self.sample.shape[2]
         allowed = max(qz.NODE_BYTES, qz.NODE_SHARE / (1 - qz.NODE_SHARE) * rest)

@@ -403,7 +403,9 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
-    segment = SegmentMotion(plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic)
+    segment = SegmentMotion(
+        plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
+    )
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 
