@@ -75,7 +75,7 @@ class Motion(ctypes.Structure):
     """ath_motion."""
 
     _fields_ = [
-        (name, c_void_p) for name in ("streams", "cosines", "attach_caches", "work", "before", "known", "decoded")
+        (name, c_void_p) for name in ("streams", "waves", "attach_caches", "work", "before", "known", "decoded")
     ]
     _fields_ += [("frames", c_int32), ("ratio", c_int32)]
 
@@ -168,11 +168,11 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_build_plan": (None, [POINTER(CorePlan), c_void_p, c_void_p, c_void_p, c_int]),
     "ath_basis_table_size": (c_size_t, [c_int32]),
     "ath_basis_layout": (c_int64, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
-    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p, c_void_p]),
+    "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 4]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, *[c_void_p] * 4]),
     "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
-    "ath_cosine_basis": (None, [c_int32, c_void_p]),
+    "ath_waves": (None, [c_int32, c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),
     "ath_model_size": (c_size_t, []),

@@ -333,13 +333,18 @@ def _steady_step(method: int, time: np.ndarray) -> float | None:
 
 
 def pack_clips(
-    clip_ranges: Sequence[ClipRange], segment_counts: Sequence[int], seams: Sequence[Sequence[float] | None]
+    clip_ranges: Sequence[ClipRange],
+    segment_counts: Sequence[int],
+    seams: Sequence[Sequence[float] | None],
+    periodic: bool = False,
 ) -> bytes:
-    """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32."""
+    """CLIPS; seams: for a loop the error at the seam of each level, scene units, rounded up to float32. periodic:
+    whether loops of one segment are coded by periodic waves."""
     entries = []
     for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
         name = clip_range.name.encode()
-        entries.append(_CLIP.pack(clip_range.frame_count, segments, int(clip_range.loop), len(name)) + name)
+        flags = clip_range.loop | (clip_range.loop and periodic and segments == 1) << 1
+        entries.append(_CLIP.pack(clip_range.frame_count, segments, flags, len(name)) + name)
         if clip_range.loop:
             entries.append(_round_up(errors).astype("<f4").tobytes())
     return b"".join(entries)

@@ -91,7 +91,7 @@ class Clip(Structure):
 
     _fields_ = [("name", ctypes.c_char_p), ("duration", c_double)]
     _fields_ += [
-        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop reserved").split()
+        (name, c_int32) for name in ("first_frame frame_count first_segment segment_count loop periodic").split()
     ]
 
 

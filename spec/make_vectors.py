@@ -611,6 +611,16 @@ def loop(clip: rd.Clip, *seams: float) -> rd.Clip:
     return replace(clip, seams=seams)
 
 
+def periodic(clip: rd.Clip, *seams: float) -> rd.Clip:
+    return replace(loop(clip, *seams), periodic=True)
+
+
+def all_waves(frames: int) -> Callable[[], Plant]:
+    clips = rd.Clip(frames, 1, "once"), periodic(rd.Clip(frames, 1, "again"), 0.0, 0.0)
+    rows = row(*(tuple((k + axis) % 5 - 2 for axis in range(3)) for k in range(frames)))
+    return lambda: lone(clips=clips, scripts={(rd.STEMS, 0): rows})
+
+
 def named(*names: str) -> Plant:
     """One vertex with a clip of a frame for each name."""
     return lone(clips=tuple(rd.Clip(1, 1, name) for name in names))
@@ -654,6 +664,22 @@ valid(
 )
 valid("clip-named", "a single clip with a name", lambda: two_clips(clips=(CALM,)))
 valid("clip-loop", "a single clip with a name, a loop", lambda: two_clips(clips=(loop(STORM, 3.0, 2.0, 1.0),)))
+valid(
+    "clips-periodic",
+    "of three loops of one segment the first and the last are periodic",
+    lambda: moving(
+        FORK,
+        30,
+        heads=HEADS,
+        clips=(
+            periodic(CALM, 0.5, 0.25, 0.0),
+            loop(rd.Clip(3, 1, "jerks"), 0.5, 0.25, 0.0),
+            periodic(rd.Clip(1, 1, "one"), 0.0, 0.0, 0.0),
+        ),
+    ),
+)
+for frames in (2, 3, 4, 7, 33, 255, 256):
+    valid(f"waves-{frames}", f"all waves of {frames} frames, once of a beam and once periodic", all_waves(frames))
 valid("clip-unnamed", "a single clip that CLIPS gives an empty name", lambda: two_clips(clips=(rd.Clip(4, 2),)))
 valid(
     "clip-unnamed-loop",
@@ -1033,7 +1059,7 @@ valid(
 )
 valid(
     "learned-basis-full",
-    "a learned basis of as many rows as frames, 16 bits, beside cosines on other levels",
+    "a learned basis of as many rows as frames, 16 bits, beside waves on other levels",
     lambda: moving(
         FORK,
         43,
@@ -1738,7 +1764,7 @@ valid("layers-shapes-of-last", "shapes in a refinement alone", layered(3, (rd.SH
 valid("layers-shapes-of-first", "shapes in the first layer alone", layered(3, (rd.SHAPES, 3, 0), (rd.SHAPES, 4, 0)))
 valid(
     "layers-learned-first",
-    "learned time bases in the first layer: predictions in cosines are of all frequencies",
+    "learned time bases in the first layer: predictions in waves are of all frequencies",
     layered(heads=learned(1, 2)),
 )
 valid("layers-learned-one", "a learned time basis in one refinement", layered(heads=learned(3)))
@@ -1818,6 +1844,11 @@ valid(
     "layers-clips",
     "two clips, one of them a loop",
     layered(clips=(loop(rd.Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), rd.Clip(2, 1, "down"))),
+)
+valid(
+    "layers-periodic",
+    "two clips, one of them periodic",
+    layered(clips=(periodic(rd.Clip(3, 1, "up"), 0.5, 0.4, 0.3, 0.2, 0.1), rd.Clip(2, 1, "down"))),
 )
 valid("layers-lossless", "EXACT behind three layers", lossless_layers)
 for level_ in range(5):
@@ -2664,13 +2695,15 @@ clips(
     clip_entry(11, 7, "storm"),
 )
 clips("of-one-do-not-add-up", "the only clip has less frames than the file", clip_entry(6, 3, "all"), count=1)
-for bit in range(1, 8):
+for bit in range(2, 8):
     clips(
         f"flags-{bit}",
         f"reserved bit {bit} of Clip_Flags is set",
         clip_entry(3, 1, "calm", flags=1 << bit),
         STORM_ENTRY,
     )
+clips("periodic-no-loop", "Periodic of a clip that is no loop", clip_entry(3, 1, "calm", flags=2), STORM_ENTRY)
+clips("periodic-segments", "Periodic of two segments", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0,) * 3, flags=3))
 clips("name-none", "Name_Length 0 in a file of two clips", CALM_ENTRY, clip_entry(4, 2))
 clips("name-twice", "two clips with the same Name", CALM_ENTRY, clip_entry(4, 2, "calm"))
 clips(
@@ -2934,7 +2967,7 @@ motion(
 for name, level, reason, base in (
     ("own", 1, "Basis_Level is the level itself", 1),
     ("later", 1, "Basis_Level is a later level", 2),
-    ("cosines", 2, "Basis_Level is a level in cosines", 1),
+    ("waves", 2, "Basis_Level is a level in waves", 1),
     ("missing", 2, "Basis_Level is a level without STEMS", 0),
 ):
     motion(
@@ -3007,13 +3040,13 @@ def forked_plan() -> rd.Plan:
 
 
 def stems_motion(head: bytes, frames: int) -> rd.Motion:
-    made = rd.Motion(frames, rd.cosine_waves(frames))
+    made = rd.Motion(frames, rd.waves_over_time(frames, False))
     rd.read_stems_head(head, made, 1)
     return made
 
 
 def affines(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_affines, list(script), forked_plan(), rd.Motion(2, rd.cosine_waves(2)), 0)
+    return lambda: write(rd.decode_affines, list(script), forked_plan(), rd.Motion(2, rd.waves_over_time(2, False)), 0)
 
 
 motion("step-beyond", rd.AFFINES, 0, "the step of a map is 2^100.5", affines(201))
@@ -3037,7 +3070,7 @@ invalid(
 
 
 def shapes(*script) -> Callable[[], bytes]:
-    return lambda: write(rd.decode_shapes, list(script), forked_plan(), rd.Motion(1, rd.cosine_waves(1)), 1)
+    return lambda: write(rd.decode_shapes, list(script), forked_plan(), rd.Motion(1, rd.waves_over_time(1, False)), 1)
 
 
 motion("too-many", rd.SHAPES, 1, "a piece of three modes has ten shapes", shapes(10))

@@ -16,7 +16,7 @@ import math
 import re
 import struct
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import islice
 
@@ -188,6 +188,7 @@ class Clip:
     segments: int
     name: str = ""
     seams: tuple[float, ...] | None = None  # of a loop: Seam_Errors, one for each level
+    periodic: bool = False  # a loop of one segment, in periodic waves
 
     @property
     def segment_lengths(self) -> list[int]:
@@ -198,7 +199,9 @@ class Clip:
     def entry(self) -> bytes:
         """What CLIPS says of it."""
         name, seams = self.name.encode("utf-8"), self.seams or ()
-        head = struct.pack("<IIBB", self.frames, self.segments, self.seams is not None, len(name))
+        head = struct.pack(
+            "<IIBB", self.frames, self.segments, (self.seams is not None) | self.periodic << 1, len(name)
+        )
         return head + name + struct.pack(f"<{len(seams)}f", *seams)
 
 
@@ -221,14 +224,15 @@ def read_clip(chunk: bytes, at: int, header: Header) -> tuple[Clip, int]:
     require(at + CLIP_BYTES <= len(chunk), "CLIPS ends inside a clip")
     frames, segments, flags, length = u32(chunk, at), u32(chunk, at + 4), chunk[at + 8], chunk[at + 9]
     require(1 <= segments <= frames <= SEGMENT_FRAMES * segments, "Clip_Frames or Clip_Segments is out of range")
-    require(flags < 2, "Clip_Flags has reserved bits")
+    require(flags < 4, "Clip_Flags has reserved bits")
+    require(flags < 2 or (flags == 3 and segments == 1), "Periodic of a clip that is no loop of one segment")
     require(length > 0 or header.clip_count == 1, "Name_Length is 0 in a file of several clips")
     name_at, seams_at = at + CLIP_BYTES, at + CLIP_BYTES + length
-    end = seams_at + (4 * header.full_level_count if flags else 0)
+    end = seams_at + (4 * header.full_level_count if flags & 1 else 0)
     require(end <= len(chunk), "CLIPS ends inside a clip")
-    seams = tuple(f32(chunk, i) for i in range(seams_at, end, 4)) if flags else None
+    seams = tuple(f32(chunk, i) for i in range(seams_at, end, 4)) if flags & 1 else None
     require(all(finite(seam) and seam >= 0.0 for seam in seams or ()), "a seam's error is no length")
-    return Clip(frames, segments, clip_name(chunk[name_at:seams_at]), seams), end
+    return Clip(frames, segments, clip_name(chunk[name_at:seams_at]), seams, flags >= 2), end
 
 
 def clip_name(name: bytes) -> str:
@@ -792,7 +796,7 @@ def decode_rest(
         for r in range(runs):
             n = left * (r + 1) // runs - left * r // runs
             base = rest[branch.attach] if len(rest) == branch.first else rest[-1]
-            modes = cantilever((1,) * n, 100.0, 0.0)
+            modes = cantilever((1,) * n, 100.0, 0.0, 1.0)
             if before:
                 row = decode_refined_run(coder, rows, modes, step, base, before, len(rest))
             else:
@@ -1089,7 +1093,7 @@ class BentPose:
 
     def _run(self, first: int, n: int, before: int, turn: np.ndarray) -> None:
         row, _ = decode_row(self.coder, self.rows, RUN_VERTICES, n, 0)
-        modes = cantilever((1,) * n, 100.0, 0.0)
+        modes = cantilever((1,) * n, 100.0, 0.0, 1.0)
         bent = np.array([in_order(modes * np.array(row[k][:n], float)[:, None]) * self.step for k in range(3)])
         local = self.reference[first : first + n, :, 0] - self.reference[before, :, 0] + bent.T
         self.rest[first : first + n] = self.rest[before] + mat_vec(turn, local.T).T[:, :, None]
@@ -1832,7 +1836,7 @@ class Plan:
     def basis(self, piece: Piece) -> np.ndarray:
         """(modes, count): functions over the piece's vertices."""
         if piece.number not in self._bases:
-            modes = cantilever(piece_gaps(self, piece), 0.1, 0.001)
+            modes = cantilever(piece_gaps(self, piece), 0.1, 0.001, tip_weight(self, piece))
             self._bases[piece.number] = sheet(self, piece, modes) if piece.flags & SHEET else modes
         return self._bases[piece.number]
 
@@ -1887,8 +1891,7 @@ def in_order(terms: np.ndarray) -> np.ndarray:
 def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
     """Distances along a piece in quarters of their mean, 1 to 64."""
     before = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices][:-1]])
-    x, y, z = (plan.rest[piece.vertices] - before).T
-    lengths = np.sqrt(x * x + y * y + z * z)
+    lengths = distances(plan.rest[piece.vertices], before)
     if piece.flags & SHEET:
         lengths[:] = 0.0
     total = in_order(lengths)
@@ -1896,21 +1899,37 @@ def piece_gaps(plan: Plan, piece: Piece) -> tuple[int, ...]:
     return tuple(64 if q >= 64.0 else int(q) if q >= 1.0 else 1 for q in quarters.tolist())
 
 
+def tip_weight(plan: Plan, piece: Piece) -> float:
+    """What the last vertex counts in products of the modes of its piece."""
+    points = np.vstack([plan.attach_point(piece), plan.rest[piece.vertices]])
+    way, chord = in_order(distances(points[1:], points[:-1])), distances(points[-1], points[0])
+    return 2.0 if not piece.flags & SHEET and piece.count > 1 and 2.0 * way <= 3.0 * chord else 1.0
+
+
+def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    x, y, z = (a - b).T
+    return np.sqrt(x * x + y * y + z * z)
+
+
 @cache
-def cantilever(gaps: tuple[int, ...], turn: float, rough: float) -> np.ndarray:
+def cantilever(gaps: tuple[int, ...], turn: float, rough: float, tip: float) -> np.ndarray:
     """(n, n): modes of a randomly bent cantilever, its covariance's eigenvectors, largest eigenvalue
-    first."""
+    first; orthonormal where the last vertex counts `tip` times."""
     n, total = len(gaps), float(sum(gaps))
     s = np.cumsum(gaps) / total
     high, low = np.maximum(s[:, None], s), np.minimum(s[:, None], s)
     bend = low * low * (3.0 * high - low) / 6.0
-    q, d, e = tridiagonalise(bend + turn * (low * high) + rough * low)
+    covariance = bend + turn * (low * high) + rough * low
+    covariance[:, -1] *= math.sqrt(tip)
+    covariance[-1] *= math.sqrt(tip)
+    q, d, e = tridiagonalise(covariance)
     diagonalise(q, d, e)
     modes = []
     for _ in range(n):
         best = max(range(n), key=lambda i: d[i])  # the first of equals
         sign = -1.0 if q[best, n - 1] < 0.0 else 1.0
         modes.append(sign * q[best])
+        modes[-1][-1] /= math.sqrt(tip)
         d[best] = -1e300
     return np.array(modes)
 
@@ -2014,16 +2033,89 @@ PI = 3.14159265358979323846
 
 
 @cache
-def cosine_waves(frames: int) -> np.ndarray:
-    """(frames, frames): the orthonormal DCT-II, wave k at frame t."""
-    first, other = math.sqrt(1.0 / frames), math.sqrt(2.0 / frames)
-    cosines = [cos_of_fraction(j, frames) for j in range(4 * frames)]
-    return np.array(
-        [
-            [(first if k == 0 else other) * cosines[(2 * t + 1) * k % (4 * frames)] for t in range(frames)]
-            for k in range(frames)
-        ]
-    )
+def waves_over_time(frames: int, periodic: bool) -> np.ndarray:
+    """(frames, frames): wave k at frame t, modes of a free beam or a Fourier series."""
+    return np.array(periodic_waves(frames) if periodic else beam_waves(frames))
+
+
+def beam_waves(frames: int) -> list[list[float]]:
+    waves = [unit_length([1.0] * frames)]
+    if frames > 1:
+        waves.append(unit_length([0.5 * (frames - 1) - t for t in range(frames)]))
+    return waves + [beam_wave(frames, k) for k in range(2, frames)]
+
+
+def unit_length(x: list[float]) -> list[float]:
+    length2 = 0.0
+    for value in x:
+        length2 = length2 + value * value
+    scale = 1.0 / math.sqrt(length2)
+    return [value * scale for value in x]
+
+
+def beam_wave(frames: int, k: int) -> list[float]:
+    """Of a mode that bends: cos((2 t + 1) h + phase), and what falls by `decay` a frame from either end."""
+    sine, cosine, decay, slope = mode_at(frames, k, PI * (k - 0.5) / (2 * frames))
+    for _ in range(24):
+        sine, cosine, decay, slope = mode_at(frames, k, (0.5 * PI * k - atan_of(slope)) / frames)
+    sign, unit = 1.0 if k % 2 == 0 else -1.0, 1.0 / math.sqrt(1.0 + slope * slope)
+    c, s = (cosine - sine * slope) * unit, (sine + cosine * slope) * unit
+    turn_c, turn_s = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+    edge, fall, wave = c / (1.0 + sign * power(decay, frames - 1)), [1.0], [0.0] * frames
+    for _ in range(frames - 1):
+        fall.append(fall[-1] * decay)
+    for t in range((frames + 1) // 2):
+        x = c + edge * (fall[t] + sign * fall[frames - 1 - t])
+        wave[frames - 1 - t] = sign * x
+        wave[t] = x
+        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+    return unit_length(wave)
+
+
+def mode_at(frames: int, k: int, h: float) -> tuple[float, float, float, float]:
+    """Sine and cosine of h, decay, tangent of the phase."""
+    sine, cosine = sin_of(h), cos_of(h)
+    root = math.sqrt(1.0 + sine * sine)
+    decay = (root - sine) * (root - sine)
+    far = power(decay, frames)
+    ratio = (1.0 - far) / (1.0 + far)
+    return sine, cosine, decay, cosine / root * (ratio if k % 2 == 0 else 1.0 / ratio)
+
+
+def power(x: float, n: int) -> float:
+    product = 1.0
+    while n > 0:
+        if n % 2 == 1:
+            product = product * x
+        x, n = x * x, n // 2
+    return product
+
+
+def cos_of(x: float) -> float:
+    """0 <= x <= pi / 2."""
+    return cos_series(x) if x <= 0.25 * PI else sin_series(0.5 * PI - x)
+
+
+def sin_of(x: float) -> float:
+    return sin_series(x) if x <= 0.25 * PI else cos_series(0.5 * PI - x)
+
+
+def atan_of(x: float) -> float:
+    """x >= 0."""
+    half = x / (1.0 + math.sqrt(1.0 + x * x))
+    quarter, total = half / (1.0 + math.sqrt(1.0 + half * half)), 0.0
+    for k in range(25, 0, -2):
+        total = 1.0 / k - total * (quarter * quarter)
+    return 4.0 * (quarter * total)
+
+
+def periodic_waves(frames: int) -> list[list[float]]:
+    once, twice, waves = math.sqrt(1.0 / frames), math.sqrt(2.0 / frames), []
+    for k in range(frames):
+        turns, later = (k + 1) // 2, 3 * frames if k > 0 and k % 2 == 0 else 0
+        size = once if k == 0 or 2 * turns == frames else twice
+        waves.append([size * cos_of_fraction((4 * turns * t + later) % (4 * frames), frames) for t in range(frames)])
+    return waves
 
 
 def cos_of_fraction(j: int, frames: int) -> float:
@@ -2063,7 +2155,7 @@ class LevelStream:
     rotation_step_factor: float
     only_tips: bool  # pieces that carry others have no rotations
     waves: np.ndarray  # (rank, frames)
-    root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are cosines
+    root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are waves
 
 
 @dataclass
@@ -2071,7 +2163,7 @@ class Motion:
     """The integers of a segment: rows of three axes over frequency. What no chunk holds is missing."""
 
     frames: int
-    cosines: np.ndarray
+    waves: np.ndarray
     streams: dict[int, LevelStream] = field(default_factory=dict)  # by level
     shapes: dict[int, list[np.ndarray]] = field(default_factory=dict)  # by piece: (16, 3), one per shape
     shape_rows: dict[int, list] = field(default_factory=dict)  # by piece: their integers
@@ -2148,7 +2240,7 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
     require(finite(step) and step > 0.0 and rotation & ~8 <= 4, "Step or Rotation of STEMS is out of range")
     require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
-    waves, root, body = motion.cosines, None, chunk[6:]
+    waves, root, body = motion.waves, None, chunk[6:]
     if bits:
         waves, root, body = read_basis(body, motion, level, bits)
     motion.streams[level] = LevelStream(step, float((1 << (rotation & 7)) >> 1), rotation & 8 != 0, waves, root)
@@ -2498,13 +2590,13 @@ class Pose:
         step = motion.node_step.get(node.number, 1.0)
         c, R = self.attach_frame(piece)
         if piece.has_shift:
-            c = c + over_time(motion.node_shift.get(node.number), step, motion.cosines)
+            c = c + over_time(motion.node_shift.get(node.number), step, motion.waves)
         rows = motion.node_rows.get(node.number, [])  # of predicted motion, where no chunk has them
         return (
             c,
             R,
             [
-                (functional, over_time(row, step, motion.cosines))
+                (functional, over_time(row, step, motion.waves))
                 for functional, row in zip(self.plan.whitening(node), rows)
             ],
         )
@@ -2665,7 +2757,8 @@ class Refinement(Pose):
         c, R = self.turned_frames(piece)
         local = mat_vec(R.transpose(1, 0, 2), self.before.placed[piece.vertices] - c)
         local = local - plan.from_attach(piece)[:, :, None]
-        tracks = np.array([in_order(mode[:, None, None] * local) for mode in basis[:known]])
+        weights = np.append(np.ones(piece.count - 1), tip_weight(plan, piece))
+        tracks = np.array([in_order((mode * weights)[:, None, None] * local) for mode in basis[:known]])
         for m in range(known):
             track = tracks[m]
             if shapes and m < plan.shape_modes(piece):
@@ -3145,9 +3238,14 @@ class AthFile:
             places += [(AFFINES, d, s)] if self.plan.has_affines(d, level) else []
         return [self._places[place] for place in places if place in self._places]
 
+    def _waves(self, s: int) -> np.ndarray:
+        """Of a segment."""
+        periodic = [clip.periodic for clip in self.clips for _ in range(clip.segments)]
+        return waves_over_time(self._segment_lengths[s], periodic[s])
+
     def _first_layer(self, s: int, frames: int, level: int) -> Pose:
         """All vertices of a segment at a level of the branch hierarchy."""
-        plan, motion = self._plan_of(level, 0), Motion(frames, cosine_waves(frames))
+        plan, motion = self._plan_of(level, 0), Motion(frames, self._waves(s))
         for d in range(level + 1):
             if self.find(SHAPES, d):
                 decode_shapes(self.content(SHAPES, d), plan, motion, d)
@@ -3163,7 +3261,7 @@ class AthFile:
         """All vertices of a segment in a layer, from those of the layer before."""
         level = self.plan.height + 1 + q
         plan = self._plan_of(level, q)
-        motion = Motion(frames, cosine_waves(frames), dict(before.motion.streams))
+        motion = Motion(frames, self._waves(s), dict(before.motion.streams))
         if self.find(SHAPES, level):
             chunk = self.content(SHAPES, level)
             require(len(chunk) >= 1 and chunk[0] <= MOST_SHIFT, "Shift of SHAPES is out of range")
@@ -3261,7 +3359,7 @@ def raw(file: AthFile, what: str, mesh: bytes | None = None) -> bytes:
     if what == "time":
         return np.concatenate(file.times).astype("<f8").tobytes()
     if what == "clips":
-        return b"".join(clip.entry() for clip in file.clips)
+        return b"".join(replace(clip, periodic=False).entry() for clip in file.clips)  # how it is coded is no answer
     if mesh is not None:
         file.set_host_mesh(mesh)
     return (file.rest() if what == "rest" else file.positions(int(what))).tobytes()

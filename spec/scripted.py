@@ -506,6 +506,13 @@ def basis_stream(rows: list[list[int]], bits: int) -> bytes:
     return write(rd.decode_temporal, script, len(rows), len(rows[0]), bits)
 
 
+def _no_motion(frames: int, periodic: bool = False, shapes: rd.Motion | None = None) -> rd.Motion:
+    motion = rd.Motion(frames, rd.waves_over_time(frames, periodic))
+    if shapes:
+        motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
+    return motion
+
+
 @dataclass
 class Plant:
     """A file of scripts, by (kind, level, segment) or (kind, level). Streams without a script hold empty rows; SHAPES,
@@ -564,23 +571,23 @@ class Plant:
             entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
             self.plan = rd.Plan(branches)
             self.plan.rest = np.array(rests[-1].rest)
-        self.plans, self.shapes = [self.plan], [self._no_motion(1)]
+        self.plans, self.shapes = [self.plan], [_no_motion(1)]
         for level in range(self.plan.height + 2):
             if (rd.SHAPES, level, 0) in self.scripts:
                 entries.append(Entry(rd.SHAPES, self._shapes(level), level))
         for q in range(1, self.layers):
             entries += self._layer(branches, q, rests)
-        lengths = [frames for clip in clips for frames in clip.segment_lengths]
-        for s, frames in enumerate(lengths):
-            entries += self._segment(s, frames)
+        segments = [(frames, clip.periodic) for clip in clips for frames in clip.segment_lengths]
+        for s, (frames, periodic) in enumerate(segments):
+            entries += self._segment(s, frames, periodic)
         entries.sort(key=lambda entry: entry.key)
         levels = self.plan.height + 1 + self.layers
         return Draft(
             dict(
                 vertex_count=vertices,
                 branch_count=len(self.stems),
-                frame_count=sum(lengths),
-                segment_count=len(lengths),
+                frame_count=sum(clip.frames for clip in clips),
+                segment_count=len(segments),
                 level_count=levels,
                 full_level_count=levels,
                 clip_count=len(clips),
@@ -625,12 +632,6 @@ class Plant:
             self.plan.rest = np.array(coded.rest)
             return [coded]
 
-    def _no_motion(self, frames: int, shapes: rd.Motion | None = None) -> rd.Motion:
-        motion = rd.Motion(frames, rd.cosine_waves(frames))
-        if shapes:
-            motion.shapes, motion.shape_rows = shapes.shapes, shapes.shape_rows
-        return motion
-
     def _shapes(self, level: int) -> bytes:
         """SHAPES by its script; its values are used by the streams of STEMS."""
         return self._write(rd.decode_shapes, (rd.SHAPES, level, 0), self.plan, self.shapes[0], level)
@@ -638,7 +639,7 @@ class Plant:
     def _layer(self, branches: list, q: int, rests: list[rd.RestLayer]) -> list[Entry]:
         """What all segments share of a refinement."""
         level, entries = self.plan.height + 1 + q, []
-        plan, shapes = self.plans[-1].refined(branches, level), self._no_motion(1)
+        plan, shapes = self.plans[-1].refined(branches, level), _no_motion(1)
         if (rd.REFINED_REST, level, 0) in self.scripts:
             entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
             plan.rest = np.array(rests[-1].rest)
@@ -658,8 +659,8 @@ class Plant:
         rests.append(rd.decode_rest(stream, *arguments))
         return Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level)
 
-    def _segment(self, s: int, frames: int) -> list[Entry]:
-        motion = self._no_motion(frames, self.shapes[0])
+    def _segment(self, s: int, frames: int, periodic: bool) -> list[Entry]:
+        motion = _no_motion(frames, periodic, self.shapes[0])
         entries, last = [], self.plan.height + 1
         for level in range(last + 1):
             if self.plan.has_stems(level):
@@ -675,7 +676,7 @@ class Plant:
             stream = self._write(self._predict, (rd.PREDICTED, 1, s), frames)
             entries.append(Entry(rd.PREDICTED, self.predicted + stream, 1, s))
         if self.layers > 1:
-            entries += self._refinements(s, motion)
+            entries += self._refinements(s, motion, periodic)
         for level in range(last, last + self.layers):
             place = (rd.CORRECTIONS, level, s)
             if place in self.scripts or place[:2] in self.scripts:
@@ -694,14 +695,14 @@ class Plant:
         rd.read_stems_head(head, motion, level)
         return head
 
-    def _refinements(self, s: int, motion: rd.Motion) -> list[Entry]:
+    def _refinements(self, s: int, motion: rd.Motion, periodic: bool) -> list[Entry]:
         """STEMS of further layers, from the motion of the first."""
         entries, pose = [], rd.Pose(self.plan, motion)
         with np.errstate(all="ignore"):
             pose.place_level(self.plan.height + 1)
         for q in range(1, self.layers):
             level, before = self.plan.height + 1 + q, pose
-            motion = self._no_motion(motion.frames, self.shapes[q])
+            motion = _no_motion(motion.frames, periodic, self.shapes[q])
             motion.streams |= before.motion.streams
             head = struct.pack("<H", self.ratio) + self._head(level, s, motion)
             pose = rd.Refinement(self.plans[q], motion, before)

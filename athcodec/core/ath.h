@@ -264,8 +264,8 @@ typedef struct ath_clip {
     double duration;  /* seconds from its first frame to its last */
     int32_t first_frame, frame_count;
     int32_t first_segment, segment_count;
-    int32_t loop; /* 1: its first frame follows its last */
-    int32_t reserved;
+    int32_t loop;     /* 1: its first frame follows its last */
+    int32_t periodic; /* 1: a loop that is one segment, coded by functions of time that go on across its seam */
 } ath_clip;
 
 /* info.clip_count of them. */

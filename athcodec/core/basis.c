@@ -1,10 +1,10 @@
-/* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, cosines in
+/* The orthonormal bases of the motion model: cantilever modes along a piece, affine functions of a sheet, waves in
  * time. FORMAT.md, "Bases", states the same operations in the same order; nothing here may be reordered. */
 #include "plan.h"
 
 #define PI 3.14159265358979323846
 
-enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES };
+enum { MOST_PROBES = 64, MOST_ROWS = ATH_SEGMENT_FRAMES, MODE_STEPS = 24 };
 
 /* Householder reduction of the symmetric n x n matrix `a` to tridiagonal form; on return row i of `q` is the i-th
  * basis vector in which the matrix is tridiagonal (diagonal d, subdiagonal e[1..n-1]). */
@@ -119,10 +119,12 @@ static void eigenvectors(int32_t n, double *a, double *q, double *values, double
 }
 
 /* Eigenvectors, largest eigenvalue first, of the covariance of a randomly bent cantilever at the arc lengths that
- * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. */
-static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double *basis, double *work)
+ * `gaps` (small positive integers) add up to: an integrated Wiener process, free rotation by `turn`, roughness. They are
+ * orthonormal where the last vertex counts `tip` times. */
+static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough, double tip, double *basis,
+                       double *work)
 {
-    double s[ATH_PIECE_VERTICES], *a = work, *q = work + n * n;
+    double s[ATH_PIECE_VERTICES], *a = work, *q = work + n * n, root = ath_sqrt(tip);
     int32_t total = 0, along = 0;
     for (int32_t i = 0; i < n; i++) total += gaps[i];
     for (int32_t i = 0; i < n; i++) {
@@ -135,7 +137,10 @@ static void cantilever(int32_t n, const uint8_t *gaps, double turn, double rough
             double bend = low * low * (3.0 * high - low) / 6.0;
             a[i * n + j] = a[j * n + i] = bend + turn * (low * high) + rough * low;
         }
+    for (int32_t i = 0; i < n; i++) a[i * n + n - 1] = a[i * n + n - 1] * root;
+    for (int32_t i = 0; i < n; i++) a[(n - 1) * n + i] = a[(n - 1) * n + i] * root;
     eigenvectors(n, a, q, s, basis);
+    for (int32_t m = 0; m < n; m++) basis[m * n + n - 1] = basis[m * n + n - 1] / root;
 }
 
 void ath_principal(int32_t count, int32_t n, double *matrices, double *work, double *values, double *vectors)
@@ -148,7 +153,7 @@ void ath_rest_basis(int32_t n, double *basis, double *work)
 {
     uint8_t even[ATH_PIECE_VERTICES];
     memset(even, 1, sizeof even);
-    cantilever(n, even, 100.0, 0.0, basis, work);
+    cantilever(n, even, 100.0, 0.0, 1.0, basis, work);
 }
 
 /* Adds `candidate` to the `count` orthonormal rows of `basis`, its projections on them subtracted, twice for
@@ -236,15 +241,31 @@ static int same_gaps(const uint8_t *a, const uint8_t *b, int32_t n)
     return 1;
 }
 
-/* Pieces with equal gaps share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
+double ath_tip_weight(const ath_piece *piece, const double *rest)
+{
+    const double *base = rest + 3 * (size_t)(piece->attach >= 0 ? piece->attach : piece->first), *before = base;
+    double way = 0.0;
+    for (int32_t i = 0; i < piece->count; i++) {
+        const double *here = rest + 3 * (size_t)(piece->first + i);
+        way = way + distance(here, before);
+        before = here;
+    }
+    return !(piece->flags & ATH_SHEET) && piece->count > 1 && 2.0 * way <= 3.0 * distance(before, base) ? 2.0 : 1.0;
+}
+
+/* Pieces with equal gaps and weights share one basis. `table` is an open-addressing hash of pieces that own theirs. A file may be
  * made so that all of them collide: after MOST_PROBES a piece gets a basis to itself, which holds the same numbers. */
-static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, uint8_t *gaps, int32_t *table, uint32_t mask)
+static int32_t owner_of_basis(const ath_piece *pieces, int32_t p, const double *rest, const uint8_t *gaps,
+                              int32_t *table, uint32_t mask)
 {
     const uint8_t *mine = gaps + pieces[p].first;
+    double tip = ath_tip_weight(pieces + p, rest);
     uint32_t at = gaps_hash(mine, pieces[p].count) & mask;
     for (int32_t probe = 0; table[at] >= 0; probe++) {
         const ath_piece *other = pieces + table[at];
-        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)) return table[at];
+        if (other->count == pieces[p].count && same_gaps(mine, gaps + other->first, other->count)
+            && ath_tip_weight(other, rest) == tip)
+            return table[at];
         if (probe == MOST_PROBES) return p;
         at = (at + 1) & mask;
     }
@@ -267,7 +288,7 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     for (int32_t p = 0; p < piece_count; p++) {
         ath_piece *piece = pieces + p;
         piece_gaps(piece, rest, gaps + piece->first);
-        int32_t owner = owner_of_basis(pieces, p, gaps, table, (uint32_t)size - 1);
+        int32_t owner = owner_of_basis(pieces, p, rest, gaps, table, (uint32_t)size - 1);
         piece->rank = piece->count;
         piece->modes = owner == p ? next : pieces[owner].modes;
         if (owner == p) next += (int64_t)piece->count * piece->count;
@@ -280,15 +301,16 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
     return next;
 }
 
-void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps, double *work,
-                     double *bases)
+void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, const uint8_t *gaps,
+                     double *work, double *bases)
 {
     int64_t laid_out = 0; /* up to here by the pieces before: modes that stand further back are the piece's own */
     for (int32_t p = 0; p < stop; p++) {
         const ath_piece *piece = pieces + p;
         int64_t last = piece->flags & ATH_SHEET ? piece->basis : piece->modes;
         if (p >= first && piece->modes >= laid_out)
-            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, bases + piece->modes, work);
+            cantilever(piece->count, gaps + piece->first, 0.1, 0.001, ath_tip_weight(piece, rest), bases + piece->modes,
+                       work);
         last += (int64_t)piece->count * piece->count;
         if (last > laid_out) laid_out = last;
     }
@@ -303,7 +325,7 @@ void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const doub
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases)
 {
-    ath_basis_modes(pieces, 0, piece_count, gaps, work, bases);
+    ath_basis_modes(pieces, 0, piece_count, rest, gaps, work, bases);
     ath_basis_sheets(pieces, 0, piece_count, rest, bases);
 }
 
@@ -337,12 +359,110 @@ static double cos_of_fraction(int64_t j, int64_t T)
     return sign * value;
 }
 
-void ath_cosine_basis(int32_t frames, double *basis)
+/* Real Fourier series: a sine is a cosine a quarter of a turn later. */
+static void periodic_waves(int32_t frames, double *waves)
 {
-    double first = ath_sqrt(1.0 / (double)frames), other = ath_sqrt(2.0 / (double)frames);
-    for (int32_t k = 0; k < frames; k++)
+    double once = ath_sqrt(1.0 / (double)frames), twice = ath_sqrt(2.0 / (double)frames);
+    for (int32_t k = 0; k < frames; k++) {
+        int64_t turns = (k + 1) / 2, later = k > 0 && k % 2 == 0 ? 3 * frames : 0;
+        double size = k == 0 || 2 * turns == frames ? once : twice;
         for (int32_t t = 0; t < frames; t++)
-            basis[k * frames + t] = (k == 0 ? first : other) * cos_of_fraction((int64_t)(2 * t + 1) * k, frames);
+            waves[k * frames + t] = size * cos_of_fraction(4 * turns * t + later, frames);
+    }
+}
+
+/* For 0 <= x <= pi / 2. */
+static double cos_of(double x) { return x <= 0.25 * PI ? cos_series(x) : sin_series(0.5 * PI - x); }
+
+static double sin_of(double x) { return x <= 0.25 * PI ? sin_series(x) : cos_series(0.5 * PI - x); }
+
+/* For x >= 0, by the series at a quarter of the angle. */
+static double atan_of(double x)
+{
+    double half = x / (1.0 + ath_sqrt(1.0 + x * x)), quarter = half / (1.0 + ath_sqrt(1.0 + half * half)), sum = 0.0;
+    for (int32_t k = 25; k > 0; k -= 2) sum = 1.0 / (double)k - sum * (quarter * quarter);
+    return 4.0 * (quarter * sum);
+}
+
+static double power(double x, int32_t n)
+{
+    double product = 1.0;
+    for (; n > 0; n /= 2) {
+        if (n % 2 == 1) product = product * x;
+        x = x * x;
+    }
+    return product;
+}
+
+/* A mode of a free beam, cos((2 t + 1) h + phase) and what falls by `decay` a frame from either end. */
+typedef struct {
+    double sine, cosine; /* of h */
+    double decay, slope; /* slope: tan(phase) */
+} beam_mode;
+
+/* Mode k, its h taken as right; even modes are even about the middle, odd ones odd. */
+static beam_mode mode_at(int32_t frames, int32_t k, double h)
+{
+    beam_mode mode = {sin_of(h), cos_of(h), 0.0, 0.0};
+    double root = ath_sqrt(1.0 + mode.sine * mode.sine), other = root - mode.sine;
+    mode.decay = other * other;
+    double far = power(mode.decay, frames), ratio = (1.0 - far) / (1.0 + far);
+    mode.slope = mode.cosine / root * (k % 2 == 0 ? ratio : 1.0 / ratio);
+    return mode;
+}
+
+/* h solves 2 frames h = pi k - 2 phase(h): each step takes at least two bits, mostly ten, off the error. */
+static beam_mode find_mode(int32_t frames, int32_t k)
+{
+    beam_mode mode = mode_at(frames, k, PI * ((double)k - 0.5) / (double)(2 * frames));
+    for (int32_t step = 0; step < MODE_STEPS; step++)
+        mode = mode_at(frames, k, (0.5 * PI * (double)k - atan_of(mode.slope)) / (double)frames);
+    return mode;
+}
+
+static void unit_length(int32_t frames, double *wave)
+{
+    double length2 = 0.0;
+    for (int32_t t = 0; t < frames; t++) length2 = length2 + wave[t] * wave[t];
+    double scale = 1.0 / ath_sqrt(length2);
+    for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
+}
+
+static void beam_wave(int32_t frames, int32_t k, double *wave)
+{
+    beam_mode mode = find_mode(frames, k);
+    double sign = k % 2 == 0 ? 1.0 : -1.0, unit = 1.0 / ath_sqrt(1.0 + mode.slope * mode.slope);
+    double c = (mode.cosine - mode.sine * mode.slope) * unit, s = (mode.sine + mode.cosine * mode.slope) * unit;
+    double turn_c = 1.0 - 2.0 * mode.sine * mode.sine, turn_s = 2.0 * mode.sine * mode.cosine;
+    double edge = c / (1.0 + sign * power(mode.decay, frames - 1)), fall[ATH_SEGMENT_FRAMES];
+    fall[0] = 1.0;
+    for (int32_t t = 1; t < frames; t++) fall[t] = fall[t - 1] * mode.decay;
+    for (int32_t t = 0; 2 * t < frames; t++) {
+        double x = c + edge * (fall[t] + sign * fall[frames - 1 - t]), turned = c * turn_c - s * turn_s;
+        wave[frames - 1 - t] = sign * x;
+        wave[t] = x;
+        s = s * turn_c + c * turn_s;
+        c = turned;
+    }
+    unit_length(frames, wave);
+}
+
+static void beam_waves(int32_t frames, double *waves)
+{
+    for (int32_t t = 0; t < frames; t++) waves[t] = 1.0;
+    unit_length(frames, waves);
+    if (frames == 1) return;
+    for (int32_t t = 0; t < frames; t++) waves[frames + t] = 0.5 * (double)(frames - 1) - (double)t;
+    unit_length(frames, waves + frames);
+    for (int32_t k = 2; k < frames; k++) beam_wave(frames, k, waves + k * frames);
+}
+
+void ath_waves(int32_t frames, int32_t periodic, double *waves)
+{
+    if (periodic)
+        periodic_waves(frames, waves);
+    else
+        beam_waves(frames, waves);
 }
 
 double ath_tan_of_half(double x)

@@ -379,16 +379,18 @@ float ath_seam(const ath_clip_entry *entry, int32_t level) { return f32_at(entry
 
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry)
 {
-    if (chunk->size < 10 || chunk->bytes[8] > 1) return ATH_BAD_CHUNK;
+    if (chunk->size < 10 || chunk->bytes[8] > 3) return ATH_BAD_CHUNK;
     entry->frames = u32_at(chunk->bytes);
     entry->segments = u32_at(chunk->bytes + 4);
-    entry->loop = chunk->bytes[8];
+    entry->loop = chunk->bytes[8] & 1;
+    entry->periodic = chunk->bytes[8] >> 1;
     entry->name.size = chunk->bytes[9];
     size_t seams = entry->loop ? 4 * (size_t)header->full_level_count : 0;
     *chunk = rest_of(*chunk, 10);
     if (entry->segments < 1 || entry->segments > entry->frames
         || entry->frames > (uint64_t)ATH_SEGMENT_FRAMES * entry->segments || chunk->size < entry->name.size + seams
-        || (entry->name.size == 0 && header->clip_count > 1))
+        || (entry->name.size == 0 && header->clip_count > 1)
+        || (entry->periodic && !(entry->loop && entry->segments == 1)))
         return ATH_BAD_CHUNK;
     entry->name.bytes = chunk->bytes;
     entry->seams = chunk->bytes + entry->name.size;

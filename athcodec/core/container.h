@@ -60,7 +60,7 @@ typedef struct {
 
 typedef struct {
     uint32_t frames, segments;
-    int32_t loop;
+    int32_t loop, periodic;
     ath_bytes name;       /* UTF-8 */
     const uint8_t *seams; /* of a loop: full_level_count floats, see ath_seam */
 } ath_clip_entry;

@@ -165,6 +165,7 @@ static int read_clip(ath_file *file, int32_t index, ath_bytes *chunk)
     if (result != ATH_OK) return result;
     memcpy(file->names + NAME_BYTES * index, entry.name.bytes, entry.name.size);
     clip->loop = entry.loop;
+    clip->periodic = entry.periodic;
     for (int32_t level = 0; clip->loop && level < file->header.full_level_count; level++)
         file->seams[index * file->header.full_level_count + level] = ath_seam(&entry, level);
     for (int32_t before = 0; before < index; before++)
@@ -565,11 +566,12 @@ int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, int32_t ve
 /* ---- building ---- */
 
 /* The segments of a clip have as many frames as each other, or one more. */
-static int has_segments_of(const ath_file *file, int32_t frames)
+static int has_segments_of(const ath_file *file, int32_t periodic, int32_t frames)
 {
     for (int32_t i = 0; i < file->info.clip_count; i++) {
         const ath_clip *clip = file->clips + i;
         int32_t shorter = clip->frame_count / clip->segment_count, rest = clip->frame_count % clip->segment_count;
+        if (clip->periodic != periodic) continue;
         if (frames == shorter || (rest > 0 && frames == shorter + 1)) return 1;
     }
     return 0;
@@ -579,9 +581,10 @@ static uint64_t carve_build(ath_file *file, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-        if (has_segments_of(file, (int32_t)frames))
-            file->cosines[frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
+    for (int32_t periodic = 0; periodic < 2; periodic++)
+        for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+            if (has_segments_of(file, periodic, (int32_t)frames))
+                file->waves[periodic][frames] = (double *)ath_take(&arena, frames * frames * sizeof(double));
     return arena.used;
 }
 
@@ -603,8 +606,9 @@ int ath_build(ath_file *file, void *memory, size_t memory_bytes)
                        file->bases);
     }
     file->plan.bases = file->bases;
-    for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-        if (file->cosines[frames]) ath_cosine_basis(frames, file->cosines[frames]);
+    for (int32_t periodic = 0; periodic < 2; periodic++)
+        for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
+            if (file->waves[periodic][frames]) ath_waves(frames, periodic, file->waves[periodic][frames]);
     return ATH_OK;
 }
 
@@ -866,9 +870,19 @@ const ath_clip *ath_file_clip(const ath_file *file, int32_t frame)
     return clip_at(file, offsetof(ath_clip, first_frame), frame);
 }
 
+static const ath_clip *clip_of(const ath_file *file, int32_t segment)
+{
+    return clip_at(file, offsetof(ath_clip, first_segment), segment);
+}
+
+const double *ath_file_waves(const ath_file *file, int32_t segment)
+{
+    return file->waves[clip_of(file, segment)->periodic][ath_file_frames(file, segment)];
+}
+
 int32_t ath_segment_start(const ath_file *file, int32_t segment)
 {
-    const ath_clip *clip = clip_at(file, offsetof(ath_clip, first_segment), segment);
+    const ath_clip *clip = clip_of(file, segment);
     int64_t within = segment - clip->first_segment;
     return clip->first_frame + (int32_t)(clip->frame_count * within / clip->segment_count);
 }

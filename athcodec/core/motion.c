@@ -496,7 +496,7 @@ double ath_node_step(int32_t exponent) { return half_octave(exponent); }
 
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
-    ath_stream stream = {step, 0.0, motion->cosines, motion->frames, -1, 0, 0};
+    ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0, 0};
     return stream;
 }
 
@@ -730,9 +730,10 @@ ATH_HOT static void project_mode(const ath_plan *plan, int32_t T, const ath_piec
                                  const double *local, double *ATH_RESTRICT row)
 {
     const double *mode = plan->bases + piece->basis + (size_t)m * (size_t)piece->count;
+    double tip = ath_tip_weight(piece, plan->rest);
     for (int32_t i = 0; i < 3 * T; i++) row[i] = 0.0;
     for (int32_t v = 0; v < piece->count; v++) {
-        double weight = mode[v];
+        double weight = v == piece->count - 1 ? mode[v] * tip : mode[v];
         const double *x = local + (size_t)v * 3 * (size_t)T;
         for (int32_t i = 0; i < 3 * T; i++) row[i] = row[i] + weight * x[i];
     }

@@ -10,7 +10,7 @@ typedef struct ath_stream {
     double rotation_step_factor; /* of rotation tracks; 0: none are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t root;      /* level of the first of the streams whose learned bases begin with the same rows; -1: cosines */
+    int32_t root; /* level of the first of the streams whose learned bases begin with the same rows; -1: ath_waves */
     int32_t only_tips; /* 1: of pieces that carry others no rotations are coded */
     int32_t reserved;
 } ath_stream;
@@ -27,7 +27,7 @@ typedef struct ath_coarse {
 /* What the pieces and nodes of one segment are placed with. */
 typedef struct ath_motion {
     const ath_stream *streams; /* one per level, 0 to height + 1 */
-    const double *cosines;     /* frames x frames */
+    const double *waves;       /* frames x frames: ath_waves */
     double *attach_caches;     /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;              /* ath_motion_work(longest, frames) doubles */
     const ath_coarse *before;  /* of a refinement; else null */

@@ -64,13 +64,16 @@ ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, 
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
                                          int32_t *table);
+/* What the last vertex of a piece counts in the products of its modes, which are orthonormal so: twice in a cantilever that
+ * is not far from straight, whose errors are largest there. */
+double ath_tip_weight(const ath_piece *piece, const double *rest);
 /* work: ATH_BASIS_WORK doubles. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
 void ath_basis_fill(ath_piece *pieces, int32_t piece_count, const double *rest, const uint8_t *gaps, double *work,
                     double *bases);
 /* The same by ranges of pieces, in two passes: the sheets of one need the modes of any. */
-ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const uint8_t *gaps,
-                                     double *work, double *bases);
+ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
+                                     const uint8_t *gaps, double *work, double *bases);
 ATH_ENCODER_API void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest,
                                       double *bases);
 /* n x n: the modes of an evenly spaced beam that leaves its base in any direction; work: 2 n x n doubles. */
@@ -82,10 +85,10 @@ ATH_ENCODER_API void ath_principal(int32_t count, int32_t n, double *matrices, d
 /* Completes the nodes, once the rest pose is known. */
 ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
 
-/* frames x frames: row k is the k-th function of the orthonormal DCT-II. */
-ATH_ENCODER_API void ath_cosine_basis(int32_t frames, double *basis);
+/* frames x frames, orthonormal: row k is the k-th mode of a free beam or, where `periodic` is set, of a Fourier series. */
+ATH_ENCODER_API void ath_waves(int32_t frames, int32_t periodic, double *waves);
 
-/* tan(x / 2) for 0 <= x < pi, by the series of the cosines. */
+/* tan(x / 2) for 0 <= x < pi, by the series of sine and cosine. */
 double ath_tan_of_half(double x);
 
 ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex) { return plan->rest + 3 * (size_t)vertex; }

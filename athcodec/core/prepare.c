@@ -225,7 +225,7 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
 
 size_t ath_kept_size(const void *kept) { return (size_t)((const kept_head *)kept)->bytes; }
 
-/* Of the waves of a basis that is not of cosines. */
+/* Of the waves of a basis that is learned. */
 static size_t learned_numbers(const ath_work *work, const ath_stream *stream)
 {
     return stream->root < 0 ? 0 : (size_t)stream->temporal_rank * (size_t)work->segment->frames;
@@ -374,7 +374,7 @@ static void ready_layer(ath_work *work, int32_t q)
     layer->plan = ath_layer_plan(work->file, q, work->level);
     layer->motion.frames = work->segment->frames;
     layer->motion.streams = work->streams;
-    layer->motion.cosines = work->file->cosines[work->segment->frames];
+    layer->motion.waves = ath_file_waves(work->file, work->index);
     layer->motion.ratio = 1;
     layer->scratch = ath_motion_scratch(layer->plan, &layer->motion);
     layer->rows.counts = layer->counts;
@@ -393,7 +393,7 @@ static void ready_motion(ath_work *work)
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
-        work->streams[d].temporal = work->file->cosines[work->segment->frames];
+        work->streams[d].temporal = ath_file_waves(work->file, work->index);
         work->streams[d].root = -1;
         work->streams[d].temporal_rank = work->segment->frames;
     }

@@ -408,7 +408,7 @@ class EncodingJob:
 
     def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
-        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors)
+        return ct.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Of each clip, if it is a loop: how far off its step from the last frame to the first is, per level."""
@@ -494,7 +494,10 @@ class EncodingJob:
         positions, exact = self._positions(block)
         if decided.choice.predicted is not None:
             return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
-        return CodedSegment(index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact))
+        whole_loop = decided.source.is_whole_loop(index)
+        return CodedSegment(
+            index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact, whole_loop)
+        )
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""
@@ -534,6 +537,7 @@ def _summary(
         "rotations": list(settings.rotation_step_factors),
         "learned": list(settings.learned_bases),
         "sheets": int(settings.sheet.sum()),
+        "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
     }
     diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12

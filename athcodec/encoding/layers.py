@@ -94,6 +94,10 @@ class Layers:
         """Without that of the source's own numbers."""
         return self.level_0.level_count + len(self.each) - 1
 
+    def of_segment(self, whole_loop: bool) -> Layers:
+        """As Settings.of_segment has it."""
+        return replace(self, each=[replace(own, settings=own.settings.of_segment(whole_loop)) for own in self.each])
+
     @property
     def first_rest_bytes(self) -> int:
         """Of the streams up to the rest pose of the first layer."""
@@ -310,7 +314,7 @@ class _SegmentCoder:
         """The segment as level 0 shows it, which may have a rest pose of its own."""
         if self._level_0 is segment.plan:
             return segment
-        shown = SegmentMotion(self._level_0, segment.frames, segment.streams)
+        shown = SegmentMotion(self._level_0, segment.frames, segment.streams, periodic=settings.periodic)
         shown.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE, level=0)
         return shown
 
@@ -422,12 +426,19 @@ class _EvenLevels:
 
 
 def code_segment(
-    prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray, exact: np.ndarray | None = None
+    prelude: CodedPrelude,
+    layers: Layers,
+    segment_count: int,
+    positions: np.ndarray,
+    exact: np.ndarray | None = None,
+    whole_loop: bool = False,
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
     """Chunks {(level, kind): payload} of one of so many segments and (levels, 3) errors of stopping at each level.
 
-    exact: the source's own numbers (see Source.exact), which one more level is to give.
+    exact: the source's own numbers (see Source.exact), which one more level is to give. whole_loop: whether the segment
+    is all of a loop.
     """
+    layers = layers.of_segment(whole_loop)
     coder, level = _SegmentCoder(prelude, layers, segment_count, positions), layers.level_0.level_count
     segment = coder.first(layers.each[0])
     for before, layer in pairwise(layers.each):

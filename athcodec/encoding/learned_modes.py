@@ -51,7 +51,7 @@ class Components:
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
-    """Of segments that were analysed with a fine step, without learned modes and in cosines."""
+    """Of segments that were analysed with a fine step, in nothing learned."""
     sizes = np.minimum(plan.pieces["rank"], SHAPE_MODES)
     groups = [
         (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from ctypes import addressof
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,11 +40,14 @@ if TYPE_CHECKING:
 RANGES, LEAST_RANGE = 24, 1024  # of a plant's vertices per thread and call
 
 
-def cosine_basis(frames: int) -> np.ndarray:
-    """Rows of the orthonormal DCT-II, (frames, frames) float64, bit for bit those of the decoder."""
-    basis = np.empty((frames, frames))
-    lib.ath_cosine_basis(frames, basis.ctypes.data)
-    return basis
+@lru_cache(16)
+def waves_over_time(frames: int, periodic: bool = False) -> np.ndarray:
+    """The modes of a free beam or, if periodic, a Fourier series: orthonormal rows, (frames, frames) float64, bit for
+    bit those of the decoder."""
+    waves = np.empty((frames, frames))
+    lib.ath_waves(frames, periodic, waves.ctypes.data)
+    waves.setflags(write=False)
+    return waves
 
 
 class Plan:
@@ -112,7 +115,7 @@ class Plan:
         def fill_modes(first: int, stop: int) -> None:
             work = np.empty(2 * PIECE_VERTICES**2)
             lib.ath_basis_modes(
-                self.pieces.ctypes.data, first, stop, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
+                self.pieces.ctypes.data, first, stop, at, gaps.ctypes.data, work.ctypes.data, self.bases.ctypes.data
             )
 
         def fill_sheets(first: int, stop: int) -> None:
@@ -186,7 +189,7 @@ class LevelStream:
 
     step: float
     rotation_step_factor: float = 0.0
-    temporal: np.ndarray | None = None  # (rank, frames) float64; None: cosines
+    temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time
     only_tips: bool = False  # pieces that carry others have no rotations
     root: int = -1  # level of the first of the streams whose learned bases begin with the same rows
 
@@ -203,6 +206,7 @@ class SegmentMotion:
         before: SegmentMotion | None = None,
         ratio: int = 1,
         layered: bool = False,
+        periodic: bool = False,
     ):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
             raise ValueError(
@@ -216,7 +220,7 @@ class SegmentMotion:
         self.node_tracks = np.zeros((core.node_count, 4, 3, frames), np.int32)
         self.node_steps = np.zeros(core.node_count, np.int32)
         self._attach_caches = np.empty(lib.ath_attach_cache_size(core.attach_cache_rows, frames))
-        self.cosines = cosine_basis(frames)
+        self.waves = waves_over_time(frames, periodic)
         self.before, self.ratio = before, ratio
         if before is not None:
             self.predicted, self.predicted_tracks = np.zeros_like(self.coefficients), np.zeros_like(self.tracks)
@@ -247,14 +251,14 @@ class SegmentMotion:
         self._c_streams = (Stream * len(self.streams))()
         self._temporal = []  # keeps what the C structs point to
         for c_stream, stream in zip(self._c_streams, self.streams):
-            temporal = self.cosines if stream.temporal is None else stream.temporal
+            temporal = self.waves if stream.temporal is None else stream.temporal
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
             c_stream.root, c_stream.only_tips = stream.root, stream.only_tips
         self.motion = Motion(
             streams=addressof(self._c_streams),
-            cosines=self.cosines.ctypes.data,
+            waves=self.waves.ctypes.data,
             attach_caches=self._attach_caches.ctypes.data,
             frames=self.frames,
             ratio=self.ratio,

@@ -1,6 +1,6 @@
 """Predicted motion, the other way to code a clip: every vertex of every frame about what is decoded (FORMAT.md).
 
-It suits what cosines and modes do not: growth, few frames, noise, jumps, rests. `best_prediction` finds its settings,
+It suits what waves and modes do not: growth, few frames, noise, jumps, rests. `best_prediction` finds its settings,
 `code_predicted_segment` makes the chunks of a segment.
 """
 

@@ -63,22 +63,27 @@ WORTH = {
 
 @dataclass(frozen=True, eq=False)
 class SegmentSample:
-    """(N, 3, T) positions of a segment in file order, and how many frames of the clip it stands for."""
+    """(N, 3, T) positions of a segment in file order, how many frames of the clip it stands for, and whether it is all
+    of a loop."""
 
     positions: np.ndarray
     frames: float
+    whole_loop: bool = False
 
     @property
     def scale(self) -> float:
         return self.frames / self.positions.shape[2]
 
     def of_plant(self, sample: PlantSample) -> SegmentSample:
-        return SegmentSample(self.positions[sample.vertices], self.frames)
+        return replace(self, positions=self.positions[sample.vertices])
 
 
 def samples_of(source: Source) -> list[SegmentSample]:
     """The middle segment of a clip; of several clips those of a few, from calm to wild, each for clips like it."""
-    return [SegmentSample(_middle(source.positions(segment)), frames) for segment, frames in typical_segments(source)]
+    return [
+        SegmentSample(_middle(source.positions(segment)), frames, source.is_whole_loop(segment))
+        for segment, frames in typical_segments(source)
+    ]
 
 
 def typical_segments(source: Source) -> list[tuple[int, int]]:
@@ -295,6 +300,8 @@ class Search:
             steps = [self._with_rotations]
         if self.source.weights is not None:
             steps.insert(0, self._with_level_steps)
+        if any(sample.whole_loop for sample in self.samples):
+            steps.append(self._with_periodic_waves)
         return self._after(steps, self.start)
 
     @cached_property
@@ -421,6 +428,7 @@ class Search:
             rotation_step_factors=found.rotation_step_factors,
             only_tips=found.only_tips,
             learned_bases=found.learned_bases,
+            periodic=found.periodic,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
             node_steps=found.node_steps * np.where(inner > 0, fewer, 1.0),
         )
@@ -444,6 +452,7 @@ class Search:
             *self._prelude_key(settings),
             settings.rotation_step_factors,
             settings.only_tips,
+            settings.periodic,
             settings.learned_bases,
             settings.learned_pieces is not None and settings.learned_pieces.tobytes(),
         )
@@ -465,7 +474,8 @@ class Search:
     ) -> np.ndarray:
         """Of the streams in all that a sample stands for, (levels,)."""
         sample = self.samples[number]
-        coded = code_stems(prelude, settings, sample.positions, learned_modes, self._bases(settings, number))
+        own = settings.of_segment(sample.whole_loop)
+        coded = code_stems(prelude, own, sample.positions, learned_modes, self._bases(settings, number))
         levels, heads = np.zeros(self.levels), np.zeros(self.levels)
         for level, data in coded.stems.items():
             levels[level], heads[level] = len(data), coded.heads[level]
@@ -480,8 +490,9 @@ class Search:
 
     def _analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
         """A sample in its integers."""
-        plan, positions = self.prelude(settings).plan, self.samples[number].positions
-        return analyse(plan, settings, positions, modes, self._bases(settings, number))
+        plan, sample = self.prelude(settings).plan, self.samples[number]
+        own = settings.of_segment(sample.whole_loop)
+        return analyse(plan, own, sample.positions, modes, self._bases(settings, number))
 
     def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
         """The time bases of the levels that learn theirs."""
@@ -494,11 +505,14 @@ class Search:
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int, TimeComponents]]]:
         """Components of the samples over time, of all levels, and the step of the trial that asked first for them: they
         hardly depend on it."""
-        known = *self._turning(settings), settings.level_steps.tobytes()
+        known = *self._turning(settings), settings.level_steps.tobytes(), settings.periodic
         if known not in self._time_components:
             plan = self.prelude(settings).plan
             levels = [level for level in range(self.levels) if plan.has_stems(level)]
-            found = [time_components(plan, settings, sample.positions, levels) for sample in self.samples]
+            found = [
+                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
+                for sample in self.samples
+            ]
             self._time_components[known] = settings.step, found
         return self._time_components[known]
 
@@ -656,9 +670,14 @@ class Search:
     def _with_learned_bases(self, settings: Settings) -> Settings:
         """Learned time bases for the levels whose streams they shorten, where the file as a whole gets shorter."""
         learning = replace(settings, learned_bases=(True,) * self.levels)
-        (cost, cosines), (_, learned) = self._costs([settings, learning])
-        mixed = replace(settings, learned_bases=tuple((learned < cosines).tolist()))
+        (cost, plain), (_, learned) = self._costs([settings, learning])
+        mixed = replace(settings, learned_bases=tuple((learned < plain).tolist()))
         return mixed if any(mixed.learned_bases) and self.cost(mixed)[0] < cost else settings
+
+    def _with_periodic_waves(self, settings: Settings) -> Settings:
+        """Loops that are one segment by waves that go on across their seam: those of a motion that does not are
+        larger so."""
+        return self._cheapest([replace(settings, periodic=True), settings])
 
     def _with_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.15, 1.4)

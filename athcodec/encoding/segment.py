@@ -149,6 +149,11 @@ class Source:
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
 
+    def is_whole_loop(self, segment: int) -> bool:
+        """Whether the segment is all of a clip that is a loop."""
+        of_clips = zip(self.clip.clip_ranges, self.clip_range_segments)
+        return any(clip_range.loop and own == [self.segments[segment]] for clip_range, own in of_clips)
+
     @property
     def segment_bytes(self) -> int:
         """Of the float32 positions of the longest segment."""
@@ -191,6 +196,7 @@ class Settings:
     only_tips: bool  # pieces that carry others have no rotations
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
+    periodic: bool = False  # waves over time are, of loops that are one segment
 
     @property
     def learning_levels(self) -> list[int]:
@@ -200,6 +206,10 @@ class Settings:
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
         return qz.single(self.step * self.level_steps[level])
+
+    def of_segment(self, whole_loop: bool) -> Settings:
+        """The same for a segment, which is all of a loop or not."""
+        return replace(self, periodic=self.periodic and whole_loop)
 
 
 def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.ndarray:
@@ -374,7 +384,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
 
 def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]:
     """Second moments over time, (T, T), of those tracks of one level's stream that do not quantise to nothing, in units
-    of their steps, and how many they are; of a segment that was analysed finely, in cosines."""
+    of their steps, and how many they are; of a segment that was analysed finely, in no learned basis."""
     pieces, slots = segment.plan.pieces, []
     for low, high, at in (
         (0, pieces["low_modes"], pieces["low_level"]),
@@ -390,14 +400,16 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
         rows = part.reshape(-1, segment.frames)
         into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
         count += lib.ath_add_moments(len(rows), segment.frames, *into)
-    moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.cosines
+    moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.waves
     return np.einsum("ka,kb->ab", waves, np.einsum("kl,lb->kb", moments, waves)), count  # without NumPy's threads
 
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
-    """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
+    """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
     fine = replace(settings, step=qz.single(settings.step / FINER))
-    segment = SegmentMotion(plan, positions.shape[2], level_streams(fine, plan.level_count, {}))
+    segment = SegmentMotion(
+        plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
+    )
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 
@@ -405,7 +417,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
 def time_components(
     plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int]
 ) -> dict[int, TimeComponents]:
-    """Of some levels, from a finer pass with cosines."""
+    """Of some levels, from a finer pass."""
     if not levels:
         return {}
     segment = analyse_finely(plan, settings, positions)
@@ -463,7 +475,7 @@ def analyse(
     """The integers of the stems; bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has
     them."""
     own = level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered)
+    segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
 

@@ -1,0 +1,89 @@
+"""Waves over time: orthonormal, smooth first, the same bits as the reference decoder's; what they are good for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.encoding.motion import waves_over_time
+from spec import reference_decoder as rd
+
+FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("frames", FRAMES)
+def test_waves_are_orthonormal(frames, periodic):
+    waves = waves_over_time(frames, periodic)
+    assert abs(waves @ waves.T - np.eye(frames)).max() < 1e-12
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("frames", FRAMES)
+def test_waves_are_those_of_the_reference_decoder_bit_for_bit(frames, periodic):
+    assert waves_over_time(frames, periodic).tobytes() == rd.waves_over_time(frames, periodic).tobytes()
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+def test_waves_of_a_beam_bend_in_ascending_order(frames):
+    waves = waves_over_time(frames)
+    bent = np.diff(waves, 2, axis=1) if frames > 2 else np.zeros((frames, 1))
+    bending = bent @ bent.T
+    energy = bending.diagonal()
+    assert abs(bending - np.diag(energy)).max() < 1e-12, "they are eigenvectors"
+    assert (energy[:2] < 1e-24).all() and (np.diff(energy[1:]) > 0).all()
+    assert (waves[:, 0] > 0).all()
+
+
+def test_steady_motion_takes_two_waves():
+    steady = 3.0 - 0.25 * np.arange(200.0)
+    assert abs(waves_over_time(200)[2:] @ steady).max() < 1e-10
+
+
+def test_periodic_waves_do_not_know_where_a_loop_begins():
+    waves = waves_over_time(60, periodic=True)
+    track = np.random.default_rng(1).normal(size=60)
+    energy = [np.add.reduceat((waves @ np.roll(track, turn)) ** 2, [0, *range(1, 60, 2)]) for turn in (0, 17)]
+    np.testing.assert_allclose(*energy, rtol=1e-9)
+
+
+def encoded_loop(clip, path, blend: int):
+    return athcodec.encode(athcodec.looped(clip, blend), path, rel_error=1e-3, attributes="none", ladder="none")
+
+
+def jerk_at_seam(path) -> float:
+    """Second differences (RMS) across the seam of a loop, over those of the median frame."""
+    with athcodec.open(path) as decoder:
+        shown = decoder.positions(dtype=np.float64)
+    bent = np.roll(shown, 1, axis=0) - 2 * shown + np.roll(shown, -1, axis=0)
+    each = np.sqrt((bent**2).sum(axis=2).mean(axis=1))
+    return float(max(each[0], each[-1]) / np.median(each))
+
+
+def test_a_smooth_loop_is_coded_by_periodic_waves_and_smooth_at_its_seam(sample_clip, tmp_path):
+    summary = encoded_loop(sample_clip, tmp_path / "loop.ath", 40)
+    assert summary.choices["periodic"]
+    assert jerk_at_seam(tmp_path / "loop.ath") < 2
+    assert summary.seams[0].error <= 2 * summary.max_error_bound
+
+
+def test_a_loop_that_jumps_is_not(sample_clip, tmp_path):
+    summary = encoded_loop(sample_clip, tmp_path / "loop.ath", 0)
+    assert not summary.choices["periodic"]
+    assert summary.bytes < 3400
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+def test_clips_of_a_file_are_periodic_each_for_itself(sample_clip, tmp_path, ladder):
+    clips = {"loop": athcodec.looped(sample_clip, 40), "once": sample_clip}
+    path = tmp_path / "clips.ath"
+    summary = athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, ladder=ladder)
+    reference = rd.AthFile(path.read_bytes())
+    assert [clip.periodic for clip in reference.clips] == [True, False]
+    with athcodec.open(path, strict=True) as decoder:
+        played = [decoder.play(name).positions() for name in clips]
+        assert np.concatenate(played).tobytes() == reference.positions().tobytes()
+        for shown, clip in zip(played, clips.values()):
+            off = shown - np.float64(clip.block(0, clip.frame_count))
+            assert np.linalg.norm(off, axis=2).max() <= summary.max_error_bound
