@@ -42,7 +42,7 @@ from athcodec.encoding.layers import (
 )
 from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
+from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -51,6 +51,7 @@ from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
+CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
 SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
@@ -288,8 +289,8 @@ class EncodingJob:
             return self._predicted(prediction.choice)
         choices, prelude = search.decide(ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
-        best = layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
-        if prediction is not None and prediction.bytes < share * self._bytes_like_the_middle(best):
+        best = layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
+        if prediction is not None and prediction.bytes < share * self._estimated_bytes(best):
             return self._predicted(prediction.choice)
         return best
 
@@ -306,12 +307,17 @@ class EncodingJob:
         ath, prelude, layers = predicted_layers(source, choice)
         return _Decided(ath, choice, prelude, layers, source)
 
-    def _bytes_like_the_middle(self, decided: _Decided) -> int:
-        """Of the motion of a file whose segments are all like the one in the middle."""
-        middle = self.segment_count // 2
-        positions, whole_loop = self.source.positions(middle), self.source.is_whole_loop(middle)
-        chunks, _ = code_segment(decided.prelude, decided.layers, self.segment_count, positions, whole_loop=whole_loop)
-        return self.segment_count * sum(map(len, chunks.values())) + decided.shared_bytes
+    def _estimated_bytes(self, decided: _Decided) -> float:
+        """Of the motion of a file whose segments are like typical ones."""
+        total = float(decided.shared_bytes)
+        for segment, frames in typical_segments(self.source):
+            positions, whole_loop = self.source.positions(segment), self.source.is_whole_loop(segment)
+            chunks, errors = code_segment(
+                decided.prelude, decided.layers, self.segment_count, positions, whole_loop=whole_loop
+            )
+            front = CHUNK_BYTES * len(chunks) + LEVEL_BYTES * len(errors)
+            total += (front + sum(map(len, chunks.values()))) * frames / positions.shape[2]
+        return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
         """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy; of one where the
