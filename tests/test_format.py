@@ -425,12 +425,12 @@ def motion_function(spec: SimpleNamespace, parts: Parts, chunk: container.Chunk)
     branches, rest = prelude_by_document(spec, parts.header, chunks)
     plan = spec.make_plan(branches, rest.rest)
     if chunk.kind == container.SHAPES:
-        motion = spec.no_motion(plan, 1)
+        motion = spec.no_motion(plan, 1, False)
         for level in range(chunk.level):
             if (container.SHAPES, level, 0) in chunks:
                 spec.decode_shapes(spec.content(chunks, container.SHAPES, level), plan, motion, level)
         return "decode_shapes", plan, motion, chunk.level
-    motion = spec.decode_motion(chunks, plan, 0, frames, chunk.level)
+    motion = spec.decode_motion(chunks, plan, 0, frames, False, chunk.level)
     name = "decode_stems" if chunk.kind == container.STEMS else "decode_affines"
     return name, plan, motion, chunk.level
 
@@ -451,7 +451,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     _, chunks = spec.parse_front(parts.file())
     branches, rest = prelude_by_document(spec, parts.header, chunks)
     plan = spec.make_plan(branches, rest.rest)
-    motion = spec.decode_motion(chunks, plan, 0, parts.header.frame_count, level - 1)
+    motion = spec.decode_motion(chunks, plan, 0, parts.header.frame_count, False, level - 1)
     before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1))
     added, step = [], 2.0**-9
     if refines_rest:

@@ -121,7 +121,6 @@ def test_every_prefix_plays_its_complete_levels(layered_ath):
         ends = [chunk.offset + chunk.length // 2 for chunk in whole.file.chunks if chunk.is_motion]
         ends += [chunk.offset + chunk.length for chunk in whole.file.chunks if chunk.is_motion]
         frames = [start for start, _ in whole.segments]
-        levels = whole.level_count
         shown = [[whole.positions(frame, level.level) for frame in frames] for level in whole.levels]
         poses = [whole.level_rest(level.level).astype(whole.rest.dtype) for level in whole.levels]
     for end in ends:

@@ -13,10 +13,10 @@ import hashlib
 import math
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO, cast
+from typing import IO, BinaryIO
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from athcodec.encoding.layers import (
 )
 from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
+from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
@@ -51,6 +51,7 @@ from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 
 SPOOL_BYTES = 64 << 20
+CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
 SEARCH_SAVES = 0.5  # of the bytes at the settings that a search starts with, at most
 STATIC_METADATA = ("unit", "up_axis")
@@ -177,7 +178,7 @@ class _Decided:
     prelude: CodedPrelude
     layers: Layers
     source: Source
-    tried: CodedSegment | None = None  # one that was coded to compare
+    tried: dict[int, CodedSegment] = field(default_factory=dict)  # segments that were coded to compare
 
     @property
     def segment_count(self) -> int:
@@ -289,8 +290,8 @@ class EncodingJob:
             return self._predicted(prediction.choice)
         choices, prelude = search.decide(ratio)
         layered = [self._layered(ath, choice, prelude) for choice in choices]
-        best = layered[0] if len(layered) == 1 else min(layered, key=self._bytes_like_the_middle)
-        if prediction is not None and prediction.bytes < share * self._bytes_like_the_middle(best):
+        best = layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
+        if prediction is not None and prediction.bytes < share * self._estimated_bytes(best):
             return self._predicted(prediction.choice)
         return best
 
@@ -307,12 +308,18 @@ class EncodingJob:
         ath, prelude, layers = predicted_layers(source, choice)
         return _Decided(ath, choice, prelude, layers, source)
 
-    def _bytes_like_the_middle(self, decided: _Decided) -> int:
-        """Of the motion of a file whose segments are all like the one in the middle."""
-        middle = self.segment_count // 2
-        decided.tried = self._code(decided, middle, self.source.block(middle))
-        lossy = (data for (_, kind), data in decided.tried.chunks.items() if kind != ct.EXACT)
-        return self.segment_count * sum(map(len, lossy)) + decided.shared_bytes
+    def _estimated_bytes(self, decided: _Decided) -> float:
+        """Of the motion of a file whose segments are like typical ones."""
+        total = float(decided.shared_bytes)
+        for segment, frames in typical_segments(self.source):
+            first, stop = self.source.segments[segment]
+            if segment not in decided.tried:
+                decided.tried[segment] = self._code(decided, segment, self.source.block(segment))
+            coded = decided.tried[segment]
+            lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
+            front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
+            total += (front + sum(map(len, lossy))) * frames / (stop - first)
+        return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
         """Of as many layers, the last ones, as there is room for behind the levels of the hierarchy; of one where the
@@ -482,12 +489,12 @@ class EncodingJob:
 
         def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
             index, blocks = taken
-            return self._code(decided, index, blocks.pop()) if blocks else cast(CodedSegment, decided.tried)
+            return self._code(decided, index, blocks.pop()) if blocks else decided.tried[index]
 
-        source, known = decided.source, None if decided.tried is None else decided.tried.index
+        source = decided.source
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
-        items = ((index, [] if index == known else [source.block(index)]) for index in segments)
+        items = ((index, [] if index in decided.tried else [source.block(index)]) for index in segments)
         return pool.ordered(code, items, at_once)
 
     def _code(self, decided: _Decided, index: int, block: np.ndarray) -> CodedSegment:
