@@ -127,9 +127,7 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
     return (coded - first) / some.shape[2] * sample.frames
 
 
-def _predicted(
-    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, head: int
-) -> tuple[bytes, np.ndarray]:
+def _predicted(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, head: int) -> tuple[bytes, np.ndarray]:
     """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
