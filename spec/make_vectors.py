@@ -164,6 +164,19 @@ def frame_steps(vertices: int, seed: int, large: int = 12, still: float = 0.5) -
     return values
 
 
+def frame_points(vertices: int, seed: int) -> list[int]:
+    """The same of points of the lattice: integers, or halves of even ones, or signs and halves of odd ones."""
+    chance, values = Chance(seed, large=12), []
+    for _ in range(vertices):
+        if chance.answer("bit", 1):
+            first = chance.answer("signed", 0)
+            asked = ("bit", "unsigned") * 2 if first % 2 else ("signed",) * 2
+            values += [1, first, *(chance.answer(what, 0) for what in asked)]
+        else:
+            values.append(0)
+    return values
+
+
 def predicted(stems: list[Stem], frames: list, segments: int = 1, settings: int = 2, **fields) -> Plant:
     """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
     scripts = {(rd.PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
@@ -185,6 +198,23 @@ for settings in (0, 7, 8, 15):
         f"Memory {settings & 7}, Common {settings >> 3}",
         lambda settings=settings: predicted(ROOTED, swayed(12, 2), settings=settings),
     )
+valid(
+    "predicted-lattice",
+    "vertices are points of the lattice",
+    lambda: predicted(ROOTED, [[0, 1, *frame_points(12, 30 + t)] for t in range(20)], settings=18),
+)
+valid(
+    "predicted-lattice-huge",
+    "the largest points of the lattice, even and odd",
+    lambda: predicted(
+        SINGLE,
+        [
+            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
+            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
+        ],
+        predicted=predicted_head(FLOAT_MAX, 31),
+    ),
+)
 valid(
     "predicted-references",
     "frames that are copies of earlier ones, of the rest pose, and coded about earlier ones",
@@ -3195,7 +3225,7 @@ invalid(
 )
 for name, reason, content in (
     ("short", "4 bytes", predicted_head()[:4]),
-    ("settings", "a reserved bit of Settings", predicted_head(settings=16)),
+    ("settings", "a reserved bit of Settings", predicted_head(settings=32)),
     ("step-0", "Step 0", predicted_head(0.0)),
     ("step-nan", "Step is NaN", predicted_head(math.nan)),
     ("left-over", "a byte behind the stream", predicted_head() + b"\1" * 400),

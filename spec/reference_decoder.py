@@ -387,11 +387,40 @@ def code_signed(coder: RangeDecoder, model: NumberModel, expected: int) -> int:
     return code_signed_in_class(coder, model, number_class(expected))
 
 
-def code_signed_in_class(coder: RangeDecoder, model: NumberModel, c: int) -> int:
+def code_signed_in_class(coder: RangeDecoder, model: NumberModel, c: int, sign: Context | None = None) -> int:
     magnitude = code_in_class(coder, model, c)
     if magnitude == 0:
         return 0
-    return -magnitude if coder.raw_bit() else magnitude
+    return -magnitude if code_sign(coder, sign) else magnitude
+
+
+def code_sign(coder: RangeDecoder, sign: Context | None) -> int:
+    return coder.raw_bit() if sign is None else coder.bit(sign)
+
+
+ANY, EVEN, ODD = range(3)  # what is known of an integer
+
+
+class LatticeModel:
+    """Of integers of each parity."""
+
+    def __init__(self):
+        self.numbers = [NumberModel() for _ in range(3)]
+
+    def code(self, coder: RangeDecoder, parity: int, c: int, sign: Context | None = None) -> int:
+        half = max(c - 2, 0)
+        if parity == ANY:
+            return code_signed_in_class(coder, self.numbers[ANY], c, sign)
+        if parity == EVEN:
+            return 2 * code_signed_in_class(coder, self.numbers[EVEN], half, sign)
+        negative = code_sign(coder, sign)
+        magnitude = 2 * code_in_class(coder, self.numbers[ODD], half) + 1
+        return -magnitude if negative else magnitude
+
+
+def parity_of(point: list[int], k: int) -> int:
+    """Of integer k of a point of the lattice."""
+    return ANY if k == 0 else ODD if point[0] & 1 else EVEN
 
 
 def clipped(value: int) -> int:
@@ -876,7 +905,7 @@ class AdaptiveRest:
     """What is learned of an adaptive rest pose: of all vertices, and by phase."""
 
     def __init__(self) -> None:
-        self.models = [NumberModel() for _ in range(3)]  # first axis; others where that is even; where it is odd
+        self.lattice = LatticeModel()
         self.filters = [RestFilter() for _ in range(6)]
         self.all, self.phases = RestMemory(), [RestMemory() for _ in range(256)]
         self.offsets = [[0.0] * 3 for _ in range(256)]  # of the last vertex of each phase, from the one before it
@@ -899,7 +928,7 @@ def decode_adaptive_vertex(
     base, terms = rest_terms(branch, i, lag, model.offsets[phase], per_unit, rest, before)
     guesses = rest_guesses(weights, terms)
     offset = [expected_offset(model.all, own, guesses, k) for k in range(3)]
-    steps = decode_lattice_point(coder, model, own)
+    steps = decode_rest_point(coder, model, own)
     point = [(base[k] + offset[k] * unit) + float(steps[k]) * unit for k in range(3)]
     offset = [(point[k] - base[k]) * per_unit for k in range(3)]
     for memory, rate in (model.all, 0.06), (own, 0.1):
@@ -963,20 +992,11 @@ def expected_offset(everywhere: RestMemory, own: RestMemory, guesses: Points, k:
     return total / weights
 
 
-def decode_lattice_point(coder: RangeDecoder, model: AdaptiveRest, own: RestMemory) -> list[int]:
+def decode_rest_point(coder: RangeDecoder, model: AdaptiveRest, own: RestMemory) -> list[int]:
     steps: list[int] = []
     for k in range(3):
         classes = [number_class((m[k] + m[0] + m[1] + m[2]) // 4) for m in (model.all.mean, own.mean)]
-        both = (classes[0] + classes[1] + 1) // 2
-        half = max(both - 2, 0)
-        if k == 0:
-            steps.append(code_signed_in_class(coder, model.models[0], both))
-        elif steps[0] & 1 == 0:
-            steps.append(2 * code_signed_in_class(coder, model.models[1], half))
-        else:
-            negative = coder.raw_bit()
-            magnitude = 2 * code_in_class(coder, model.models[2], half) + 1
-            steps.append(-magnitude if negative else magnitude)
+        steps.append(model.lattice.code(coder, parity_of(steps, k), (classes[0] + classes[1] + 1) // 2))
     return steps
 
 
@@ -1395,7 +1415,7 @@ def decode_difference(coder: RangeDecoder, model: RefinementModel, known: bool, 
 
 # ---- predicted motion --------------------------------------------------------------------------------------
 
-GUESSES, FEATURES, LINE_GUESS, FITTED = 11, 8, 6, 10
+GUESSES, FEATURES, LINE_GUESS, FITTED = 12, 8, 6, 11
 LONGEST_LINE, LONGEST_MEAN, SOLVED_EVERY, RUNS = 24, 64, 16, 8
 
 Point = list[float]
@@ -1407,6 +1427,7 @@ class Follower:
 
     before: int
     near: int
+    base: int
     like: int
     line: Point
     mean: Point
@@ -1417,6 +1438,7 @@ class Follower:
     noise: float = 0.0
     age: int = 0
     frames: int = 0
+    steps: list[int] = field(default_factory=lambda: [0] * 3)
     size: tuple[int, int] = (0, 0)
 
     @property
@@ -1455,7 +1477,8 @@ def followers(branches: list[Branch], rest: list[Point], step: float) -> list[Fo
             before = branch.first + i - 1 if i > 0 else branch.attach
             at = rest[branch.first + i]
             near = before if i > 0 else first_before
-            found.append(Follower(before, near, like + i if like >= 0 else -1, list(at), list(at)))
+            base = branch.attach if branch.attach >= 0 else branch.first if i > 0 else -1
+            found.append(Follower(before, near, base, like + i if like >= 0 else -1, list(at), list(at)))
         first_before = branch.first
     follow_twins(found, [tuple(steps_in(x, step * 0.00390625) for x in at) for at in rest])
     for vertex in found:
@@ -1549,13 +1572,16 @@ class Prediction:
     """PREDICTED of a segment."""
 
     def __init__(self, chunk: bytes, branches: list[Branch], rest: np.ndarray, origin: np.ndarray, number: np.dtype):
-        require(len(chunk) >= 5 and chunk[4] <= 15, "Settings of PREDICTED are out of range")
-        self.step, self.memory, self.common = f32(chunk, 0), 32 << (chunk[4] & 7), chunk[4] >= 8
+        require(len(chunk) >= 5 and chunk[4] <= 31, "Settings of PREDICTED are out of range")
+        self.step, self.memory, self.common = f32(chunk, 0), 32 << (chunk[4] & 7), bool(chunk[4] & 8)
+        self.is_lattice = chunk[4] >= 16
+        self.unit = 0.625 * self.step if self.is_lattice else self.step
         require(finite(self.step) and self.step > 0.0, "Step of PREDICTED is out of range")
         self.coder = RangeDecoder(chunk[5:])
         self.rest, self.origin, self.number = rest.tolist(), origin, number
         self.vertices = followers(branches, self.rest, self.step)
-        self.numbers, self.distances = NumberModel(), NumberModel()
+        self.numbers, self.distances = LatticeModel(), NumberModel()
+        self.signs = [[Context(32768) for _ in range(3)] for _ in range(3)]
         self.moved = [
             [[Context(6000 if own + near == 0 else 32768) for _ in range(3)] for near in range(4)] for own in range(4)
         ]
@@ -1602,7 +1628,7 @@ class Prediction:
         for v in range(len(self.vertices)):
             p = self._predict(around, v)
             steps = self._decode_steps(v)
-            at = [around.was[0][v][k] + p.way[k] + float(steps[k]) * self.step for k in range(3)]
+            at = [around.was[0][v][k] + p.way[k] + float(steps[k]) * self.unit for k in range(3)]
             out.append(self._put_out([at])[0])
             around.now.append((out[v].astype(float) - self.origin).tolist())
             self._learn(around, v, p)
@@ -1610,8 +1636,10 @@ class Prediction:
 
     def _predict(self, around: Around, v: int) -> Way:
         vertex = self.vertices[v]
-        fit, scale = self.fits[vertex.kind], self._grown(vertex, around)
-        guesses, features = zip(*(self._guess(vertex, around, v, k, scale, fit.weights) for k in range(3)))
+        fit, scales = self.fits[vertex.kind], (1.0, 1.0)
+        if vertex.kind == 2:
+            scales = self._grown(around, vertex.above, vertex.before), self._grown(around, vertex.base, vertex.before)
+        guesses, features = zip(*(self._guess(vertex, around, v, k, scales, fit.weights) for k in range(3)))
         errors = list(vertex.error)
         if vertex.near >= 0:
             errors = [a + b for a, b in zip(errors, self.vertices[vertex.near].error)]
@@ -1623,30 +1651,30 @@ class Prediction:
         way = [own[chosen] if finite(own[chosen]) else 0.0 for own in guesses]
         return Way(list(guesses), list(features), way)
 
-    @staticmethod
-    def _grown(vertex: Follower, around: Around) -> float:
-        """How far the edge before a vertex on its stem is out, over the rest pose's."""
-        u, p = vertex.before, vertex.above
-        if u < 0 or p < 0 or vertex.near != u:
+    def _grown(self, around: Around, u: int, v: int) -> float:
+        """How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more."""
+        if u < 0 or v < 0:
             return 1.0
-        along = length2 = 0.0
+        along = length2 = self.step * self.step
         for k in range(3):
-            edge = around.rest[u][k] - around.rest[p][k]
-            along = along + edge * (around.now[u][k] - around.now[p][k])
+            edge = around.rest[v][k] - around.rest[u][k]
+            along = along + edge * (around.now[v][k] - around.now[u][k])
             length2 = length2 + edge * edge
         return along / length2 if length2 > 1e-60 else 1.0
 
     @staticmethod
-    def _guess(vertex: Follower, around: Around, v: int, k: int, scale: float, weights: list[float]) -> tuple:
+    def _guess(vertex: Follower, around: Around, v: int, k: int, scales: tuple, weights: list[float]) -> tuple:
         now, (was, was2, was3) = around.now, around.was
 
         def moved(u: int) -> tuple[float, float]:
             return (now[u][k] - was[u][k], was[u][k] - was2[u][k]) if u >= 0 else (0.0, 0.0)
 
-        x, u, joined, edge = was[v][k], vertex.before, 0.0, 0.0
+        x, u, joined, edge, stem = was[v][k], vertex.before, 0.0, 0.0, 0.0
         if u >= 0:
             joined = now[u][k] - x
-            edge = joined + scale * (around.rest[v][k] - around.rest[u][k])
+            edge = joined + scales[0] * (around.rest[v][k] - around.rest[u][k])
+        if vertex.base >= 0:
+            stem = (now[vertex.base][k] - x) + scales[1] * (around.rest[v][k] - around.rest[vertex.base][k])
         own, (before, before2), (above, above2) = x - was2[v][k], moved(u), moved(vertex.above)
         line, mean = (vertex.line[k] + vertex.slope[k]) - x, vertex.mean[k] - x
         features = [own, was2[v][k] - was3[v][k], before, before2, above, above2, line, mean]
@@ -1654,8 +1682,8 @@ class Prediction:
         for weight, feature in zip(weights, features):
             fitted = fitted + weight * feature
         like = moved(vertex.like)[0]
-        guesses = [0.0, own, before, own + (before - before2), edge, joined, line, mean, like, vertex.older[k], fitted]
-        return guesses, features
+        both, older = own + (before - before2), vertex.older[k]
+        return [0.0, own, before, both, edge, joined, line, mean, like, older, stem, fitted], features
 
     def _decode_steps(self, v: int) -> list[int]:
         vertex, vertices = self.vertices[v], self.vertices
@@ -1663,14 +1691,18 @@ class Prediction:
         near = vertices[vertex.near].size[0] if vertex.near >= 0 else 0
         beside = max(vertices[u].size[0] if u >= 0 else 0 for u in (v - 1, vertex.before))
         contexts = self.moved[size_class(own + older // 2)][size_class(near)]
-        expected, steps, total = (2 * own + older + 2 * near + beside) * 8 // 9, [0, 0, 0], 0
+        expected, steps, total = (2 * own + older + 2 * near + beside) * 8 // 9, [], 0
+        signs = vertices[vertex.near].steps if vertex.near >= 0 else [0, 0, 0]
         if self.coder.bit(contexts[0 if beside == 0 else 1 if beside < 4 else 2]):
             for k in range(3):
-                about = expected if k == 0 else (2 * expected + total * 16 // k) // 3
-                steps[k] = code_signed(self.coder, self.numbers, about)
+                about = number_class(expected if k == 0 else (2 * expected + total * 16 // k) // 3)
+                sign = self.signs[sign_class(signs[k])][sign_class(vertex.steps[k])]
+                parity = parity_of(steps, k) if self.is_lattice else ANY
+                steps.append(self.numbers.code(self.coder, parity, about, sign))
                 total += clipped(steps[k])
+            vertex.steps = steps
         vertex.size = total, own
-        return steps
+        return steps or [0, 0, 0]
 
     def _learn(self, around: Around, v: int, p: Way) -> None:
         vertex, x = self.vertices[v], around.now[v]
@@ -1690,6 +1722,10 @@ class Prediction:
 
 def size_class(size: int) -> int:
     return 0 if size == 0 else 1 if size < 2 else 2 if size < 6 else 3
+
+
+def sign_class(value: int) -> int:
+    return 0 if value < 0 else 2 if value > 0 else 1
 
 
 # ---- plan: what all segments share -------------------------------------------------------------------------

@@ -101,12 +101,12 @@ def scripted_unsigned(original: Callable):
 
 
 def scripted_signed(original_unsigned: Callable):
-    def code(coder, model, c):
+    def code(coder, model, c, sign=None):
         value = coder.script.answer("signed", 1 << 30)
         coder.decisions.extend(magnitude_bits(abs(value), rd.LONGEST))
         if original_unsigned(coder, model, c):
             coder.decisions.append(value < 0)
-            coder.raw_bit()
+            rd.code_sign(coder, sign)
         return value
 
     return code

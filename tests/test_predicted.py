@@ -19,7 +19,7 @@ from plants import STEADY, awkward_plants, bound_for, clip_of, grow, plant, rand
 import athcodec
 from athcodec import container as ct
 from athcodec import encoding
-from athcodec.encoding import search
+from athcodec.encoding import prediction, search
 from athcodec.errors import AthError, BadChunk, BadChunkTable
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
@@ -114,7 +114,7 @@ def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) ->
     return athcodec.encode(clip, folder / "a.ath", attributes="none", **{"ladder": "none"} | given)
 
 
-@pytest.mark.parametrize("fraction", [1e-3, 1e-5])
+@pytest.mark.parametrize("fraction", [1e-2, 1e-3, 1e-5, 1e-6])
 @pytest.mark.parametrize("make", ODD.values(), ids=ODD)
 def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
     clip = make()
@@ -125,7 +125,7 @@ def test_no_odd_clip_takes_more_than_a_simple_codec(make, fraction, tmp_path):
     assert found.bytes <= 1.02 * simple_bytes(positions, bound) + 160
 
 
-@pytest.mark.parametrize("fraction", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("fraction", [1e-2, 1e-3, 1e-4, 1e-5])
 @pytest.mark.parametrize("eased", [False, True])
 def test_growth_takes_at_most_seven_tenths_of_a_simple_codec(fraction, eased, tmp_path):
     clip = growth(eased)
@@ -134,6 +134,13 @@ def test_growth_takes_at_most_seven_tenths_of_a_simple_codec(fraction, eased, tm
     found = size(clip, tmp_path, fraction)
     assert found.choices["motion"] == "predicted"
     assert found.bytes <= 0.7 * simple_bytes(positions, bound)
+
+
+def test_points_of_the_lattice_tell_noise_in_fewer_bits_than_cubes(monkeypatch, tmp_path):
+    clip = ODD["noise"]()
+    found = size(clip, tmp_path, 1e-4)
+    monkeypatch.setattr(prediction, "LATTICE", 0)
+    assert 8 * (size(clip, tmp_path, 1e-4).bytes - found.bytes) >= 0.6 * clip.frame_count * clip.vertex_count
 
 
 def test_frames_that_are_there_already_cost_nothing(always, tmp_path):

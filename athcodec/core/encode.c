@@ -297,7 +297,7 @@ static int32_t find_reference(const prediction *p, const predicted_source *sourc
 }
 
 /* Steps towards 0 while the vertex stays within its limit, those that take it least away first. */
-static void shorten(const double *rest, double step, double limit2, int32_t steps[3])
+static void shorten(const double left[3], double limit2, int32_t steps[3])
 {
     for (;;) {
         double best = limit2;
@@ -306,8 +306,8 @@ static void shorten(const double *rest, double step, double limit2, int32_t step
             double off2 = 0.0;
             if (steps[k] == 0) continue;
             for (int32_t i = 0; i < 3; i++) {
-                double left = rest[i] - (double)(steps[i] - (i != k ? 0 : steps[k] > 0 ? 1 : -1)) * step;
-                off2 = off2 + left * left;
+                double off = left[i] - (double)(steps[i] - (i != k ? 0 : steps[k] > 0 ? 1 : -1));
+                off2 = off2 + off * off;
             }
             if (off2 < best) {
                 best = off2;
@@ -319,26 +319,55 @@ static void shorten(const double *rest, double step, double limit2, int32_t step
     }
 }
 
-/* The smallest integers that keep a vertex within its limit. 0: there are none. */
+/* The point of the lattice that is likely to take the fewest bits of those within a limit that is no less than its reach. */
+static void cheapest_of_lattice(const double left[3], double limit, uint32_t expected, int32_t steps[3])
+{
+    double spare = limit - LATTICE_REACH, length2 = 0.0, nearer[3];
+    uint32_t mean[3] = {expected, expected, expected};
+    for (size_t k = 0; k < 3; k++) length2 = length2 + left[k] * left[k];
+    double keep = spare <= 0.0 ? 1.0 : length2 > spare * spare ? 1.0 - spare / ath_sqrt(length2) : 0.0;
+    for (size_t k = 0; k < 3; k++) nearer[k] = keep * left[k];
+    nearest_of_lattice(nearer, LATTICE_REACH, mean, steps);
+}
+
+static void nearest_point(const prediction *p, const double left[3], int32_t steps[3])
+{
+    static const uint32_t mean[3] = {0, 0, 0};
+    if (p->head.lattice) {
+        nearest_of_lattice(left, 0.0, mean, steps);
+        return;
+    }
+    for (size_t k = 0; k < 3; k++) steps[k] = steps_in(left[k], 1.0, 0.5);
+}
+
+/* The smallest integers that keep a vertex within its limit; left: units that it is from where it is expected. */
+static void cheapest_point(const prediction *p, int32_t v, const double left[3], double limit, int32_t steps[3])
+{
+    uint32_t near, beside;
+    if (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] < limit * limit) {
+        steps[0] = steps[1] = steps[2] = 0;
+    } else if (p->head.lattice) {
+        cheapest_of_lattice(left, limit, expected_size(p->vertices, v, &near, &beside), steps);
+    } else {
+        nearest_point(p, left, steps);
+        shorten(left, limit * limit, steps);
+    }
+}
+
+/* 0: there are no integers that keep a vertex within its limit. */
 static int choose_steps(prediction *p, const predicted_source *source, int32_t v, const predicted_way *way,
                         int32_t steps[3])
 {
     const double *wanted = source_of(p, source, v), *was = p->around.was[0] + 3 * (size_t)v;
-    double left[3], step = p->head.step, limit = source->limits[v];
-    int32_t nearest[3];
+    double left[3], unit = unit_of(&p->head);
     for (size_t k = 0; k < 3; k++) {
-        left[k] = wanted[k] - (was[k] + way->way[k]);
-        double units = left[k] / step;
-        if (!(absolute(units) < 1073741822.0)) return 0;
-        nearest[k] = steps[k] = units < 0.0 ? -(int32_t)(0.5 - units) : (int32_t)(0.5 + units);
+        left[k] = (wanted[k] - (was[k] + way->way[k])) / unit;
+        if (!(absolute(left[k]) < 1073741820.0)) return 0;
     }
-    if (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] < limit * limit)
-        steps[0] = steps[1] = steps[2] = 0;
-    else
-        shorten(left, step, limit * limit, steps);
+    cheapest_point(p, v, left, source->limits[v] / unit, steps);
     place_vertex(p, v, way, steps);
     if (is_within(p, source, p->frame, v)) return 1;
-    memcpy(steps, nearest, sizeof nearest);
+    nearest_point(p, left, steps);
     place_vertex(p, v, way, steps);
     return is_within(p, source, p->frame, v);
 }
@@ -353,7 +382,7 @@ static int encode_frame(ath_coder *coder, prediction *p, const predicted_source 
         int32_t steps[3];
         predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
         valid = choose_steps(p, source, v, &way, steps);
-        code_steps(coder, &p->model, p->vertices, v, steps);
+        code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
         learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
     }
     p->frame++;

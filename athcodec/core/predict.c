@@ -49,7 +49,7 @@ static void decode_vertex(ath_coder *coder, prediction *p, int32_t v)
     predicted_way way;
     int32_t steps[3] = {0, 0, 0};
     predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
-    code_steps(coder, &p->model, p->vertices, v, steps);
+    code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
     place_vertex(p, v, &way, steps);
     learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
 }

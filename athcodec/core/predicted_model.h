@@ -3,11 +3,11 @@
 #ifndef ATH_PREDICTED_MODEL_H
 #define ATH_PREDICTED_MODEL_H
 
-#include "number_model.h"
 #include "container.h"
+#include "lattice.h"
 #include "plan.h"
 
-enum { GUESSES = 11, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
+enum { GUESSES = 12, FEATURES = 8, FITS = 3, FITTED = GUESSES - 1, LINE_GUESS = 6 };
 enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, RUNS = 8 };
 
 /* A vertex from frame to frame. */
@@ -17,8 +17,10 @@ typedef struct {
     double mean[3];
     double error[GUESSES], noise; /* noise: error of the line while it does not turn */
     int32_t age, frames;          /* positions that make the line, the mean */
+    int32_t steps[3];             /* its integers when they were last not 0 */
     uint32_t size[2];             /* of its integers in the last frames */
     int32_t before, above;        /* the vertex that it follows, the one that this follows; -1: none */
+    int32_t base;                 /* where its stem is attached, or begins; -1: it is there itself */
     int32_t like;                 /* its place on an earlier stem that is as long, -1: none */
     int32_t near;                 /* whose errors and integers tell of its own, -1: none */
 } predicted_vertex;
@@ -30,8 +32,9 @@ typedef struct {
 } predicted_fit;
 
 typedef struct {
-    number_model number, distance;
-    ath_context moved[4][4][3], copied[RUNS][RUNS], usual[2];
+    lattice_model lattice;
+    number_model distance;
+    ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2];
     predicted_fit fits[FITS];
     int32_t run, last_run, last_distance;
 } predicted_model;
@@ -53,12 +56,14 @@ typedef struct {
 static void predicted_model_init(predicted_model *model)
 {
     memset(model, 0, sizeof *model);
-    number_model_init(&model->number);
+    lattice_model_init(&model->lattice);
     number_model_init(&model->distance);
     for (int32_t own = 0; own < 4; own++)
         for (int32_t near = 0; near < 4; near++)
             for (int32_t beside = 0; beside < 3; beside++)
                 context_init(&model->moved[own][near][beside], own + near == 0 ? 6000 : 32768);
+    for (int32_t near = 0; near < 3; near++)
+        for (int32_t own = 0; own < 3; own++) context_init(&model->sign[near][own], 32768);
     for (int32_t run = 0; run < RUNS; run++)
         for (int32_t last = 0; last < RUNS; last++) context_init(&model->copied[run][last], 6000);
     for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
@@ -144,12 +149,12 @@ ATH_INLINE int is_number(double x) { return x - x == 0.0; }
 
 ATH_INLINE double absolute(double x) { return x < 0.0 ? -x : x; }
 
-/* How far the edge before a vertex on its stem is out, over the rest pose's. */
-ATH_INLINE double grown(const predicted_vertex *vertex, const predicted_frames *frames)
+/* How far apart two vertices are along the way between them at rest, over that; near 1 where a step is more. */
+ATH_INLINE double grown(const predicted_frames *frames, int32_t from, int32_t to, double step)
 {
-    double along = 0.0, length2 = 0.0;
-    if (vertex->before < 0 || vertex->above < 0 || vertex->near != vertex->before) return 1.0;
-    size_t u = 3 * (size_t)vertex->before, p = 3 * (size_t)vertex->above;
+    double along = step * step, length2 = along;
+    if (from < 0 || to < 0) return 1.0;
+    size_t p = 3 * (size_t)from, u = 3 * (size_t)to;
     for (size_t k = 0; k < 3; k++) {
         double edge = frames->rest[u + k] - frames->rest[p + k];
         along = along + edge * (frames->now[u + k] - frames->now[p + k]);
@@ -159,23 +164,27 @@ ATH_INLINE double grown(const predicted_vertex *vertex, const predicted_frames *
 }
 
 ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frames *frames, size_t v, size_t k,
-                           double scale, const double *weights, predicted_way *p)
+                           const double scales[2], const double *weights, predicted_way *p)
 {
     const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
     size_t at = 3 * v + k;
     double x = was[at], own = x - was2[at], before = 0.0, before2 = 0.0, above = 0.0, above2 = 0.0;
-    double joined = 0.0, edge = 0.0, like = 0.0;
+    double joined = 0.0, edge = 0.0, stem = 0.0, like = 0.0;
     if (vertex->before >= 0) {
         size_t u = 3 * (size_t)vertex->before + k;
         before = now[u] - was[u];
         before2 = was[u] - was2[u];
         joined = now[u] - x;
-        edge = joined + scale * (frames->rest[at] - frames->rest[u]);
+        edge = joined + scales[0] * (frames->rest[at] - frames->rest[u]);
     }
     if (vertex->above >= 0) {
         size_t u = 3 * (size_t)vertex->above + k;
         above = now[u] - was[u];
         above2 = was[u] - was2[u];
+    }
+    if (vertex->base >= 0) {
+        size_t u = 3 * (size_t)vertex->base + k;
+        stem = (now[u] - x) + scales[1] * (frames->rest[at] - frames->rest[u]);
     }
     if (vertex->like >= 0) {
         size_t u = 3 * (size_t)vertex->like + k;
@@ -194,8 +203,8 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
         p->features[k][i] = features[i];
         fitted = fitted + weights[i] * features[i];
     }
-    double guesses[GUESSES] = {0.0,         own,         before, own + (before - before2), edge,  joined,
-                               features[6], features[7], like,   vertex->older[k],         fitted};
+    double guesses[GUESSES] = {0.0,         own,         before, own + (before - before2), edge, joined,
+                               features[6], features[7], like,   vertex->older[k],         stem, fitted};
     for (int32_t i = 0; i < GUESSES; i++) p->guess[i][k] = guesses[i];
 }
 
@@ -204,11 +213,16 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
                            predicted_way *p)
 {
     const predicted_vertex *vertex = vertices + v, *near = vertex->near >= 0 ? vertices + vertex->near : 0;
-    p->fit = vertex->before < 0 ? 0 : vertex->near == vertex->before ? 2 : 1;
+    int32_t inner = vertex->before >= 0 && vertex->near == vertex->before;
+    p->fit = inner ? 2 : vertex->before < 0 ? 0 : 1;
     const predicted_fit *fit = model->fits + p->fit;
-    double scale = grown(vertex, frames), best = 0.0;
+    double scales[2] = {1.0, 1.0}, best = 0.0;
     int32_t chosen = 0;
-    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scale, fit->weights, p);
+    if (inner) {
+        scales[0] = grown(frames, vertex->above, vertex->before, head->step);
+        scales[1] = grown(frames, vertex->base, vertex->before, head->step);
+    }
+    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scales, fit->weights, p);
     for (int32_t i = 0; i < GUESSES; i++) {
         double error = vertex->error[i];
         if (near) error = error + near->error[i];
@@ -268,24 +282,39 @@ static void learn_vertex(predicted_model *model, const ath_predicted_head *head,
 
 ATH_INLINE int32_t size_class(uint32_t size) { return size == 0 ? 0 : size < 2 ? 1 : size < 6 ? 2 : 3; }
 
-/* Its integers, under contexts of those around. */
-ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, predicted_vertex *vertices, int32_t v,
-                           int32_t steps[3])
+/* The magnitude in 1/16 that is expected of its integers; near, beside: sizes of others in this frame. */
+ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, uint32_t *near, uint32_t *beside)
 {
+    const predicted_vertex *vertex = vertices + v;
+    *near = vertex->near >= 0 ? vertices[vertex->near].size[0] : 0;
+    *beside = v > 0 ? vertices[v - 1].size[0] : 0;
+    if (vertex->before >= 0 && vertices[vertex->before].size[0] > *beside) *beside = vertices[vertex->before].size[0];
+    return (2 * vertex->size[0] + vertex->size[1] + 2 * *near + *beside) * 8 / 9;
+}
+
+ATH_INLINE int32_t sign_class(int32_t steps) { return steps < 0 ? 0 : steps > 0 ? 2 : 1; }
+
+/* Its integers, under contexts of those around. */
+ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lattice, predicted_vertex *vertices,
+                           int32_t v, int32_t steps[3])
+{
+    static const int32_t none[3] = {0, 0, 0};
     predicted_vertex *vertex = vertices + v;
-    uint32_t own = vertex->size[0], older = vertex->size[1], near = 0, beside = v > 0 ? vertices[v - 1].size[0] : 0;
-    if (vertex->near >= 0) near = vertices[vertex->near].size[0];
-    if (vertex->before >= 0 && vertices[vertex->before].size[0] > beside) beside = vertices[vertex->before].size[0];
-    ath_context *moved = &model->moved[size_class(own + older / 2)][size_class(near)][beside == 0  ? 0
-                                                                                      : beside < 4 ? 1
-                                                                                                   : 2];
-    uint32_t expected = (2 * own + older + 2 * near + beside) * 8 / 9, sum = 0;
+    const int32_t *signs = vertex->near >= 0 ? vertices[vertex->near].steps : none;
+    uint32_t near, beside, sum = 0, expected = expected_size(vertices, v, &near, &beside);
+    ath_context *moved =
+        &model->moved[size_class(vertex->size[0] + vertex->size[1] / 2)][size_class(near)][beside == 0  ? 0
+                                                                                           : beside < 4 ? 1
+                                                                                                        : 2];
     if (coder_bit(coder, moved, steps[0] || steps[1] || steps[2])) {
-        for (uint32_t k = 0; k < 3; k++) {
-            uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / k) / 3;
-            steps[k] = code_signed(coder, &model->number, about, steps[k]);
+        for (int32_t k = 0; k < 3; k++) {
+            uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / (uint32_t)k) / 3;
+            ath_context *sign = &model->sign[sign_class(signs[k])][sign_class(vertex->steps[k])];
+            int32_t parity = lattice ? parity_of(steps, k) : ANY_INTEGER;
+            steps[k] = code_integer(coder, &model->lattice, parity, number_class(about), sign, steps[k]);
             sum += clipped(steps[k]);
         }
+        memcpy(vertex->steps, steps, sizeof vertex->steps);
     } else {
         steps[0] = steps[1] = steps[2] = 0;
     }
@@ -294,15 +323,6 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, predicted_v
 }
 
 /* ---- what follows what ---- */
-
-/* The cell of a grid along an axis: the nearest whole number of widths. */
-ATH_INLINE int32_t cell_of(double x, double width)
-{
-    double units = x / width;
-    if (!(units > -1073741823.0)) return -1073741823;
-    if (!(units < 1073741823.0)) return 1073741823;
-    return units < 0.0 ? -(int32_t)(0.5 - units) : (int32_t)(0.5 + units);
-}
 
 /* Of the table of vertices by where they are at rest: a power of two. */
 ATH_INLINE uint32_t twin_places(int32_t vertex_count)
@@ -316,12 +336,12 @@ ATH_INLINE uint32_t twin_places(int32_t vertex_count)
 static int32_t take_place(const double *rest, int32_t *last, uint32_t places, double width, int32_t v)
 {
     int32_t cell[3], same = 1;
-    for (size_t k = 0; k < 3; k++) cell[k] = cell_of(rest[3 * (size_t)v + k], width);
+    for (size_t k = 0; k < 3; k++) cell[k] = steps_in(rest[3 * (size_t)v + k], width, 0.5);
     uint32_t hash = (uint32_t)cell[0] * 73856093u + (uint32_t)cell[1] * 19349663u + (uint32_t)cell[2] * 83492791u;
     int32_t *place = last + ((hash ^ hash >> 15) & (places - 1)), before = *place;
     *place = v;
     if (before < 0) return -1;
-    for (size_t k = 0; k < 3; k++) same = same && cell_of(rest[3 * (size_t)before + k], width) == cell[k];
+    for (size_t k = 0; k < 3; k++) same = same && steps_in(rest[3 * (size_t)before + k], width, 0.5) == cell[k];
     return same ? before : -1;
 }
 
@@ -367,6 +387,7 @@ static void follow_stems(prediction *p, const ath_branch *branches, int32_t bran
             predicted_vertex *vertex = p->vertices + branch->first + i;
             vertex->before = i > 0 ? branch->first + i - 1 : branch->attach;
             vertex->near = i > 0 ? vertex->before : first_before;
+            vertex->base = branch->attach >= 0 ? branch->attach : i > 0 ? branch->first : -1;
             vertex->like = like >= 0 ? like + i : -1;
         }
         first_before = branch->first;
@@ -383,8 +404,8 @@ static void follow_twins(prediction *p)
         predicted_vertex *vertex = p->vertices + v;
         int32_t twin = take_place(p->rest, p->last, places, width, v), joined = vertex->before >= 0;
         for (size_t k = 0; k < 3 && joined; k++)
-            joined =
-                cell_of(p->rest[3 * (size_t)vertex->before + k], width) == cell_of(p->rest[3 * (size_t)v + k], width);
+            joined = steps_in(p->rest[3 * (size_t)vertex->before + k], width, 0.5)
+                     == steps_in(p->rest[3 * (size_t)v + k], width, 0.5);
         if (twin >= 0 && !joined) vertex->before = vertex->near = twin;
     }
 }
@@ -468,12 +489,19 @@ static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t dis
     return 1;
 }
 
+/* What an integer counts. */
+ATH_INLINE double unit_of(const ath_predicted_head *head)
+{
+    return head->lattice ? LATTICE_UNIT * head->step : head->step;
+}
+
 /* Where so many steps take a vertex, put out and in `now`. */
 static void place_vertex(prediction *p, int32_t v, const predicted_way *way, const int32_t steps[3])
 {
     size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
+    double unit = unit_of(&p->head);
     for (size_t k = 0; k < 3; k++) {
-        put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * p->head.step);
+        put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * unit);
         p->around.now[from + k] = put_back(p, at, k);
     }
 }

@@ -3,7 +3,7 @@
 #ifndef ATH_REST_PREDICTOR_H
 #define ATH_REST_PREDICTOR_H
 
-#include "number_model.h"
+#include "lattice.h"
 
 #define REST_FORGET (1.0 / 2048.0)
 

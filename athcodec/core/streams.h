@@ -219,8 +219,6 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
 
 enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1) / 6 };
 
-#define REST_UNIT 0.625 /* of the lattice over the step: it has as many points as cubes of a step */
-
 /* The rest pose of the layer before, which a refinement is coded about: positions, and integers, three for each vertex; those of
  * a run's modes stand with its vertices. */
 typedef struct {
@@ -243,7 +241,7 @@ typedef struct {
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
-    number_model lattice[3]; /* the first axis; others where that is even, and where it is odd */
+    lattice_model lattice;
     rest_predictor predictor;
 } rest_model;
 
@@ -258,7 +256,7 @@ static void rest_model_init(rest_model *model, int is_refinement)
     else
         coefficient_model_init(&model->modes, REST_RUN, model->history);
     memset(model->made, 0, sizeof model->made);
-    for (int32_t i = 0; i < 3; i++) number_model_init(&model->lattice[i]);
+    lattice_model_init(&model->lattice);
     rest_predictor_init(&model->predictor);
 }
 
@@ -279,65 +277,15 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
-/* A value in steps, rounded; fractions of at least `half` (0.5: to the nearest) count as a step. */
-static int32_t steps_in(double value, double step, double half)
-{
-    double units = value / step;
-    if (!(units > -1073741823.0)) return -1073741823;
-    if (!(units < 1073741823.0)) return 1073741823;
-    return units < 0.0 ? -(int32_t)(1.0 - half - units) : (int32_t)(1.0 - half + units);
-}
-
-#ifdef ATH_ENCODING
-
-/* Of the points of the lattice within the slack, the one that is likely to take the fewest bits; else the nearest. */
-static void nearest_of_lattice(const double units[3], double slack, const uint32_t mean[3], int32_t integers[3])
-{
-    double cheapest = 0.0, nearest = 0.0;
-    int found = 0, any = 0;
-    for (int32_t choice = 0; choice < 16; choice++) {
-        int32_t odd = choice & 1, point[3];
-        double distance = 0.0, cost = 1.0;
-        for (int32_t k = 0; k < 3; k++) {
-            point[k] = 2 * steps_in(units[k] - odd, 2.0, 0.5) + odd;
-            if (choice >> (k + 1) & 1) point[k] += point[k] > 0 ? -2 : 2;
-            distance += (units[k] - point[k]) * (units[k] - point[k]);
-            cost *= 1.0 + 32.0 * magnitude_of(point[k]) / (16.0 + mean[k]);
-        }
-        if (distance <= slack * slack) {
-            cost *= 1.0 + 0.07 * distance / (slack * slack);
-            if (!found || cost < cheapest) memcpy(integers, point, sizeof point);
-            if (!found || cost < cheapest) cheapest = cost;
-            found = 1;
-        } else if (!found && (!any || distance < nearest)) {
-            memcpy(integers, point, sizeof point);
-            nearest = distance;
-            any = 1;
-        }
-    }
-}
-
-#endif
-
-/* A point of the body-centred cubic lattice: three integers, all even or all odd. */
-static void code_lattice_point(ath_coder *coder, rest_model *model, const rest_memory *phase, int32_t integers[3])
+/* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
+static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memory *phase, int32_t integers[3])
 {
     const uint32_t *mean = model->predictor.all.mean, *own = phase->mean;
     for (int32_t k = 0; k < 3; k++) {
         int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
                         / 2;
-        int32_t half = ath_max(about - 2, 0), odd = integers[0] & 1;
-        if (k == 0) {
-            integers[0] = code_signed_in_class(coder, &model->lattice[0], about, integers[0]);
-        } else if (!odd) {
-            integers[k] = 2 * code_signed_in_class(coder, &model->lattice[1], half, integers[k] / 2);
-        } else {
-            int negative = coder_raw_bit(coder, integers[k] < 0);
-            int32_t magnitude =
-                2 * (int32_t)code_in_class(coder, &model->lattice[2], half, magnitude_of(integers[k]) / 2) + 1;
-            integers[k] = negative ? -magnitude : magnitude;
-        }
+        integers[k] = code_integer(coder, &model->lattice, parity_of(integers, k), about, 0, integers[k]);
     }
 }
 
@@ -345,7 +293,8 @@ static void code_lattice_point(ath_coder *coder, rest_model *model, const rest_m
 static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                                  int32_t i, double step, const double *source, double *rest)
 {
-    double unit = REST_UNIT * step, per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)(branch->first + i);
+    double unit = LATTICE_UNIT * step, per_unit = 1.0 / unit, expected[3],
+           *out = rest + 3 * (size_t)(branch->first + i);
     int32_t integers[3] = {0, 0, 0};
     rest_guess at;
     rest_look_around(&model->predictor, branch, rest, layer->before, i, per_unit, &at);
@@ -356,7 +305,7 @@ static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest
     nearest_of_lattice(units, layer->slack * per_unit, at.phase->mean, integers);
 #endif
     (void)source;
-    code_lattice_point(coder, model, at.phase, integers);
+    code_rest_point(coder, model, at.phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
     rest_learn(&model->predictor, &at, per_unit, out, integers);

@@ -6,7 +6,7 @@ It suits what waves and modes do not: growth, few frames, noise, jumps, rests. `
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from athcodec.encoding.search import Choice, SegmentSample, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
 from athcodec.errors import BoundError
 
-MEMORIES = (2, 9, 0, 13)  # heads of PREDICTED to choose from
+MEMORIES, LATTICE = (2, 9, 0, 13), 16  # of the second field of PREDICTED: to choose from, and beside them
 REST_STEPS = (0.5, 1.15)  # over the bound
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # over the largest that reaches every point within the limit
 TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64
@@ -51,7 +51,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         bound=bound,
         largest_bound=source.largest_bound(bound),
         limit=source.limit(bound),
-        step=qz.single(qz.SAFE_REST_CAP * float(np.min(source.limit(bound)))),
+        step=_step(source.limit(bound), MEMORIES[0]),
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         sheet=none,
@@ -80,25 +80,34 @@ def best_prediction(source: Source, bound: float, most_bytes: float) -> FoundPre
     ath = one_map_each(source.seen)
     first, *others = (_settings(source, ath, bound, ratio * source.smallest_bound(bound)) for ratio in REST_STEPS)
     samples = _samples(source)
-    prelude = CodedPrelude(source, ath, first, predicted=True)
+    preludes = {first.rest_step: CodedPrelude(source, ath, first, predicted=True)}
 
-    def size(prelude: CodedPrelude, settings: Settings, memory: int) -> FoundPrediction:
-        motion = sum(
-            len(_predicted(prelude, settings, sample.positions, memory)[0]) * sample.scale for sample in samples
-        )
-        return FoundPrediction(Choice(settings, settings, None, predicted=memory), motion + prelude.prelude_bytes)
+    def coded(settings: Settings, head: int) -> FoundPrediction:
+        own = replace(settings, step=_step(settings.limit, head))
+        prelude = preludes[settings.rest_step]
+        motion = sum(len(_predicted(prelude, own, sample.positions, head)[0]) * sample.scale for sample in samples)
+        return FoundPrediction(Choice(own, own, None, predicted=head), motion + prelude.prelude_bytes)
+
+    def best(found: Iterable[FoundPrediction]) -> tuple[FoundPrediction, Settings, int]:
+        one = min(found, key=lambda one: one.bytes)
+        assert one.choice.predicted is not None
+        return one, one.choice.settings, one.choice.predicted
 
     try:
-        if sum(_begun(prelude, first, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(preludes[first.rest_step], first, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
-        found = [size(prelude, first, memory) for memory in MEMORIES]
-        memory = min(found, key=lambda one: one.bytes).choice.predicted
-        assert memory is not None
-        found += [size(CodedPrelude(source, ath, own, predicted=True), own, memory) for own in others]
+        found, _, memory = best(coded(first, memory) for memory in MEMORIES)
+        preludes |= {own.rest_step: CodedPrelude(source, ath, own, predicted=True) for own in others}
+        found, settings, _ = best([found, *(coded(own, memory) for own in others)])
+        found, _, _ = best([found, coded(settings, memory | LATTICE)])
     except BoundError:
         return None
-    best = min(found, key=lambda one: one.bytes)
-    return best if best.bytes < most_bytes else None
+    return found if found.bytes < most_bytes else None
+
+
+def _step(limit: np.ndarray | float, head: int) -> float:
+    """The largest that reaches every place within the limit."""
+    return qz.single((qz.LATTICE_REST_CAP if head & LATTICE else qz.SAFE_REST_CAP) * float(np.min(limit)))
 
 
 def _samples(source: Source) -> list[SegmentSample]:
@@ -118,17 +127,15 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
     return (coded - first) / some.shape[2] * sample.frames
 
 
-def _predicted(
-    prelude: CodedPrelude, settings: Settings, positions: np.ndarray, memory: int
-) -> tuple[bytes, np.ndarray]:
+def _predicted(prelude: CodedPrelude, settings: Settings, positions: np.ndarray, head: int) -> tuple[bytes, np.ndarray]:
     """PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
     for factor in STEPS:
         step = qz.single(factor * settings.step)
-        coded = streams.encode_predicted(prelude.plan, prelude.origin, source, limits, step, memory, prelude.dtype)
+        coded = streams.encode_predicted(prelude.plan, prelude.origin, source, limits, step, head, prelude.dtype)
         if coded is not None:
-            return ct.pack_predicted(step, memory, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+            return ct.pack_predicted(step, head, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
