@@ -8,7 +8,7 @@ array; they release the GIL, and hold no state.
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 
@@ -107,8 +107,15 @@ class Header(ctypes.Structure):
     _fields_ += [(name, c_uint32) for name in "chunk_count vertex_count branch_count frame_count segment_count".split()]
     _fields_ += [
         (name, c_int32)
-        for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted".split()
+        for name in "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces".split()
     ]
+
+
+class CorePolygons(ctypes.Structure):
+    """ath_polygons."""
+
+    _fields_ = [(name, c_uint32) for name in ("face_count", "corner_count", "columns")]
+    _fields_ += [(name, c_uint8) for name in ("is_mixed", "is_derived", "index_type", "count_type")]
 
 
 _PLAYING = {  # core/ath.h
@@ -140,6 +147,9 @@ _PLAYING = {  # core/ath.h
     "ath_level_error": (c_double, [c_void_p, c_int32, c_int32, c_int32, c_int]),
     "ath_segment_start": (c_int32, [c_void_p, c_int32]),
     "ath_work_fault": (None, [c_void_p, c_void_p]),
+    "ath_polygons_of": (c_int, [c_void_p, c_int, POINTER(CorePolygons), c_void_p]),
+    "ath_polygons_size": (c_size_t, [c_void_p]),
+    "ath_read_polygons": (c_int, [c_void_p, c_int, c_void_p, c_size_t, *[c_void_p] * 3]),
     "ath_feed": (None, [c_void_p, c_void_p, c_uint64, c_size_t]),
     "ath_drop": (None, [c_void_p, c_uint64, c_uint64]),
     "ath_onward_ranges": (c_int32, [c_void_p, *[c_int32] * 4, c_int, c_void_p, c_int32]),
@@ -203,9 +213,17 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), c_void_p, c_void_p]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
+    "ath_mesh_size": (c_size_t, [c_int32, c_int32]),
+    "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
+    "ath_build_mesh": (None, [c_void_p, POINTER(CorePolygons), *[c_void_p] * 3]),
+    "ath_faces_memory": (c_size_t, [c_int32]),
+    "ath_encode_faces": (
+        c_int64,
+        [c_void_p, c_void_p, c_size_t, POINTER(CorePolygons), c_int, c_int32, c_void_p, c_void_p],
+    ),
     "ath_encode_rest": (
         c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 5],
+        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 6],
     ),
     "ath_encode_refined_shapes": (
         c_int64,
@@ -227,7 +245,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         c_int64,
         [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p, c_void_p, c_void_p],
     ),
-    "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
+    "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_void_p, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
     "ath_mode_weights": (None, [c_int32, c_void_p]),
@@ -301,9 +319,10 @@ def crc32c(data, crc: int = 0) -> int:
     return lib.ath_crc32c(crc, array.ctypes.data, array.size)
 
 
-def encode_stream(function_name: str, capacity: int, *arguments) -> bytes:
-    """Runs one of the core's writers, with more room until its stream fits."""
-    model = new_model()
+def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarray | None = None) -> bytes:
+    """Runs one of the core's writers, with more room until its stream fits; model: its scratch memory, where that is
+    another than `new_model` gives."""
+    model = new_model() if model is None else model
     while True:
         buffer = np.empty(capacity, np.uint8)
         size = getattr(lib, function_name)(model.ctypes.data, buffer.ctypes.data, capacity, *arguments)

@@ -38,8 +38,8 @@ from athcodec.errors import (
 )
 from athcodec.hierarchy import Hierarchy, derived_edges
 from athcodec.host_mesh import HostMesh, mesh_positions
+from athcodec.polygons import Polygons
 
-INTEGER_TYPES = [np.dtype(f"{order}{kind}{size}").str for order in "<>" for kind in "iu" for size in (1, 2, 4, 8)]
 CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
 
@@ -748,35 +748,28 @@ class AthFile:
 
     @cached_property
     def faces(self) -> np.ndarray | None:
-        """Vertex numbers of the corners, (F, k) of the source's integer type, or None."""
-        return self._indices(ct.FACES, "FACES")
+        """Vertex numbers of the corners, (F, k) of the source's integer type, or None; faces of different sizes are
+        attributes."""
+        return None if self._polygons is None or self._polygons.counts is not None else self._polygons.rows
 
     @cached_property
     def edges(self) -> np.ndarray | None:
         """Vertex numbers of both ends, (E, 2) of the source's integer type, or None."""
-        return self._indices(ct.EDGES, "EDGES")
+        stored = self._indices(ct.EDGES)
+        if stored is None or not stored.derived:
+            return None if stored is None else stored.rows
+        return derived_edges(self.hierarchy).astype(stored.index_type)
 
-    def _indices(self, kind: int, name: str) -> np.ndarray | None:
+    @cached_property
+    def _polygons(self) -> Polygons | None:
+        return self._indices(ct.FACES)
+
+    def _indices(self, kind: int) -> Polygons | None:
         chunk = self.find(kind)
         if chunk is None:
             return None
-        head, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
-        if array is None and kind == ct.EDGES:
-            return derived_edges(self.hierarchy).astype(self._derived_dtype(head))
-        if (
-            array is None
-            or array.ndim != 2
-            or array.dtype.kind not in "iu"
-            or (kind == ct.EDGES and array.shape[1] != 2)
-            or (array.size and (array.min() < 0 or array.max() >= self.vertex_count))
-        ):
-            raise BadChunk(f"{name}: got {ct.brief(head)}; expected rows of vertex numbers")
-        return array
-
-    def _derived_dtype(self, head: dict[str, Any]) -> np.dtype:
-        if head.get("derived") not in INTEGER_TYPES or np.iinfo(head["derived"]).max < self.vertex_count - 1:
-            raise BadChunk(f"EDGES: got {ct.brief(head)}; expected an array or a type that holds derived edges")
-        return np.dtype(head["derived"])
+        with self._lock, self._fed([(chunk.offset, chunk.length)], str(chunk)):
+            return self.core.polygons(kind, self.limits.corners)
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
@@ -787,7 +780,8 @@ class AthFile:
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
         """Named static arrays, unchanged. Those of a file that was cut off before them are left out."""
-        result: dict[str, np.ndarray] = {}
+        faces = self._polygons
+        result: dict[str, np.ndarray] = {} if faces is None or faces.counts is None else faces.attributes
         for chunk in self._chunks_of(ct.ATTRIBUTE):
             if not self.is_available(chunk):
                 continue

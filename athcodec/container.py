@@ -21,7 +21,7 @@ import numpy as np
 import zstandard
 
 from athcodec import _native
-from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, address, crc32c, lib
+from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, CorePolygons, address, crc32c, lib
 from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
@@ -76,6 +76,8 @@ class Limits:
         Largest sizes: of the front and of both tables, of metadata, of a name, of a chunk as stored, of a static array.
     memory_bytes : int
         What preparing a segment may take.
+    corners : int
+        Faces and corners of FACES together, and of EDGES.
     """
 
     chunks: int = 1 << 20
@@ -90,6 +92,7 @@ class Limits:
     chunk_bytes: int = 256 << 20
     decoded_chunk_bytes: int = 256 << 20
     memory_bytes: int = 2 << 30
+    corners: int = 1 << 26
 
 
 @dataclass
@@ -163,7 +166,7 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
     """FORMAT.md, "Front stream"."""
-    names = (name for name, _ in _native.Header._fields_ if name != "front_length")
+    names = (name for name, _ in _native.Header._fields_ if hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
     table = np.zeros(len(chunks), _native.CHUNK)
     for name in ("length", "segment", "kind", "level"):
@@ -250,6 +253,8 @@ _SHIFT = struct.Struct("<B")
 _REFINED_REST = struct.Struct("<f")
 _PREDICTED = struct.Struct("<fB")
 _ARRAY = struct.Struct("<H")
+_POLYGONS = struct.Struct("<II")
+_IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 16, 32, 64
 
 
 def brief(value: object) -> str:
@@ -270,7 +275,8 @@ def pack_hierarchy(thresholds, stream: bytes) -> bytes:
 @dataclass
 class Rest:
     """Head of REST and its stream, which holds the very numbers of the source where `exact`, else steps; where the rest
-    pose `is_host`, a mesh of the host's, its checksum. Origin and step are numbers of float32."""
+    pose `is_host`, a mesh of the host's, its checksum. Where it is `connected` it goes by FACES. Origin and step are
+    numbers of float32."""
 
     origin: np.ndarray
     step: float
@@ -279,10 +285,12 @@ class Rest:
     exact: bool = False
     adaptive: bool = False
     is_host: bool = False
+    connected: bool = False
 
 
 def pack_rest(rest: Rest) -> bytes:
-    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | int(rest.adaptive) << 3
+    method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1
+    method |= int(rest.adaptive) << 3 | int(rest.connected) << 4
     return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
 
 
@@ -488,6 +496,18 @@ def _dtype_from(description: object, what: str) -> np.dtype:
     if dtype is None or not 0 < dtype.itemsize <= ITEM_BYTES:
         raise BadChunk(f"{what}: got type {brief(description)}; expected plain numbers, bytes or records")
     return dtype
+
+
+def pack_polygons(shape: CorePolygons, is_absolute: bool, stream: bytes) -> bytes:
+    """FACES or EDGES of this shape."""
+    flags = _IS_MIXED * shape.is_mixed | _IS_ABSOLUTE * is_absolute
+    types = bytes([shape.index_type | flags] + [shape.count_type] * shape.is_mixed)
+    return types + _POLYGONS.pack(shape.face_count, shape.corner_count if shape.is_mixed else shape.columns) + stream
+
+
+def pack_derived_edges(index_type: int) -> bytes:
+    """EDGES that follow from the branches, of an integer type (polygons.type_code)."""
+    return bytes([index_type | _IS_DERIVED])
 
 
 def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> bytes:

@@ -28,7 +28,9 @@ import numpy as np
 import numpy.typing as npt
 
 from athcodec import container
-from athcodec._native import BRANCH, CHUNK, MEASURES, as_bytes, lib
+from athcodec._native import BRANCH, CHUNK, MEASURES, CorePolygons, as_bytes, lib
+from athcodec.errors import LimitExceeded
+from athcodec.polygons import Polygons, type_of
 
 ALIGNMENT = 16
 MOST_STEPS = 2**31 - 1
@@ -248,6 +250,28 @@ class File:
         dtype = np.dtype(dtype)
         view = np.ctypeslib.as_array(ctypes.cast(address, POINTER(c_uint8)), (count * dtype.itemsize,))
         return view.view(dtype).copy()
+
+    def polygons(self, kind: int, most: int) -> Polygons:
+        """FACES or EDGES, which are there. Edges that follow from the branches have no corners, but are `derived`.
+
+        Raises LimitExceeded where there are more faces and corners than that.
+        """
+        shape, fault = CorePolygons(), Fault()
+        self._check(lib.ath_polygons_of(self._file, kind, byref(shape), byref(fault)), fault)
+        types = [type_of(code) for code in (shape.index_type, shape.count_type)]
+        count = shape.face_count + shape.corner_count
+        if count > most:
+            raise LimitExceeded(f"{container.KIND_NAMES[kind]}: got {count} faces and corners; the limit is {most}")
+        corners = np.zeros(shape.corner_count, np.int32)
+        counts = np.zeros(shape.face_count, np.uint32) if shape.is_mixed else None
+        memory = aligned(lib.ath_polygons_size(self._file))
+        at = None if counts is None else counts.ctypes.data
+        result = lib.ath_read_polygons(
+            self._file, kind, memory.ctypes.data, len(memory), at, corners.ctypes.data, byref(fault)
+        )
+        self._check(result, fault)
+        count_type = types[1] if shape.is_mixed else None
+        return Polygons(corners, counts, shape.face_count, shape.columns, types[0], count_type, bool(shape.is_derived))
 
     def branches(self) -> np.ndarray:
         """(B,) of _native.BRANCH."""

@@ -34,6 +34,7 @@ from spec.scripted import (
     Draft,
     Entry,
     Plant,
+    Script,
     Stem,
     basis_stream,
     clip_entry,
@@ -841,9 +842,12 @@ def coded_rest(stems: list[Stem], script: list | Chance, **fields) -> bytes:
     return rest_chunk(write(rd.decode_rest, script, branches_of(stems), 1.0), **fields)
 
 
-def adaptive_rest(stems: list[Stem], script: list | Chance, step: float = 0.25, **fields) -> bytes:
+def adaptive_rest(
+    stems: list[Stem], script: list | Chance, step: float = 0.25, connected: bool = False, **fields
+) -> bytes:
     stream = write(rd.decode_rest, script, branches_of(stems), step, None, True)
-    return rest_chunk(stream, step=step, reserved=rd.REST_ADAPTIVE >> 2, **fields)
+    bits = rd.REST_ADAPTIVE | rd.REST_CONNECTED * connected
+    return rest_chunk(stream, step=step, reserved=bits >> 2, **fields)
 
 
 def with_rest(stems: list[Stem], rest: bytes, **fields) -> Plant:
@@ -1287,6 +1291,45 @@ def numbers(array: np.ndarray, type_name: str | None = None, **members) -> bytes
     return array_chunk(head, plain(shuffled(array)) if array.size else b"")
 
 
+def polygon_type(name: str) -> int:
+    """A type of integers as FACES and EDGES number them."""
+    return "1248".index(name[2]) | 4 * (name[1] == "i") | 8 * (name[0] == ">")
+
+
+def polygon_head(type_: str, faces: int, corners: int, count_type: str | None = None, flags: int = 0) -> bytes:
+    """corners: of each face, or where there is a count_type of all."""
+    mixed = b"" if count_type is None else bytes([polygon_type(count_type)])
+    return bytes([polygon_type(type_) | flags | 16 * len(mixed)]) + mixed + struct.pack("<II", faces, corners)
+
+
+def polygons(rows: np.ndarray, vertex_count: int = 5, absolute: bool = False, script: Script | None = None) -> bytes:
+    """FACES or EDGES with as many corners each."""
+    shape = rd.PolygonShape(polygon_type(rows.dtype.str), None, absolute, False, *rows.shape, rows.size)
+    stream = write(rd.decode_polygons, script or rows.reshape(-1).tolist(), shape, vertex_count)
+    return polygon_head(rows.dtype.str, *rows.shape, flags=32 * absolute) + stream
+
+
+def mixed_polygons(
+    faces: list[list[int]],
+    vertex_count: int = 5,
+    types: tuple[str, str] = ("<u4", "|u1"),
+    corner_count: int | None = None,
+    absolute: bool = False,
+) -> bytes:
+    """FACES of different sizes; types: of vertices and numbers of corners."""
+    corners = sum(map(len, faces)) if corner_count is None else corner_count
+    index_type, count_type = map(polygon_type, types)
+    shape = rd.PolygonShape(index_type, count_type, absolute, False, len(faces), 0, corners)
+    script = [value for face in faces for value in (len(face), *face)]
+    return polygon_head(types[0], len(faces), corners, types[1], 32 * absolute) + write(
+        rd.decode_polygons, script, shape, vertex_count
+    )
+
+
+def derived(type_: str) -> bytes:
+    return bytes([polygon_type(type_) | 64])
+
+
 def element(type_: object, content: bytes, name: str = "a") -> bytes:
     """A single element of any Type."""
     return array_chunk({"name": name, "dtype": type_, "shape": []}, plain(content))
@@ -1340,17 +1383,17 @@ valid(
 valid(
     "faces-and-edges",
     "triangles and edges, in integers of different sizes",
-    lambda: with_static((rd.FACES, numbers(FACES_3)), (rd.EDGES, numbers(EDGES_2))),
+    lambda: with_static((rd.FACES, polygons(FACES_3)), (rd.EDGES, polygons(EDGES_2))),
 )
 valid(
     "faces-of-any-width",
     "faces of five columns, big-endian",
-    lambda: with_static((rd.FACES, numbers(np.array([[4, 3, 2, 1, 0]], ">i4")))),
+    lambda: with_static((rd.FACES, polygons(np.array([[4, 3, 2, 1, 0]], ">i4")))),
 )
 valid(
     "faces-none",
     "no faces: three columns, no rows, no data; edges without rows likewise",
-    lambda: with_static((rd.FACES, numbers(np.zeros((0, 3), "|u1"))), (rd.EDGES, numbers(np.zeros((0, 2), "<u4")))),
+    lambda: with_static((rd.FACES, polygons(np.zeros((0, 3), "|u1"))), (rd.EDGES, polygons(np.zeros((0, 2), "<u4")))),
 )
 valid(
     "edges-derived",
@@ -1358,23 +1401,82 @@ valid(
     lambda: (
         moving([Stem(-1, 3), Stem(0, 2, 1), Stem(-1, 1)], 61, vertex_source=[5, 0, 3, 1, 4, 2])
         .draft()
-        .add(Entry(rd.EDGES, array_chunk({"derived": ">i2"})))
+        .add(Entry(rd.EDGES, derived(">i2")))
     ),
 )
 valid(
     "edges-derived-least",
     "as numbers of one byte; of one vertex there are none",
-    lambda: lone().draft().add(Entry(rd.EDGES, array_chunk({"derived": "|i1"}))),
+    lambda: lone().draft().add(Entry(rd.EDGES, derived("|i1"))),
+)
+MANY_FACES = {  # of 119 vertices: those of ADAPTIVE
+    "by chance": lambda: polygons(np.zeros((150, 3), "<i2"), 120, script=Chance(71)),
+    "absolute": lambda: polygons(np.zeros((60, 4), "<u4"), 120, True, Chance(72)),
+    "strip": lambda: polygons(np.array([[i, i + 1, i + 2] for i in range(118)], "<i4"), 120),
+    "quads": lambda: polygons(np.array([[i, i + 1, i + 11, i + 10] for i in range(109)], "<i8"), 120),
+    "mixed": lambda: mixed_polygons(
+        [[(7 * i + k * k) % 120 for k in range((3, 4, 3, 5, 0, 1, 4, 2, 40)[i % 9])] for i in range(60)], 120
+    ),
+}
+valid(
+    "faces-mixed",
+    "faces of 3, 4, 0, 1, 2 and 5 corners, numbers of one byte and of eight",
+    lambda: with_static(
+        (rd.FACES, mixed_polygons([[0, 1, 2], [3, 2, 1, 0], [], [4], [4, 3], [0, 1, 2, 3, 4]], types=(">i8", "|i1")))
+    ),
 )
 valid(
-    "edges-array-counts",
-    '"derived" does not count where there is an array',
-    lambda: with_static((rd.EDGES, numbers(EDGES_2, derived="no type"))),
+    "faces-mixed-alike",
+    "faces that could be of different sizes, but are triangles; attributes behind them",
+    lambda: with_static((rd.FACES, mixed_polygons([[0, 1, 2], [2, 1, 4]]))).add(
+        Entry(rd.ATTRIBUTE, numbers(np.arange(5.0), name="radius"))
+    ),
 )
+valid("faces-mixed-none", "no faces of different sizes", lambda: with_static((rd.FACES, mixed_polygons([]))))
+for name_, make_faces in MANY_FACES.items():
+    valid(
+        f"faces-many-{name_.replace(' ', '-')}",
+        f"faces of 120 vertices: {name_}",
+        lambda make_faces=make_faces: (
+            with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, [])).draft().add(Entry(rd.FACES, make_faces()))
+        ),
+    )
+
+
+def connected(
+    make_faces: Callable[[], bytes], seed: int = 73, step: float = 0.25, exact: bool = False, order: list | None = None
+) -> Plant:
+    """ADAPTIVE, by faces."""
+    content, branches = make_faces(), branches_of(ADAPTIVE)
+    shape, stream = rd.parse_polygons(content, rd.FACES, rd.Limits())
+    count = sum(stem.count for stem in ADAPTIVE)
+    mesh = rd.build_mesh(*rd.decode_polygons(stream, shape, count), order or list(range(count)))
+    script, bits = Chance(seed, large=6), rd.REST_CONNECTED >> 2
+    if exact:
+        stream = write(rd.decode_exact_rest, script, branches, False, mesh)
+        rest = rest_chunk(stream, exact=1, reserved=bits)
+    else:
+        stream = write(rd.decode_rest, script, branches, step, None, True, mesh)
+        rest = rest_chunk(stream, step=step, reserved=bits | rd.REST_ADAPTIVE >> 2)
+    fields = {} if order is None else {"vertex_source": order}
+    return with_rest(ADAPTIVE, rest, faces=content, **fields)
+
+
+for name_, make_faces in MANY_FACES.items():
+    valid(
+        f"rest-connected-{name_.replace(' ', '-')}",
+        f"a rest pose by faces: {name_}",
+        lambda make_faces=make_faces: connected(make_faces),
+    )
 valid(
-    "shape-without-type",
-    '"shape" does not count where there is no Type',
-    lambda: with_static((rd.EDGES, array_chunk({"derived": "<u8", "shape": "no shape"}))),
+    "rest-connected-order",
+    "a rest pose by faces of vertices that stand the other way round",
+    lambda: connected(MANY_FACES["strip"], order=list(range(119, -1, -1))),
+)
+valid("rest-connected-tiny", "the same, a subnormal Rest_Step", lambda: connected(MANY_FACES["strip"], 74, FLOAT_TINY))
+valid("rest-connected-exact", "an exact rest pose by faces", lambda: connected(MANY_FACES["quads"], exact=True))
+valid(
+    "rest-connected-none", "a rest pose by no faces", lambda: connected(lambda: polygons(np.zeros((0, 3), "<u2"), 120))
 )
 valid(
     "attributes",
@@ -1598,8 +1700,8 @@ def everything() -> Draft:
             Entry(rd.EXACT, b"", 6, 0),
             Entry(rd.EXACT, b"", 6, 1),
             Entry(rd.METADATA, b"\1" + WIND_FRAME),
-            Entry(rd.FACES, numbers(FACES_3)),
-            Entry(rd.EDGES, array_chunk({"derived": "<i2"})),
+            Entry(rd.FACES, polygons(FACES_3)),
+            Entry(rd.EDGES, derived("<i2")),
             Entry(0x8009, FUTURE),
             Entry(0x8018, FUTURE, 1, 1),
             Entry(rd.ATTRIBUTE, numbers(np.arange(6.0).reshape(2, 3), name="b")),
@@ -1918,6 +2020,11 @@ valid(
     "layers-adaptive-rest",
     "adaptive rest poses of all layers",
     refinements(ADAPTIVE, 46, rest=adaptive_rest(ADAPTIVE, Chance(38, large=4), 1.0)),
+)
+valid(
+    "layers-connected-rest",
+    "rest poses of all layers by faces",
+    refinements(ADAPTIVE, 46, rest=connected(MANY_FACES["strip"]).rest, faces=MANY_FACES["strip"]()),
 )
 valid(
     "rest-of-level-1-adaptive",
@@ -2525,6 +2632,28 @@ prelude(
     "Method has Is_Exact and Is_Adaptive",
     lambda: exact_rest(FORK, [0.5] * 15, False, reserved=rd.REST_ADAPTIVE >> 2),
 )
+invalid(
+    "rest-connected-without-faces",
+    "BAD_CHUNK_TABLE",
+    "open",
+    "Method has Is_Connected, and there are no FACES",
+    lambda: with_rest(FORK, adaptive_rest(FORK, [], connected=True)),
+)
+for what, content in (
+    ("broken", lambda: polygons(FACES_3) + b"\0"),
+    ("derived", lambda: derived("<i4")),
+    ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
+    ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
+):
+    invalid(
+        f"rest-connected-{what}-faces",
+        "BAD_CHUNK",
+        "open",
+        f"a rest pose by faces that do not serve it: {what}",
+        lambda content=content: (
+            with_rest(FORK, adaptive_rest(FORK, [], connected=True)).draft().add(Entry(rd.FACES, content()))
+        ),
+    )
 prelude("adaptive-zero-behind", rd.REST, "a zero byte behind an adaptive rest pose", lambda: adaptive_fork() + b"\0")
 prelude("adaptive-bytes-behind", rd.REST, "bytes behind an adaptive rest pose", lambda: adaptive_fork() + b"\1" * 12)
 for what, value in (("nan", NAN), ("infinite", -INFINITY)):
@@ -3628,44 +3757,50 @@ def edges(content: bytes) -> Callable[[], Draft]:
     return lambda: with_static((rd.EDGES, content))
 
 
-static("faces-none", "FACES without an array", faces(array_chunk({})))
-static("faces-derived", "FACES cannot be derived", faces(array_chunk({"derived": "<i4"})))
-static("faces-one-dimension", "faces of one dimension", faces(numbers(np.array([0, 1, 2], "<i4"))))
-static("faces-three-dimensions", "faces of three dimensions", faces(numbers(np.zeros((1, 1, 3), "<i4"))))
-static("faces-floats", "faces of binary32 numbers", faces(numbers(np.zeros((1, 3), "<f4"))))
-static("faces-booleans", "faces of booleans", faces(numbers(np.zeros((1, 3), "|u1"), "|b1")))
+static("faces-empty", "FACES without bytes", faces(b""))
+static("faces-short", "FACES of 8 bytes", faces(polygon_head("<i4", 0, 3)[:8]))
+static("faces-mixed-short", "FACES of 9 bytes with Is_Mixed", faces(polygon_head("<i4", 0, 0, "<i4")[:9]))
+static("faces-derived", "FACES cannot be derived", faces(derived("<i4")))
+static("faces-reserved", "bit 7 of Index_Type is set", faces(polygon_head("<i4", 0, 3, flags=128)))
+static("faces-big-endian-byte", "Index_Type is a big-endian byte", faces(polygon_head(">u1", 0, 3)))
+static("faces-count-type", "Count_Type is a big-endian byte", faces(polygon_head("<i4", 0, 0, ">i1")))
+static("faces-count-reserved", "Count_Type has bit 4 set", faces(bytes([16, 16]) + bytes(8)))
+static("faces-beyond", "a face of a vertex behind the last", faces(polygons(np.array([[0, 1, 5]], "<u4"))))
+static("faces-beyond-absolute", "the same by its number", faces(polygons(np.array([[0, 1, 5]], "<u4"), absolute=True)))
+static("faces-negative", "a face of vertex -1", faces(polygons(np.array([[0, 1, -1]], "<i2"))))
+static("faces-too-many", "2^32 - 1 faces", faces(polygon_head("<i4", 2**32 - 1, 3)), "LIMIT_EXCEEDED")
+static("faces-too-wide", "2^26 + 1 columns of no rows", faces(polygon_head("<i4", 0, 2**26 + 1)), "LIMIT_EXCEEDED")
+static("faces-too-large", "2^13 faces of 2^13 corners", faces(polygon_head("<i4", 2**13, 2**13)), "LIMIT_EXCEEDED")
+static("faces-mixed-too-many", "a face and 2^26 corners", faces(polygon_head("<i4", 1, 2**26, "<i4")), "LIMIT_EXCEEDED")
+static("faces-more-corners", "a face of more corners than are left", faces(mixed_polygons([[0, 1, 2]], corner_count=2)))
+static("faces-fewer-corners", "corners of no face", faces(mixed_polygons([[0, 1, 2]], corner_count=4)))
 static(
-    "faces-records", "faces of records", faces(array_chunk({"dtype": [["a", "<i4"]], "shape": [1, 1]}, plain(bytes(4))))
+    "faces-count-beyond-type",
+    "a face of 128 corners, of which |i1 holds 127",
+    faces(mixed_polygons([[0, 1, 2, 3] * 32], types=("<u4", "|i1"))),
 )
-static("faces-beyond", "a face of a vertex behind the last", faces(numbers(np.array([[0, 1, 5]], "<u4"))))
-static("faces-negative", "a face of vertex -1", faces(numbers(np.array([[0, 1, -1]], "<i2"))))
-static("edges-three-columns", "edges of three columns", edges(numbers(np.zeros((1, 3), "<i4"))))
 static(
-    "edges-beyond",
-    "an edge to a vertex behind the last, in big-endian numbers",
-    edges(numbers(np.array([[0, 5]], ">u2"))),
-)
-static("edges-negative", "an edge to vertex -1", edges(numbers(np.array([[0, -1]], "|i1"))))
-static("edges-none", 'EDGES with neither array nor "derived"', edges(array_chunk({"name": "edges"})))
-for name, type_ in (
-    ("float", "<f8"),
-    ("list", ["<i4"]),
-    ("order", "i4"),
-    ("byte-order-of-a-byte", "<i1"),
-    ("null", None),
-    ("number", 4),
-):
-    static(f"edges-derived-{name}", f'"derived" is {json.dumps(type_)}', edges(array_chunk({"derived": type_})))
-static(
-    "edges-derived-small",
-    "130 vertices do not fit |i1",
+    "faces-beyond-type",
+    "a face of vertex 128, which |i1 does not hold",
     lambda: (
         moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1)
         .draft()
-        .add(Entry(rd.EDGES, array_chunk({"derived": "|i1"})))
+        .add(Entry(rd.FACES, polygons(np.array([[0, 127, 128]], "<i2"), 130).replace(b"\x05", b"\x04", 1)))
     ),
 )
-static("edges-derived-with-data", 'data behind "derived"', edges(array_chunk({"derived": "<i4"}, plain(bytes(8)))))
+static("faces-zero-behind", "a zero byte behind the stream", faces(polygons(FACES_3) + b"\0"))
+static("faces-bytes-behind", "bytes behind the stream", faces(polygons(FACES_3) + b"\1" * 12))
+static("edges-three-columns", "edges of three columns", edges(polygons(np.zeros((1, 3), "<i4"))))
+static("edges-mixed", "edges of different sizes", edges(mixed_polygons([[0, 1]])))
+static("edges-beyond", "an edge to a vertex behind the last", edges(polygons(np.array([[0, 5]], ">u2"))))
+static("edges-derived-mixed", "Is_Derived with Is_Mixed", edges(bytes([2 | 64 | 16])))
+static("edges-derived-byte-order-of-a-byte", "derived edges of a big-endian byte", edges(bytes([8 | 64])))
+static(
+    "edges-derived-small",
+    "130 vertices do not fit |i1",
+    lambda: moving([Stem(-1, 64), Stem(-1, 64), Stem(-1, 2)], 2, frames=1).draft().add(Entry(rd.EDGES, derived("|i1"))),
+)
+static("edges-derived-with-data", "data behind derived edges", edges(derived("<i4") + bytes(8)))
 
 
 def attribute(name: str, reason: str, head: dict | bytes, body: bytes = b"", error: str = "BAD_CHUNK") -> None:

@@ -55,6 +55,7 @@ class Limits:
     chunk_bytes: int = 256 << 20
     decoded_chunk_bytes: int = 256 << 20
     memory_bytes: int = 2 << 30
+    corners: int = 1 << 26
 
 
 # ---- reading fields ----------------------------------------------------------------------------------------
@@ -774,7 +775,7 @@ def measure_subtrees(branches: list[Branch]) -> None:
 # ---- rest pose ---------------------------------------------------------------------------------------------
 
 RUN_VERTICES = 32
-REST_EXACT, REST_FLOAT64, REST_ADAPTIVE = 1, 2, 8  # bits of Method
+REST_EXACT, REST_FLOAT64, REST_ADAPTIVE, REST_CONNECTED = 1, 2, 8, 16  # bits of Method
 Points = list[list[float]]  # three numbers for each vertex
 MOST_STEPS = 1073741823
 
@@ -789,7 +790,12 @@ class RestLayer:
 
 
 def decode_rest(
-    stream: bytes, branches: list[Branch], step: float, before: RestLayer | None = None, is_adaptive: bool = False
+    stream: bytes,
+    branches: list[Branch],
+    step: float,
+    before: RestLayer | None = None,
+    is_adaptive: bool = False,
+    mesh: Mesh | None = None,
 ) -> RestLayer:
     """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex; of a refinement,
     about the rest pose of the layer before."""
@@ -799,6 +805,10 @@ def decode_rest(
     rest: list[list[float]] = []
     all_steps: list[list[int]] = []
     adaptive = AdaptiveRest()
+    if mesh is not None:
+        rest, all_steps = decode_connected_rest(coder, branches, 0.625 * step, before, mesh)
+        coder.finish()
+        return RestLayer(rest, all_steps)
     for branch in branches:
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
@@ -923,10 +933,23 @@ def decode_adaptive_vertex(
     """Position and integers of vertex i of a stem."""
     lag, per_unit = max(branch.lag, 1), 1.0 / unit
     phase = 0 if i == 0 else 1 + i % lag % 255
-    own = model.phases[phase]
     weights = model.filters[0 if i == 0 else 1 + i % lag if lag <= 4 else 5]
     base, terms = rest_terms(branch, i, lag, model.offsets[phase], per_unit, rest, before)
-    guesses = rest_guesses(weights, terms)
+    return decode_expected_vertex(coder, model, phase, weights, base, terms, rest_guesses(weights, terms), unit)
+
+
+def decode_expected_vertex(
+    coder: RangeDecoder,
+    model: AdaptiveRest,
+    phase: int,
+    weights: RestFilter,
+    base: list[float],
+    terms: Points,
+    guesses: Points,
+    unit: float,
+) -> tuple[list[float], list[int]]:
+    """Position and integers of a vertex about the guesses of its offset."""
+    own, per_unit = model.phases[phase], 1.0 / unit
     offset = [expected_offset(model.all, own, guesses, k) for k in range(3)]
     steps = decode_rest_point(coder, model, own)
     point = [(base[k] + offset[k] * unit) + float(steps[k]) * unit for k in range(3)]
@@ -970,14 +993,18 @@ def rest_terms(
 
 def rest_guesses(weights: RestFilter, terms: Points) -> Points:
     """Of the offset from the vertex before, in units."""
+    beyond = [terms[5][k] + terms[6][k] for k in range(3)]
+    return [[0.0] * 3, terms[0], terms[3], terms[5], beyond, weighted_terms(weights, terms)] + terms[7:]
+
+
+def weighted_terms(weights: RestFilter, terms: Points) -> list[float]:
     weighted = []
     for k in range(3):
         total = 0.0
         for j in range(len(terms)):
             total = total + weights.weight[j] * terms[j][k]
         weighted.append(total if -1e9 < total < 1e9 else 0.0)
-    beyond = [terms[5][k] + terms[6][k] for k in range(3)]
-    return [[0.0] * 3, terms[0], terms[3], terms[5], beyond, weighted] + terms[7:]
+    return weighted
 
 
 def expected_offset(everywhere: RestMemory, own: RestMemory, guesses: Points, k: int) -> float:
@@ -1037,6 +1064,201 @@ def learn_weights(weights: RestFilter, terms: Points, guess: list[float], offset
                 weights.spread[m][j] = weights.spread[j][m]
     most = 8.0 * weights.noise + 4.0
     weights.noise = weights.noise + ((squares if squares < most else most) - weights.noise) * 0.1
+
+
+# ---- connected rest poses ---------------------------------------------------------------------------------
+
+
+@dataclass
+class Mesh:
+    """Corners of faces by the vertices they are at, in file order: those beside one in its face, the one that makes a
+    parallelogram with these three, and those of each vertex; and the order in which vertices are coded."""
+
+    vertex: list[int]
+    corners: list[list[int]]
+    before: list = field(default_factory=list)
+    after: list = field(default_factory=list)
+    opposite: list = field(default_factory=list)
+    order: list[int] = field(default_factory=list)
+    rank: list[int] = field(default_factory=list)
+
+
+@dataclass
+class Ring:
+    """What is known around a vertex: how many neighbours, the last of them, and their middle; how many parallelograms
+    it completes, their mean, the last of them, and the middle of what is opposite."""
+
+    middle: list[float]
+    mean: list[float]
+    across: list[float]
+    neighbours: int = 0
+    parallelograms: int = 0
+    base: int | None = None
+    last: list[float] | None = None
+
+
+def build_mesh(counts: list[int], corners: list[int], vertex_source: list[int]) -> Mesh:
+    vertex_count, corner_count, first = len(vertex_source), len(corners), 0
+    number = [0] * vertex_count
+    for v in range(vertex_count):
+        number[vertex_source[v]] = v
+    mesh = Mesh([number[v] for v in corners], [[] for _ in range(vertex_count)])
+    mesh.before, mesh.after, mesh.opposite = ([None] * corner_count for _ in range(3))
+    sides = []
+    for count in counts:
+        for j in range(count):
+            k, closed = first + j, count in (3, 4)
+            mesh.corners[mesh.vertex[k]].append(k)
+            mesh.before[k] = first + (j - 1) % count if j > 0 or closed else None
+            mesh.after[k] = first + (j + 1) % count if j < count - 1 or closed else None
+            mesh.opposite[k] = first + (j + 2) % count if count == 4 else None
+            if count == 3:
+                a, b = mesh.vertex[k], mesh.vertex[first + (j + 1) % 3]
+                sides.append((min(a, b), max(a, b), k))
+        first += count
+    join_triangles(mesh, sorted(sides))
+    mesh.order = coding_order(mesh)
+    mesh.rank = [0] * vertex_count
+    for t in range(vertex_count):
+        mesh.rank[mesh.order[t]] = t
+    return mesh
+
+
+def join_triangles(
+    mesh: Mesh, sides: list[tuple[int, int, int]]
+) -> None:  # those with the same ends two by two; the corners that face a side
+    i = 0
+    while i + 1 < len(sides):
+        here, there = sides[i], sides[i + 1]
+        if here[:2] == there[:2]:
+            a, b = mesh.before[here[2]], mesh.before[there[2]]
+            mesh.opposite[a], mesh.opposite[b] = b, a
+            i += 1
+        i += 1
+
+
+def coding_order(mesh: Mesh) -> list[int]:
+    vertex_count = len(mesh.corners)
+    placed, state, order, seed = [False] * vertex_count, [-1] * vertex_count, [], 0
+    stacks: list[list[int]] = [[], [], [], []]  # of vertices that complete no parallelogram, one, two, more
+
+    def is_placed(corner: int | None) -> bool:
+        return corner is not None and placed[mesh.vertex[corner]]
+
+    def touch(corner: int | None, is_beside: bool) -> None:
+        if corner is None or is_placed(corner):
+            return
+        v = mesh.vertex[corner]
+        if state[v] < 0:
+            if not is_beside:
+                return
+            put(v)
+        around = (mesh.before[corner], mesh.after[corner], mesh.opposite[corner])
+        if state[v] < 3 and is_placed(around[0]) and is_placed(around[1]) and is_placed(around[2]):
+            put(v)
+
+    def put(v: int) -> None:
+        state[v] += 1
+        stacks[state[v]].append(v)
+
+    while len(order) < vertex_count:
+        v = None
+        for stack in stacks[::-1]:
+            while stack and v is None:
+                if not placed[stack[-1]]:
+                    v = stack[-1]
+                stack.pop()
+        if v is None:  # nothing is touched: the first vertex that is left
+            while placed[seed]:
+                seed += 1
+            v = seed
+        placed[v] = True
+        order.append(v)
+        for corner in mesh.corners[v]:
+            touch(mesh.after[corner], True)
+            touch(mesh.before[corner], True)
+            touch(mesh.opposite[corner], False)
+    return order
+
+
+def ring_of(mesh: Mesh, rest: list, v: int) -> Ring:  # what is known around a vertex
+    now, sums = mesh.rank[v], [[0.0] * 3 for _ in range(3)]
+    ring = Ring(middle=sums[0], mean=sums[1], across=sums[2])
+    for corner in mesh.corners[v]:
+        beside = [mesh.vertex[k] for k in (mesh.before[corner], mesh.after[corner]) if k is not None]
+        beside = [w for w in beside if mesh.rank[w] < now]
+        for w in beside:
+            if ring.base is None or mesh.rank[w] > mesh.rank[ring.base]:
+                ring.base = w
+            ring.middle = [ring.middle[k] + rest[w][k] for k in range(3)]
+            ring.neighbours += 1
+        opposite = mesh.opposite[corner]
+        if len(beside) < 2 or opposite is None or mesh.rank[mesh.vertex[opposite]] >= now:
+            continue
+        a, b, c = rest[beside[0]], rest[beside[1]], rest[mesh.vertex[opposite]]
+        ring.last = [a[k] + b[k] - c[k] for k in range(3)]
+        ring.mean = [ring.mean[k] + ring.last[k] for k in range(3)]
+        ring.across = [ring.across[k] + c[k] for k in range(3)]
+        ring.parallelograms += 1
+    if ring.neighbours > 0:
+        ring.middle = [x / float(ring.neighbours) for x in ring.middle]
+    if ring.parallelograms > 0:
+        ring.mean = [x / float(ring.parallelograms) for x in ring.mean]
+        ring.across = [x / float(ring.parallelograms) for x in ring.across]
+    return ring
+
+
+def decode_connected_rest(
+    coder: RangeDecoder, branches: list[Branch], unit: float, before: RestLayer | None, mesh: Mesh
+) -> tuple[list, list]:
+    by_stems, by_faces = AdaptiveRest(), AdaptiveRest()
+    by_faces.lattice = by_stems.lattice
+    for f in range(6):
+        by_faces.filters[f].weight = [1.0 if j == (0 if f > 0 else 2) else 0.0 for j in range(10)]
+    rest, steps, seen_from = ([None] * len(mesh.order) for _ in range(3))
+    for v in mesh.order:
+        ring = ring_of(mesh, rest, v)
+        seen_from[v] = ring.base
+        if ring.base is None:
+            branch = branch_of(branches, v)
+            rest[v], steps[v] = decode_adaptive_vertex(coder, by_stems, branch, v - branch.first, unit, rest, before)
+        else:
+            rest[v], steps[v] = decode_connected_vertex(coder, by_faces, ring, seen_from, v, unit, rest, before)
+    return rest, steps
+
+
+def branch_of(branches: list[Branch], v: int) -> Branch:
+    return [branch for branch in branches if branch.first <= v][-1]
+
+
+def decode_connected_vertex(
+    coder: RangeDecoder,
+    model: AdaptiveRest,
+    ring: Ring,
+    seen_from: list,
+    v: int,
+    unit: float,
+    rest: list,
+    before: RestLayer | None,
+) -> tuple[list[float], list[int]]:
+    per_unit, base, count = 1.0 / unit, rest[ring.base], ring.parallelograms
+
+    def way(start: list[float], end: list[float]) -> list[float]:
+        return [(end[k] - start[k]) * per_unit for k in range(3)]
+
+    place = 4 * min(ring.neighbours - 1, 7) + min(count, 3)
+    none, straight = [0.0] * 3, seen_from[ring.base]
+    terms = [way(base, ring.mean) if count > 0 else none, way(base, ring.last) if count > 0 else none]
+    terms.append(way(base, ring.middle))
+    terms.append(none if straight is None else way(rest[straight], base))
+    terms.append(way(base, ring.across) if count > 0 else none)
+    terms.append(model.offsets[place])
+    if before is not None:
+        terms += [way(base, before.rest[v]), way(before.rest[ring.base], before.rest[v])]
+    weights = model.filters[min(count, 5)]
+    between = [0.5 * (terms[0][k] + terms[2][k]) for k in range(3)]
+    guesses = [none] + terms[:4] + [weighted_terms(weights, terms), between] + terms[6:]
+    return decode_expected_vertex(coder, model, place, weights, base, terms, guesses, unit)
 
 
 # ---- rest pose of the source -------------------------------------------------------------------------------
@@ -1162,15 +1384,23 @@ def code_exact(coder: RangeDecoder, model: ExactModel, n: int, expected: float, 
     return number, length
 
 
-def decode_exact_rest(stream: bytes, branches: list[Branch], is_float64: bool) -> list[list[float]]:
-    coder, model, rest, before = RangeDecoder(stream), ExactModel(), [], [0, 0, 0]
-    for branch in branches:
-        for i in range(branch.count):
-            expected, point = predict_rest(branch, rest, i), []
-            for k in range(3):
-                number, before[k] = code_exact(coder, model, 64 if is_float64 else 32, expected[k], before[k])
-                point.append(number)
-            rest.append(point)
+def decode_exact_rest(
+    stream: bytes, branches: list[Branch], is_float64: bool, mesh: Mesh | None = None
+) -> list[list[float]]:
+    coder, model, before = RangeDecoder(stream), ExactModel(), [0, 0, 0]
+    rest: list = [None] * sum(branch.count for branch in branches)
+    for v in range(len(rest)) if mesh is None else mesh.order:
+        ring = None if mesh is None else ring_of(mesh, rest, v)
+        if ring is None or ring.base is None:
+            branch = branch_of(branches, v)
+            expected = predict_rest(branch, rest, v - branch.first)
+        else:
+            expected = ring.mean if ring.parallelograms > 0 else ring.middle
+        point = []
+        for k in range(3):
+            number, before[k] = code_exact(coder, model, 64 if is_float64 else 32, expected[k], before[k])
+            point.append(number)
+        rest[v] = point
     coder.finish()
     return rest
 
@@ -1229,6 +1459,235 @@ def steady_times(chunk: bytes, clips: list[Clip]) -> list[list[float]]:
         divided = method in (1, 3)
         times.append([first + (float(i) / step if divided else float(i) * step) for i in range(clip.frames)])
     return times
+
+
+# ---- polygons ----------------------------------------------------------------------------------------------
+
+
+@dataclass
+class PolygonShape:
+    """Head of FACES or EDGES."""
+
+    index_type: int
+    count_type: int | None
+    is_absolute: bool
+    is_derived: bool
+    face_count: int = 0
+    columns: int = 0
+    corner_count: int = 0
+
+    def dtype(self, code: int) -> np.dtype:
+        return np.dtype(f"{'>' if code & 8 else '<'}{'i' if code & 4 else 'u'}{1 << (code & 3)}")
+
+
+def parse_polygons(chunk: bytes, kind: int, limits: Limits) -> tuple[PolygonShape, bytes]:
+    """FACES or EDGES, and its stream."""
+    require(len(chunk) >= 1 and is_integer_type(chunk[0] & 15), "Index_Type is no type")
+    flags = chunk[0] & ~15
+    shape = PolygonShape(chunk[0] & 15, None, flags & 32 != 0, flags == 64)
+    if shape.is_derived:
+        require(len(chunk) == 1 and kind == EDGES, "derived edges have data, or are FACES")
+        return shape, b""
+    mixed = flags >> 4 & 1
+    require(flags & ~48 == 0 and len(chunk) >= 9 + mixed, "FACES or EDGES has reserved bits, or is too short")
+    if mixed:
+        shape.count_type = chunk[1]
+        require(is_integer_type(chunk[1]), "Count_Type is no type")
+    shape.face_count, count = u32(chunk, 1 + mixed), u32(chunk, 5 + mixed)
+    shape.columns = 0 if mixed else count
+    shape.corner_count = count if mixed else shape.face_count * count
+    most = max(shape.face_count + shape.corner_count, shape.columns)
+    require(most <= limits.corners, "there are too many faces or corners", "LIMIT_EXCEEDED")
+    require(kind == FACES or shape.columns == 2, "EDGES has not two columns")
+    return shape, chunk[9 + mixed :]
+
+
+def is_integer_type(code: int) -> bool:
+    return code <= 15 and code & 11 != 8
+
+
+class PolygonModel:
+    def __init__(self) -> None:
+        self.repeats = [Context(60000) for _ in range(16)]
+        self.guessed = [[[Context(16384) for _ in range(17)] for _ in range(5)] for _ in range(14)]
+        self.is_recent = [Context(32768) for _ in range(5)]
+        self.recent = [[Context(32768) for _ in range(32)] for _ in range(5)]
+        self.far, self.far_mean = [NumberModel() for _ in range(3)], [1024] * 3
+        self.same_count, self.counts_seen = [Context(49152) for _ in range(64)], 0
+        self.count, self.count_mean = NumberModel(), 64
+        self.places: list[dict[int, int]] = [
+            {},
+            {},
+        ]  # by the hash of 12, and of 3, ways: the corner that followed them last
+        self.followed, self.run = 0, 0  # the corner that is expected again (0: none), and for how long one has been
+        self.next, self.way = 0, 0  # the vertex behind the highest so far; how the last corner was coded
+        self.before: dict[int, list[int]] = {}
+        self.after: dict[int, list[int]] = {}  # ends of open sides of a vertex, last ones first
+
+
+def decode_polygons(
+    stream: bytes, shape: PolygonShape, vertex_count: int
+) -> tuple[list[int], list[int]]:  # numbers of corners of the faces, vertices of the corners
+    coder, model = RangeDecoder(stream), PolygonModel()
+    bound = min(vertex_count, largest_of_type(shape.index_type) + 1)
+    counts: list[int] = []
+    corners: list[int] = []
+    previous, count = 0, 3
+    for _ in range(shape.face_count):
+        first = len(corners)
+        if shape.count_type is None:
+            count = shape.columns
+        else:
+            count = decode_face_count(coder, model, count)
+            require(count <= largest_of_type(shape.count_type), "a face has more corners than Count_Type holds")
+        require(count <= shape.corner_count - first, "faces have more corners than there are")
+        for j in range(count):
+            decode_corner(coder, model, shape, bound, corners, first, j, previous)
+        for k in range(first, first + count - 1):
+            note_side(model, corners[k], corners[k + 1])
+        if count > 2:
+            note_side(model, corners[-1], corners[first])
+        if count > 0:
+            previous = first
+        counts.append(count)
+    require(len(corners) == shape.corner_count, "corners are left over")
+    coder.finish()
+    return counts, corners
+
+
+def largest_of_type(code: int) -> int:
+    return (1 << (8 << (code & 3)) - (code >> 2 & 1)) - 1
+
+
+def decode_face_count(coder: RangeDecoder, model: PolygonModel, before: int) -> int:
+    same = coder.bit(model.same_count[model.counts_seen])
+    model.counts_seen = (model.counts_seen << 1 | same) & 63
+    if same:
+        return before
+    count = code_unsigned(coder, model.count, model.count_mean)
+    model.count_mean = model.count_mean - (model.count_mean + 7) // 8 + clipped(count) * 2
+    return count
+
+
+def decode_corner(
+    coder: RangeDecoder,
+    model: PolygonModel,
+    shape: PolygonShape,
+    bound: int,
+    corners: list[int],
+    first: int,
+    j: int,
+    previous: int,
+) -> None:
+    followed = [follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
+    if model.followed == 0:
+        model.followed = followed[0]
+    expected = repeated(corners, model.followed, bound)
+    vertex = None
+    if expected is not None and coder.bit(model.repeats[min(model.run, 15)]):
+        model.way, vertex = 0, expected
+    if vertex is None and shape.is_absolute:
+        vertex = code_unsigned(coder, model.far[0], 1024)
+    if vertex is None:
+        guesses = [repeated(corners, followed[1], bound), model.next if model.next < bound else None]
+        guesses += guesses_of_sides(model, corners, first, j, previous)
+        place = 4 if j > 1 and guesses[2] is not None and guesses[2] == guesses[5] else min(j, 3)
+        vertex = decode_guessed(coder, model, place, guesses, expected)
+        if vertex is None:
+            vertex = decode_other(coder, model, corners, j, place, previous)
+    require(0 <= vertex < bound, "a vertex is not there, or beyond Index_Type")
+    corners.append(vertex)
+    model.next = max(model.next, vertex + 1)
+    if model.followed > 0 and vertex == expected:
+        model.followed, model.run = model.followed + 1, model.run + 1
+    else:
+        model.followed = model.run = 0
+
+
+def follow(
+    model: PolygonModel, corners: list[int], table: int, length: int
+) -> int:  # the corner that came behind the same ways; the next one is the last now
+    i, code = len(corners), 0
+    if i <= length:
+        return 0
+    for k in range(i - length, i):
+        code = (code + (corners[k] - corners[k - 1]) + 1) * 0x9E3779B1 & 0xFFFFFFFF
+    found = model.places[table].get(code >> 18, 0)
+    model.places[table][code >> 18] = i
+    return found
+
+
+def repeated(
+    corners: list[int], at: int, bound: int
+) -> int | None:  # the vertex as far from the last one as that of corner `at` was from the one before
+    if at == 0:
+        return None
+    vertex = corners[-1] + corners[at] - corners[at - 1]
+    return vertex if 0 <= vertex < bound else None
+
+
+def guesses_of_sides(
+    model: PolygonModel, corners: list[int], first: int, j: int, previous: int
+) -> list:  # 12, None: no guess
+    def ends(sides: dict[int, list[int]], vertex: int) -> list:
+        found = sides.get(vertex, [])
+        return found + [None] * (3 - len(found))
+
+    before, after = model.before, model.after
+    if j > 0:
+        last, start = corners[-1], corners[first]
+        return ends(before, last) + ends(after, start) + ends(after, last) + ends(before, start)
+    if first == 0:
+        return [None] * 12
+    start, end, second = corners[previous], corners[first - 1], corners[min(previous + 1, first - 1)]
+    return [start, end, second] + ends(after, start) + ends(before, start) + [None] * 3
+
+
+def decode_guessed(
+    coder: RangeDecoder, model: PolygonModel, place: int, guesses: list, expected: int | None
+) -> int | None:
+    for g in range(14):
+        guess = guesses[g]
+        if guess is None or guess == expected or guess in guesses[:g]:
+            continue
+        if coder.bit(model.guessed[g][place][model.way]):
+            model.way = 1 + g
+            return guess
+    return None
+
+
+def decode_other(
+    coder: RangeDecoder, model: PolygonModel, corners: list[int], j: int, place: int, previous: int
+) -> int:
+    i = len(corners)
+    if coder.bit(model.is_recent[place]):
+        back = 1
+        for _ in range(5):
+            back = back << 1 | coder.bit(model.recent[place][back])
+        model.way = 15
+        require(back - 32 < i, "a recent corner is before the first")
+        return corners[i - 1 - (back - 32)]
+    model.way = 16
+    kind = min(place, 2)
+    difference, mean = code_signed(coder, model.far[kind], model.far_mean[kind]), model.far_mean[kind]
+    model.far_mean[kind] = mean - (mean + 7) // 8 + clipped(difference) * 2
+    return (corners[i - 1 if j > 0 else previous] if i > 0 else 0) + difference
+
+
+def note_side(model: PolygonModel, start: int, end: int) -> None:
+    def close(sides: dict[int, list[int]], vertex: int, other: int) -> bool:
+        found = sides.get(vertex, [])
+        if other in found:
+            found.remove(other)
+            return True
+        return False
+
+    closed = [close(model.after, end, start), close(model.before, start, end)]
+    if True not in closed:
+        closed = [close(model.after, start, end), close(model.before, end, start)]
+    if True not in closed:
+        model.after[start] = ([end] + model.after.get(start, []))[:3]
+        model.before[end] = ([start] + model.before.get(end, []))[:3]
 
 
 # ---- temporal basis and coefficient streams ----------------------------------------------------------------
@@ -2874,7 +3333,6 @@ PLAIN_TYPE = re.compile(
     r"|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
     re.ASCII,
 )
-DERIVED_TYPES = {"|i1", "|u1"} | {order + kind + size for order in "<>" for kind in "iu" for size in "248"}
 
 
 def parse_json(text: bytes, what: str) -> dict:
@@ -3101,12 +3559,16 @@ class AthFile:
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 17, "REST is too short")
-        known = REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE
+        known = REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE | REST_CONNECTED
         require(chunk[0] == IS_HOST or chunk[0] & ~known == 0, "Method has reserved bits, or others beside Is_Host")
         require(chunk[0] & REST_EXACT == 0 or chunk[0] & REST_ADAPTIVE == 0, "a rest pose is exact and adaptive")
+        is_connected = chunk[0] & REST_CONNECTED != 0
         require(
             chunk[0] & (REST_EXACT | IS_HOST) == 0 or not self.find(SOURCE_REST),
             "there is a second rest pose, though the first is exact",
+        )
+        require(
+            not is_connected or chunk[0] & (REST_EXACT | REST_ADAPTIVE) != 0, "a connected rest pose is coded by steps"
         )
         self.origin = np.array([f32(chunk, 1 + 4 * k) for k in range(3)])
         step = f32(chunk, 13)
@@ -3119,15 +3581,27 @@ class AthFile:
             require(len(chunk) == 17 + 8, "Rest_Body is not two checksums")
             self.mesh_checksums = u32(chunk, 17), u32(chunk, 21)
             return  # until there is a mesh
+        self._mesh = self._read_mesh() if is_connected else None
         if chunk[0] & REST_EXACT == 0:
             self._is_adaptive = chunk[0] & REST_ADAPTIVE != 0
-            coded = decode_rest(chunk[17:], self.branches, step, None, self._is_adaptive)
+            coded = decode_rest(chunk[17:], self.branches, step, None, self._is_adaptive, self._mesh)
             self._rests = [coded]
             rest = np.array(coded.rest)
             self._set_rest(rest, rest + self.origin)
         else:
-            shown = np.array(decode_exact_rest(chunk[17:], self.branches, bool(chunk[0] & REST_FLOAT64)))
+            is_float64 = bool(chunk[0] & REST_FLOAT64)
+            shown = np.array(decode_exact_rest(chunk[17:], self.branches, is_float64, self._mesh))
             self._set_rest(shown - self.origin, shown)
+
+    def _read_mesh(self) -> Mesh:
+        """What FACES say of a connected rest pose."""
+        require(self.find(FACES) is not None, "FACES are missing", "BAD_CHUNK_TABLE")
+        shape, stream = parse_polygons(self.content(FACES), FACES, self.limits)
+        vertex_count = len(self.vertex_source)
+        few = shape.face_count <= 4 * vertex_count and shape.corner_count <= 8 * vertex_count
+        require(few, "FACES have too many faces or corners for a rest pose")
+        counts, corners = decode_polygons(stream, shape, vertex_count)
+        return build_mesh(counts, corners, list(self.vertex_source))
 
     def _set_rest(self, rest: np.ndarray, shown: np.ndarray) -> None:
         self.plan.rest = rest
@@ -3183,7 +3657,9 @@ class AthFile:
     def _refined_rest(self, chunk: bytes) -> np.ndarray:
         require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Rest_Step is out of range")
         require(self._rests != [], "a rest pose that is exact is refined")
-        self._rests.append(decode_rest(chunk[4:], self.branches, f32(chunk, 0), self._rests[-1], self._is_adaptive))
+        self._rests.append(
+            decode_rest(chunk[4:], self.branches, f32(chunk, 0), self._rests[-1], self._is_adaptive, self._mesh)
+        )
         rest = np.array(self._rests[-1].rest)
         return rest
 
@@ -3317,34 +3793,46 @@ class AthFile:
     def metadata(self) -> dict:
         return parse_json(self.metadata_text(), "METADATA")
 
-    def faces(self) -> np.ndarray | None:
-        if not self.find(FACES):
+    def _polygons(self, kind: int) -> tuple[PolygonShape, list[int], list[int]] | None:
+        """Their head, numbers of corners, and vertices."""
+        if not self.find(kind):
             return None
-        _, array = parse_array(self.content(FACES), "FACES", self.limits)
-        self._check_indices(array, "FACES")
-        return array
+        shape, stream = parse_polygons(self.content(kind), kind, self.limits)
+        if shape.is_derived:
+            return shape, [], []
+        return shape, *decode_polygons(stream, shape, self.header.vertex_count)
+
+    def faces(self) -> np.ndarray | None:
+        """Those with as many corners as each other."""
+        found = self._polygons(FACES)
+        if found is None or found[0].count_type is not None:
+            return None
+        shape, _, corners = found
+        return np.array(corners, shape.dtype(shape.index_type)).reshape(shape.face_count, shape.columns)
+
+    def _mixed_faces(self) -> dict[str, np.ndarray]:
+        found = self._polygons(FACES)
+        if found is None or found[0].count_type is None:
+            return {}
+        shape, counts, corners = found
+        return {
+            "face_vertex_counts": np.array(counts, shape.dtype(shape.count_type)),
+            "face_vertex_indices": np.array(corners, shape.dtype(shape.index_type)),
+        }
 
     def edges(self) -> np.ndarray | None:
-        if not self.find(EDGES):
+        found = self._polygons(EDGES)
+        if found is None:
             return None
-        head, array = parse_array(self.content(EDGES), "EDGES", self.limits)
-        if array is None:
-            return self._derived_edges(head.get("derived"))
-        self._check_indices(array, "EDGES")
-        require(array.shape[1] == 2, "EDGES has not two columns")
-        return array
+        shape, _, corners = found
+        dtype = shape.dtype(shape.index_type)
+        if shape.is_derived:
+            return self._derived_edges(dtype)
+        return np.array(corners, dtype).reshape(shape.face_count, 2)
 
-    def _check_indices(self, array: np.ndarray | None, what: str) -> None:
-        require(array is not None and array.ndim == 2 and array.dtype.kind in "iu", f"{what} has no rows of integers")
-        require(
-            array.size == 0 or (0 <= array.min() and array.max() < self.header.vertex_count),
-            f"{what} names a vertex that is not there",
-        )
-
-    def _derived_edges(self, type_name: object) -> np.ndarray:
+    def _derived_edges(self, dtype: np.dtype) -> np.ndarray:
         """An edge from each vertex to the one before it on its stem, or to the attach vertex."""
-        require(isinstance(type_name, str) and type_name in DERIVED_TYPES, "EDGES has neither array nor derived edges")
-        require(np.iinfo(type_name).max >= self.header.vertex_count - 1, "the type of derived edges is too small")
+        require(np.iinfo(dtype).max >= self.header.vertex_count - 1, "the type of derived edges is too small")
         pairs = []
         for branch in self.branches:
             for v in range(branch.first, branch.first + branch.count):
@@ -3352,11 +3840,11 @@ class AthFile:
                 if before >= 0:
                     pairs.append((self.vertex_source[before], self.vertex_source[v]))
         pairs.sort(key=lambda pair: pair[1])
-        return np.array(pairs, type_name).reshape(-1, 2)
+        return np.array(pairs, dtype).reshape(-1, 2)
 
     def attributes(self) -> dict[str, np.ndarray]:
         """Named arrays, of those that have arrived."""
-        arrays: dict[str, np.ndarray] = {}
+        arrays = self._mixed_faces()
         for chunk in self.chunks:
             if chunk.kind != ATTRIBUTE or not self.is_available(chunk):
                 continue

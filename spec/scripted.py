@@ -12,12 +12,15 @@ import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from spec import reference_decoder as rd
 from spec.reference_decoder import LOOSE, SHEET, WHOLE, crc32c  # noqa: F401 (flags, for scripts)
+
+RECENT = 32  # corners that a vertex may be said by
 
 # ---- scripts -----------------------------------------------------------------------------------------------
 
@@ -44,6 +47,8 @@ class Chance(Script):
             return 0 if self.random.random() < self.empty else int(self.random.integers(1, most + 1))
         if asked == "bit":
             return int(self.random.integers(2))
+        if asked == "corner":
+            return int(self.random.integers(most + 1))
         size = int(2 ** self.random.uniform(0, self.large if self.random.random() < 0.1 else 3)) - 1
         return -size if asked == "signed" and self.random.random() < 0.5 else size
 
@@ -136,6 +141,51 @@ def scripted_exact(original: Callable):
     return code
 
 
+def scripted_corner(original: Callable):
+    def code(coder, model, shape, bound, corners, first, j, previous):
+        """The script has the vertex. It is coded as the first thing that says it."""
+        vertex, script = coder.script.answer("corner", bound - 1), coder.script
+        coder.decisions.extend(corner_decisions(deepcopy(model), shape, bound, corners, first, j, previous, vertex))
+        about = corners[-1 if j > 0 else previous] if corners and not shape.is_absolute else 0
+        coder.script = Script(vertex - about)
+        original(coder, model, shape, bound, corners, first, j, previous)
+        coder.script = script
+
+    return code
+
+
+def corner_decisions(model, shape, bound, corners, first, j, previous, vertex) -> list[int]:
+    """Up to the number of a vertex that is said by its distance."""
+    followed = [rd.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
+    expected, bits = rd.repeated(corners, model.followed or followed[0], bound), []
+    if shape.is_absolute:
+        return [] if expected is None else [int(expected == vertex)]
+    guesses = [rd.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
+    guesses += rd.guesses_of_sides(model, corners, first, j, previous)
+    for guess in dict.fromkeys([expected, *guesses]):
+        if guess is not None:
+            bits.append(int(guess == vertex))
+            if bits[-1]:
+                return bits
+    recent = corners[: -RECENT - 1 : -1]
+    if vertex in recent:
+        return [*bits, 1, *_bits(recent.index(vertex), 5)]
+    return [*bits, 0]
+
+
+def scripted_face_count(original: Callable):
+    def code(coder, model, before):
+        """The script has the number of corners."""
+        count, script = coder.script.answer("unsigned", 8), coder.script
+        coder.decisions.append(int(count == before))
+        coder.script = Script(count)
+        original(coder, model, before)
+        coder.script = script
+        return count
+
+    return code
+
+
 @contextmanager
 def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
     """The reference decoder as a writer; the coder that it makes is put into the list."""
@@ -151,6 +201,8 @@ def scripted(script: Script) -> Iterator[list[ScriptedCoder]]:
         "code_signed_in_class": scripted_signed(rd.code_in_class),
         "decode_count": scripted_count(rd.decode_count),
         "code_exact": scripted_exact(rd.code_exact),
+        "decode_corner": scripted_corner(rd.decode_corner),
+        "decode_face_count": scripted_face_count(rd.decode_face_count),
     }
     kept = {name: getattr(rd, name) for name in replaced}
     try:
@@ -524,6 +576,7 @@ class Plant:
     clips: tuple[rd.Clip, ...] = ()  # of CLIPS; none: one of `frames` and `segments`, without the chunk
     points: list | None = None  # integers in units of Rest_Step; None: `grown`
     rest: bytes | None = None  # REST
+    faces: bytes | None = None  # FACES that it goes by
     source_rest: bytes | None = None  # SOURCE_REST
     mesh: np.ndarray | None = None  # of the host, in source order, in place of a rest pose
     time: bytes | None = None  # TIME
@@ -567,6 +620,8 @@ class Plant:
             )
         if self.source_rest is not None:
             entries.append(Entry(rd.SOURCE_REST, self.source_rest))
+        if self.faces is not None:
+            entries.append(Entry(rd.FACES, self.faces))
         if (rd.REFINED_REST, 1, 0) in self.scripts:
             entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
             self.plan = rd.Plan(branches)
@@ -617,6 +672,7 @@ class Plant:
 
     def _set_rest(self, branches: list, chunk: bytes, vertex_source: list) -> list[rd.RestLayer]:
         """The rest pose of REST, for those that refine it; none where it is exact or the host's."""
+        self.connectivity = None if self.faces is None else self._mesh(vertex_source)
         with np.errstate(all="ignore"):
             if self.mesh is not None:
                 self.plan.rest = (self.mesh[vertex_source] + np.float32(0)).astype(float) - np.float32(
@@ -624,13 +680,17 @@ class Plant:
                 ).astype(float)
                 return []
             if chunk[0] & 1:
-                points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2))
+                points = rd.decode_exact_rest(chunk[17:], branches, bool(chunk[0] & 2), self.connectivity)
                 self.plan.rest = np.array(points) - np.array(struct.unpack_from("<3f", chunk, 1), float)
                 return []
             self.is_adaptive = chunk[0] & rd.REST_ADAPTIVE != 0
-            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13), None, self.is_adaptive)
+            coded = rd.decode_rest(chunk[17:], branches, rd.f32(chunk, 13), None, self.is_adaptive, self.connectivity)
             self.plan.rest = np.array(coded.rest)
             return [coded]
+
+    def _mesh(self, vertex_source: list) -> rd.Mesh:
+        shape, stream = rd.parse_polygons(self.faces, rd.FACES, rd.Limits())
+        return rd.build_mesh(*rd.decode_polygons(stream, shape, len(vertex_source)), list(vertex_source))
 
     def _shapes(self, level: int) -> bytes:
         """SHAPES by its script; its values are used by the streams of STEMS."""
@@ -654,7 +714,7 @@ class Plant:
 
     def _refined_rest(self, branches: list, level: int, step: float, rests: list[rd.RestLayer]) -> Entry:
         """The rest pose of a level, which is added to those before."""
-        arguments = branches, step, rests[-1], self.is_adaptive
+        arguments = branches, step, rests[-1], self.is_adaptive, self.connectivity
         stream = self._write(rd.decode_rest, (rd.REFINED_REST, level, 0), *arguments)
         rests.append(rd.decode_rest(stream, *arguments))
         return Entry(rd.REFINED_REST, refined_rest_chunk(stream, step), level)

@@ -460,7 +460,8 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
         rest = rest if made == "invalid" else made
-    refined, motion = spec.refined_plan(branches, rest.rest, level), spec.no_motion(plan, parts.header.frame_count, False)
+    motion = spec.no_motion(plan, parts.header.frame_count, False)
+    refined = spec.refined_plan(branches, rest.rest, level)
     if seed % 3:
         stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
         added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))
@@ -594,7 +595,7 @@ def test_random_decisions_about_exact_numbers_mean_the_same_to_the_document_and_
     for dtype, n in NUMBERS.items():
         assert_same_outcome(
             spec,
-            random_stream(spec, random, "decode_exact_rest", rows, n == 64),
+            random_stream(spec, random, "decode_exact_rest", rows, n == 64, None),
             lambda stream: np.array(spec.decode_exact_rest(stream, rows, n == 64), dtype),
             lambda stream: read_exact_rest(stream, file.branches, dtype),
         )
@@ -615,7 +616,7 @@ def decisions(n: int, magnitude: int, negative: bool = False) -> list[int]:
 def exact_stream(spec: SimpleNamespace, n: int, *differences: tuple[int, bool]) -> bytes:
     """An exact rest pose of one vertex, whose numbers are each 0.0 moved by a difference."""
     made = iter(sum((decisions(n, *difference) for difference in differences), []))
-    return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64)
+    return stream_of(spec, lambda: next(made, 0), "decode_exact_rest", one_vertex(spec), n == 64, None)
 
 
 def one_vertex(spec: SimpleNamespace) -> list:
@@ -669,7 +670,7 @@ def two_numbers(spec: SimpleNamespace, first: list[int], second: list[int]) -> l
         assert read_times(stream, 2).tolist() == numbers
     stem, zeros = roots(2), 2 * decisions(64, 0)
     made = iter(first + zeros + second + zeros)
-    stream = stream_of(spec, lambda: next(made), "decode_exact_rest", stems(spec, stem), True)
+    stream = stream_of(spec, lambda: next(made), "decode_exact_rest", stems(spec, stem), True, None)
     rest = spec.decode_exact_rest(stream, stems(spec, stem), True)
     assert rest == read_exact_rest(stream, stem, np.float64).tolist() == [[x, 0.0, 0.0] for x in numbers]
     return numbers

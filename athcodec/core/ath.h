@@ -339,7 +339,7 @@ ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
 ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);
 
 /* The chunk table, in file order, unknown optional kinds included. Payloads: FORMAT.md. Static data (METADATA,
- * FACES, EDGES, ATTRIBUTE) is handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
+ * ATTRIBUTE) is handed over as stored, zstd frames and all; check it with ath_check_chunk before use. */
 typedef struct ath_chunk {
     const uint8_t *bytes; /* null: not fed */
     uint64_t offset;
@@ -353,6 +353,24 @@ typedef struct ath_chunk {
 ATH_API const ath_chunk *ath_chunks(const ath_file *file);
 /* ATH_OK, ATH_MISSING or ATH_BAD_CHECKSUM. fault: null, or what that is about. */
 ATH_API int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault);
+
+/* Polygons of FACES, or edges of EDGES: faces of as many `columns` each or, where is_mixed is 1, of numbers of corners of
+ * their own. The types are those of the source's arrays: bits 0 and 1: 1, 2, 4 or 8 bytes; bit 2: signed; bit 3: its bytes
+ * stood the other way, high ones first. Where is_derived is 1 the edges are not stored: one from each vertex but the
+ * first of a root to the one before it on its stem, or else to the attach vertex. */
+typedef struct ath_polygons {
+    uint32_t face_count, corner_count, columns;
+    uint8_t is_mixed, is_derived, index_type, count_type;
+} ath_polygons;
+
+/* kind: ATH_FACES or ATH_EDGES. ATH_MISSING, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK, ATH_LIMIT_EXCEEDED; ATH_BAD_ARGUMENT where the
+ * file has none. fault: null, or what that is about. */
+ATH_API int ath_polygons_of(const ath_file *file, int kind, ath_polygons *shape, ath_fault_info *fault);
+/* Reads them in `memory`, which is scratch, of ath_polygons_size bytes: corner_count vertices in source order, and
+ * face_count numbers of corners where is_mixed is 1 (else null). The same, ATH_NO_MEMORY. */
+ATH_API size_t ath_polygons_size(const ath_file *file);
+ATH_API int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memory_bytes, uint32_t *counts,
+                              int32_t *corners, ath_fault_info *fault);
 
 /* ---- bytes ------------------------------------------------------------------------------------------------------- */
 

@@ -192,6 +192,7 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
     uint64_t offset = header->front_length, key_before = 0;
     int in_prelude = 1;
     *prelude = offset;
+    header->has_faces = 0;
     chunk_model_init(&model);
     for (uint32_t i = 0; i < header->chunk_count; i++) {
         ath_chunk chunk;
@@ -211,6 +212,7 @@ static int read_chunks(ath_coder *coder, const uint8_t *checksums, const ath_lim
         offset += chunk.length;
         in_prelude = in_prelude && key >> 62 == 0;
         if (in_prelude) *prelude = offset;
+        if (chunk.kind == ATH_FACES) header->has_faces = 1;
         if (chunks) chunks[i] = chunk;
     }
     header->file_length = offset;
@@ -314,7 +316,7 @@ int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body)
     return epsilon < ATH_SHORT_FLOATS && xi < ATH_SHORT_FLOATS ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8 }; /* bits of Method */
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_ADAPTIVE = 8, REST_CONNECTED = 16 }; /* bits of Method */
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
@@ -324,8 +326,10 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     head->is_float64 = (method & REST_FLOAT64) != 0;
     head->adaptive = (method & REST_ADAPTIVE) != 0;
     head->is_host = method == REST_HOST;
-    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE)) return ATH_BAD_CHUNK;
+    head->connected = (method & REST_CONNECTED) != 0;
+    if (!head->is_host && method & ~(REST_EXACT | REST_FLOAT64 | REST_ADAPTIVE | REST_CONNECTED)) return ATH_BAD_CHUNK;
     if (head->exact && head->adaptive) return ATH_BAD_CHUNK;
+    if (head->connected && !head->exact && !head->adaptive) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
     int valid = is_step(head->step) && (!head->is_host || body->size == sizeof head->host_checksum);
@@ -335,6 +339,51 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
         valid = valid && ath_is_finite(head->origin[k]);
     }
     return valid ? ATH_OK : ATH_BAD_CHUNK;
+}
+
+/* Bits of Index_Type; those below are the type. */
+enum { IS_MIXED = 16, IS_ABSOLUTE = 32, IS_DERIVED = 64, TYPE_BITS = 15, TYPE_BIG_ENDIAN = 8 };
+
+static int is_integer_type(int32_t type)
+{
+    return type <= TYPE_BITS && (type & (TYPE_BIG_ENDIAN | 3)) != TYPE_BIG_ENDIAN;
+}
+
+int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count)
+{
+    int32_t bits = ath_bits_of_type(type);
+    return bits < 31 ? ath_min(vertex_count, 1 << bits) : vertex_count;
+}
+
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body)
+{
+    if (chunk.size < 1) return ATH_BAD_CHUNK;
+    int32_t flags = chunk.bytes[0] & ~TYPE_BITS;
+    memset(shape, 0, sizeof *shape);
+    shape->index_type = chunk.bytes[0] & TYPE_BITS;
+    shape->is_mixed = (flags & IS_MIXED) != 0;
+    shape->is_derived = flags == IS_DERIVED;
+    *is_absolute = (flags & IS_ABSOLUTE) != 0;
+    *body = rest_of(chunk, 1);
+    if (!is_integer_type(shape->index_type)) return ATH_BAD_CHUNK;
+    if (shape->is_derived) return body->size == 0 ? ATH_OK : ATH_BAD_CHUNK;
+    if (flags & ~(IS_MIXED | IS_ABSOLUTE) || body->size < 8 + (size_t)shape->is_mixed) return ATH_BAD_CHUNK;
+    if (shape->is_mixed) {
+        shape->count_type = body->bytes[0];
+        *body = rest_of(*body, 1);
+        if (!is_integer_type(shape->count_type)) return ATH_BAD_CHUNK;
+    }
+    uint64_t faces = u32_at(body->bytes), corners = u32_at(body->bytes + 4);
+    if (!shape->is_mixed) {
+        shape->columns = (uint32_t)corners;
+        corners = corners * faces;
+    }
+    *body = rest_of(*body, 8);
+    if (faces > MOST_CORNERS || shape->columns > MOST_CORNERS || corners > MOST_CORNERS - faces)
+        return ATH_LIMIT_EXCEEDED;
+    shape->face_count = (uint32_t)faces;
+    shape->corner_count = (uint32_t)corners;
+    return ATH_OK;
 }
 
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body)

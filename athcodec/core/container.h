@@ -10,6 +10,7 @@ typedef struct ath_header {
     double max_error;
     uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
     int32_t level_count, full_level_count, clip_count, layer_count, is_float64, is_predicted;
+    int32_t has_faces; /* of the chunk table */
 } ath_header;
 
 /* Announced errors: so many floats without sign, of which the top bits of binary32 are stored, shifted. */
@@ -49,7 +50,7 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, is_float64, adaptive, is_host;
+    int32_t exact, is_float64, adaptive, is_host, connected;
     uint32_t host_checksum[2]; /* of a mesh of the host's, where that is the rest pose */
 } ath_rest_head;
 
@@ -86,6 +87,14 @@ typedef struct {
 
 int ath_parse_hierarchy(ath_bytes chunk, ath_thresholds *head, ath_bytes *body);
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
+/* Of FACES or EDGES, which have at most so many faces and corners together: else ATH_LIMIT_EXCEEDED. */
+enum { MOST_CORNERS = 1 << 26 };
+/* Bits of the numbers from 0 on that an integer type holds. */
+ATH_INLINE int32_t ath_bits_of_type(int32_t type) { return (8 << (type & 3)) - (type >> 2 & 1); }
+
+/* Vertices that the numbers of an integer type can name, at most `vertex_count`. */
+int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count);
+int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body);
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
 /* Parses the entry at the front of `chunk`, and moves `chunk` past it. */
 int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *entry);

@@ -1,5 +1,6 @@
 /* Decodes the streams of the prelude: streams.h compiled for decoding. */
 #include "decode.h"
+#include "faces_model.h"
 #include "streams.h"
 
 size_t ath_prelude_model_size(void)
@@ -50,11 +51,11 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 }
 
 int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, int adaptive, const int32_t *coarse, const double *before, int32_t *steps,
-                    double *rest)
+                    double step, int adaptive, ath_mesh *mesh, const int32_t *coarse, const double *before,
+                    int32_t *steps, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, 0.0};
+    rest_layer layer = {coarse, before, steps, adaptive, mesh, 0.0};
     coder_start(&coder, bytes, size);
     return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
 }
@@ -69,11 +70,26 @@ int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const
 }
 
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
-                          int32_t branch_count, int is_float64, double *rest)
+                          int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest)
 {
     ath_coder coder;
     coder_start(&coder, bytes, size);
-    return finished(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, rest));
+    return finished(&coder,
+                    code_exact_rest(&coder, (exact_model *)model, branches, branch_count, mesh, is_float64, rest));
+}
+
+size_t ath_faces_memory(int32_t vertex_count)
+{
+    return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
+}
+
+int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t is_absolute,
+                     int32_t vertex_count, uint32_t *counts, int32_t *corners)
+{
+    ath_coder coder;
+    coder_start(&coder, stream.bytes, stream.size);
+    faces_list faces = faces_of((faces_model *)memory, shape, is_absolute, vertex_count, counts, corners);
+    return finished(&coder, code_faces(&coder, (faces_model *)memory, &faces));
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)

@@ -1,6 +1,7 @@
 /* Encodes streams: streams.h compiled for encoding. */
 #define ATH_ENCODING
 #include "encode.h"
+#include "faces_model.h"
 #include "front_model.h"
 #include "motion_streams.h"
 #include "predicted_model.h"
@@ -56,11 +57,11 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 }
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
-                        double step, int adaptive, double slack, const int32_t *coarse, const double *before,
-                        int32_t *steps, const double *source, double *rest)
+                        double step, int adaptive, double slack, ath_mesh *mesh, const int32_t *coarse,
+                        const double *before, int32_t *steps, const double *source, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, slack};
+    rest_layer layer = {coarse, before, steps, adaptive, mesh, slack};
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }
@@ -76,12 +77,22 @@ int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, con
 }
 
 int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                              int32_t branch_count, int is_float64, const double *rest)
+                              int32_t branch_count, const ath_mesh *mesh, int is_float64, const double *rest)
 {
     ath_coder coder;
     coder_start(&coder, bytes, capacity);
-    return written(&coder,
-                   code_exact_rest(&coder, (exact_model *)model, branches, branch_count, is_float64, (double *)rest));
+    return written(&coder, code_exact_rest(&coder, (exact_model *)model, branches, branch_count, mesh, is_float64,
+                                           (double *)rest));
+}
+
+int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int is_absolute,
+                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners)
+{
+    ath_coder coder;
+    coder_start(&coder, bytes, capacity);
+    faces_list faces =
+        faces_of((faces_model *)memory, shape, is_absolute, vertex_count, (uint32_t *)counts, (int32_t *)corners);
+    return written(&coder, code_faces(&coder, (faces_model *)memory, &faces));
 }
 
 int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count, const double *times)

@@ -7,6 +7,7 @@
 #define ATH_ENCODE_H
 
 #include "container.h"
+#include "mesh.h"
 #include "motion.h"
 
 /* The integers of one segment; with them come ath_motion's streams. */
@@ -125,9 +126,9 @@ ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const 
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* slack: how far from its place a vertex may be put to save bits, where `adaptive`. */
+/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits, where `adaptive`. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                        int32_t branch_count, double step, int adaptive, double slack,
+                                        int32_t branch_count, double step, int adaptive, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, int32_t *steps,
                                         const double *source, double *rest);
 /* turns: scratch, branch_count x 9. */
@@ -135,7 +136,12 @@ ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size
                                                int32_t branch_count, double step, const double *reference,
                                                const double *source, double *turns, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
-                                              int32_t branch_count, int is_float64, const double *rest);
+                                              int32_t branch_count, const ath_mesh *mesh, int is_float64,
+                                              const double *rest);
+/* memory: ath_faces_memory bytes. */
+ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
+                                         int is_absolute, int32_t vertex_count, const uint32_t *counts,
+                                         const int32_t *corners);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,

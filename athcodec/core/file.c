@@ -37,6 +37,14 @@ static void carve_layers(ath_file *file, const ath_header *header, ath_arena *ar
     }
 }
 
+/* FACES as read, and what reading and building them needs. */
+static uint64_t mesh_work(uint64_t vertices)
+{
+    uint64_t read = (MESH_CORNERS + MESH_FACES) * vertices * sizeof(int32_t);
+    uint64_t building = ath_mesh_work(vertices, MESH_CORNERS * vertices) * sizeof(int32_t);
+    return read + larger(building, ath_faces_memory((int32_t)vertices));
+}
+
 /* Places the file's arrays behind its struct; with a null base it only counts. Returns the bytes that they take. */
 static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
 {
@@ -60,6 +68,8 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     file->gaps = (uint8_t *)ath_take(&arena, vertices);
     file->scratch = ath_take(&arena, scratch_size(header));
     carve_layers(file, header, &arena);
+    if (header->has_faces)
+        ath_carve_mesh(&file->mesh, &arena, vertices, MESH_CORNERS * vertices, mesh_work(header->vertex_count));
     return arena.used;
 }
 
@@ -339,6 +349,25 @@ static void take_numbers(ath_file *file)
     if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
 }
 
+/* The mesh that a rest pose is connected by. */
+static int read_mesh(ath_file *file, ath_fault_info *fault)
+{
+    ath_mesh *mesh = &file->mesh;
+    int32_t vertex_count = (int32_t)file->header.vertex_count, is_absolute;
+    size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
+    int32_t *corners = mesh->work + larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
+    ath_bytes chunk, body;
+    ath_polygons shape;
+    int result = load(file, ATH_FACES, &chunk, fault);
+    if (result == ATH_OK) result = ath_parse_polygons(chunk, &shape, &is_absolute, &body);
+    if (result != ATH_OK) return fault->code = result;
+    if (shape.is_derived || !ath_serves_rest(&shape, vertex_count)) return ATH_BAD_CHUNK;
+    uint32_t *counts = shape.is_mixed ? (uint32_t *)(void *)(corners + shape.corner_count) : 0;
+    result = ath_decode_faces(mesh->work, body, &shape, is_absolute, vertex_count, counts, corners);
+    if (result == ATH_OK) ath_build_mesh(mesh, &shape, counts, corners, file->vertex_source);
+    return result;
+}
+
 static int read_rest(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
@@ -346,7 +375,12 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     ath_rest_head head;
     int result = load(file, ATH_REST, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
+    if (result == ATH_OK && head.connected) {
+        result = read_mesh(file, fault);
+        if (result == ATH_OK) result = load(file, ATH_REST, &chunk, fault);
+    }
     if (result != ATH_OK) return result;
+    file->connected = head.connected ? &file->mesh : 0;
     memcpy(file->info.origin, head.origin, sizeof head.origin);
     file->info.rest_is_float64 = head.is_float64;
     file->adaptive_rest = head.adaptive;
@@ -356,12 +390,13 @@ static int read_rest(ath_file *file, ath_fault_info *fault)
     if (head.is_host) {
         memcpy(file->info.host_checksum, head.host_checksum, sizeof head.host_checksum);
     } else if (head.exact) {
-        result = ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches,
-                                       (int32_t)header->branch_count, head.is_float64, file->source_rest);
+        result =
+            ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
+                                  file->connected, head.is_float64, file->source_rest);
         take_numbers(file);
     } else {
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                 head.step, head.adaptive, 0, 0, file->rest_steps, file->rest);
+                                 head.step, head.adaptive, file->connected, 0, 0, file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
     return result;
@@ -458,16 +493,22 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
                       const ath_limits *limits, ath_fault_info *fault)
 {
     ath_header header;
+    ath_file counted;
     uint64_t needed;
     int result = ath_read_header(bytes, available, limits, &header, &needed, fault);
     if (result != ATH_OK) return result;
+    header.has_faces = 0; /* not known before the table is read, which needs memory; what they need comes last */
     if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
     carve(file, &header, (uint8_t *)file);
     result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, fault);
     file->header = header;
     set_info(file, needed);
-    return result != ATH_OK ? result : check_least_memory(&header, limits, fault);
+    if (result == ATH_OK) result = check_least_memory(&header, limits, fault);
+    if (result != ATH_OK) return result;
+    if (memory_bytes < carve(&counted, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    carve(file, &header, (uint8_t *)file);
+    return ATH_OK;
 }
 
 int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
@@ -638,8 +679,8 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     int result = ath_parse_refined_rest(chunk, &step, &body);
     if (result == ATH_OK)
         result = ath_decode_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                                 file->adaptive_rest, rest_steps_before(file, q), plan_before(file, q)->rest,
-                                 layer->rest_steps, layer->rest);
+                                 file->adaptive_rest, file->connected, rest_steps_before(file, q),
+                                 plan_before(file, q)->rest, layer->rest_steps, layer->rest);
     return result;
 }
 
@@ -780,7 +821,7 @@ static int read_source_rest(ath_file *file, ath_fault_info *fault)
     if (result == ATH_OK) result = ath_parse_source_rest(chunk, &head, &body);
     if (result != ATH_OK) return result;
     if (head.exact)
-        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
+        return ath_decode_exact_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count, 0,
                                      file->info.rest_is_float64, file->source_rest);
     result = ath_decode_source_rest(file->scratch, body.bytes, body.size, file->branches, file->info.branch_count,
                                     head.step, finest_reference(file), turns, file->source_rest);
@@ -917,6 +958,46 @@ int ath_check_chunk(const ath_file *file, int32_t index, ath_fault_info *fault)
     else if (found != chunk->checksum)
         ath_refuse(why, ATH_BAD_CHECKSUM, ATH_FIELD_CHUNK_CHECKSUM, found, chunk->checksum, chunk->checksum);
     return ath_fault_at(why, chunk, index);
+}
+
+/* ---- polygons ---- */
+
+static int find_polygons(const ath_file *file, int kind, ath_polygons *shape, int32_t *is_absolute, ath_bytes *body,
+                         ath_fault_info *fault)
+{
+    ath_bytes chunk;
+    if (!ath_find_chunk(file->chunks, file->header.chunk_count, kind, ATH_NO_LEVEL, 0))
+        return ath_refuse(fault, ATH_BAD_ARGUMENT, ATH_FIELD_NONE, 0, 0, 0);
+    int result = load(file, kind, &chunk, fault);
+    if (result == ATH_OK) result = ath_parse_polygons(chunk, shape, is_absolute, body);
+    int too_small = ath_vertices_of_type(shape->index_type, file->info.vertex_count) < file->info.vertex_count;
+    if (result == ATH_OK && shape->is_derived && (kind == ATH_FACES || too_small)) result = ATH_BAD_CHUNK;
+    if (result == ATH_OK && kind == ATH_EDGES && !shape->is_derived && shape->columns != 2) result = ATH_BAD_CHUNK;
+    return fault->code = result;
+}
+
+int ath_polygons_of(const ath_file *file, int kind, ath_polygons *shape, ath_fault_info *fault)
+{
+    ath_fault_info unwanted;
+    ath_bytes body;
+    int32_t is_absolute;
+    return find_polygons(file, kind, shape, &is_absolute, &body, fault ? fault : &unwanted);
+}
+
+size_t ath_polygons_size(const ath_file *file) { return ath_faces_memory(file->info.vertex_count); }
+
+int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memory_bytes, uint32_t *counts,
+                      int32_t *corners, ath_fault_info *fault)
+{
+    ath_fault_info unwanted, *why = fault ? fault : &unwanted;
+    ath_polygons shape;
+    ath_bytes body;
+    int32_t is_absolute;
+    int result = find_polygons(file, kind, &shape, &is_absolute, &body, why);
+    if (result != ATH_OK || shape.is_derived) return result;
+    if (!ath_fits(memory, memory_bytes, ath_polygons_size(file)))
+        return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
+    return why->code = ath_decode_faces(memory, body, &shape, is_absolute, file->info.vertex_count, counts, corners);
 }
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)

@@ -3,6 +3,7 @@
 #define ATH_FILE_H
 
 #include "container.h"
+#include "mesh.h"
 #include "plan.h"
 
 /* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its level. A
@@ -37,6 +38,8 @@ struct ath_file {
     void *scratch; /* of opening and building */
     double *bases; /* null until ath_build */
     int32_t adaptive_rest;
+    ath_mesh mesh;                /* where there are FACES */
+    ath_mesh *connected;          /* it, where the rest pose is connected, else null */
     int32_t *rest_steps;          /* null where no layer refines the rest pose */
     ath_layer layers[ATH_LAYERS]; /* first_layer to layer_count - 1 */
     double

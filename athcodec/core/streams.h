@@ -7,7 +7,7 @@
 #include "exact_model.h"
 #include "motion.h"
 #include "refinement_model.h"
-#include "rest_predictor.h"
+#include "rest_connected.h"
 
 /* ---- hierarchy ---- */
 
@@ -226,7 +226,8 @@ typedef struct {
     const double *before;
     int32_t *steps; /* filled for the next layer; may be null */
     int adaptive;
-    double slack; /* an encoder's: how far from its place it may put a vertex to save bits */
+    ath_mesh *mesh; /* null: not connected; else it gives the order */
+    double slack;   /* an encoder's: how far from its place it may put a vertex to save bits */
 } rest_layer;
 
 typedef struct {
@@ -242,7 +243,7 @@ typedef struct {
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
     lattice_model lattice;
-    rest_predictor predictor;
+    rest_predictor predictor, connected;
 } rest_model;
 
 static void rest_model_init(rest_model *model, int is_refinement)
@@ -258,6 +259,7 @@ static void rest_model_init(rest_model *model, int is_refinement)
     memset(model->made, 0, sizeof model->made);
     lattice_model_init(&model->lattice);
     rest_predictor_init(&model->predictor);
+    rest_connected_init(&model->connected);
 }
 
 /* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
@@ -278,9 +280,10 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
 }
 
 /* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
-static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memory *phase, int32_t integers[3])
+static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memory *all, const rest_memory *phase,
+                            int32_t integers[3])
 {
-    const uint32_t *mean = model->predictor.all.mean, *own = phase->mean;
+    const uint32_t *mean = all->mean, *own = phase->mean;
     for (int32_t k = 0; k < 3; k++) {
         int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
@@ -289,26 +292,34 @@ static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memo
     }
 }
 
-/* Vertex i of a stem as a point of a lattice about where it is expected. */
-static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
-                                 int32_t i, double step, const double *source, double *rest)
+/* A vertex as a point of a lattice about where it is expected. */
+static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer,
+                                 rest_predictor *predictor, rest_guess *at, int32_t v, double unit,
+                                 const double *source, double *rest)
 {
-    double unit = LATTICE_UNIT * step, per_unit = 1.0 / unit, expected[3],
-           *out = rest + 3 * (size_t)(branch->first + i);
+    double per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)v;
     int32_t integers[3] = {0, 0, 0};
-    rest_guess at;
-    rest_look_around(&model->predictor, branch, rest, layer->before, i, per_unit, &at);
-    for (int32_t k = 0; k < 3; k++) expected[k] = at.base[k] + rest_expected(&model->predictor.all, &at, k) * unit;
+    for (int32_t k = 0; k < 3; k++) expected[k] = at->base[k] + rest_expected(&predictor->all, at, k) * unit;
 #ifdef ATH_ENCODING
     double units[3];
     rest_term(units, expected, source + (out - rest), per_unit);
-    nearest_of_lattice(units, layer->slack * per_unit, at.phase->mean, integers);
+    nearest_of_lattice(units, layer->slack * per_unit, at->phase->mean, integers);
 #endif
     (void)source;
-    code_rest_point(coder, model, at.phase, integers);
+    code_rest_point(coder, model, &predictor->all, at->phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
-    rest_learn(&model->predictor, &at, per_unit, out, integers);
+    rest_learn(predictor, at, per_unit, out, integers);
+}
+
+/* Vertex i of a stem, by those before it on the stem. */
+static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
+                                 int32_t i, double step, const double *source, double *rest)
+{
+    double unit = LATTICE_UNIT * step;
+    rest_guess at;
+    rest_look_around(&model->predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
+    code_expected_vertex(coder, model, layer, &model->predictor, &at, branch->first + i, unit, source, rest);
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
@@ -415,10 +426,36 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
     }
 }
 
+/* Vertices in the order of their mesh, by their neighbours; those without as elsewhere: all below them are known. */
+static void code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer,
+                                const ath_branch *branches, double step, const double *source, double *rest)
+{
+    double unit = LATTICE_UNIT * step;
+    const ath_branch *branch = branches;
+    for (int32_t t = 0; t < layer->mesh->vertex_count; t++) {
+        int32_t v = layer->mesh->order[t];
+        rest_ring ring;
+        rest_guess at;
+        rest_ring_of(layer->mesh, rest, v, &ring);
+        layer->mesh->from[v] = ring.base;
+        if (ring.base < 0) {
+            while (v >= branch->first + branch->count) branch++;
+            code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step, source, rest);
+            continue;
+        }
+        rest_look_beside(&model->connected, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
+        code_expected_vertex(coder, model, layer, &model->connected, &at, v, unit, source, rest);
+    }
+}
+
 static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                      int32_t branch_count, double step, const double *source, double *rest)
 {
     rest_model_init(model, layer->coarse != 0);
+    if (layer->mesh) {
+        code_connected_rest(coder, model, layer, branches, step, source, rest);
+        return 1;
+    }
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
         if (branches[b].lag == 0)
             code_rest_beam(coder, model, layer, branches + b, step, source, rest);
@@ -570,11 +607,35 @@ static int code_source_rest(ath_coder *coder, rest_model *model, const bent_pose
 
 /* ---- exact rest pose, times ---- */
 
+/* The vertices of a connected pose in the order of their mesh: the mean of its parallelograms, or else of its
+ * neighbours, is expected; without any, what is elsewhere. */
+static int code_connected_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches,
+                                     const ath_mesh *mesh, int is_float64, double *rest)
+{
+    int32_t length[3] = {0, 0, 0};
+    const ath_branch *branch = branches;
+    for (int32_t t = 0; t < mesh->vertex_count; t++) {
+        int32_t v = mesh->order[t];
+        double predicted[3];
+        rest_ring ring;
+        rest_ring_of(mesh, rest, v, &ring);
+        const double *expected = ring.parallelograms > 0 ? ring.mean : ring.neighbours > 0 ? ring.middle : predicted;
+        if (ring.base < 0) {
+            while (v >= branch->first + branch->count) branch++;
+            predict_rest(branch, rest, v - branch->first, predicted);
+        }
+        if (!code_exact_point(coder, model, is_float64, expected, length, rest + 3 * (size_t)v)) return 0;
+    }
+    return 1;
+}
+
+/* mesh: null, or of a connected pose. */
 static int code_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches, int32_t branch_count,
-                           int is_float64, double *rest)
+                           const ath_mesh *mesh, int is_float64, double *rest)
 {
     int32_t length[3] = {0, 0, 0};
     exact_model_init(model);
+    if (mesh) return code_connected_exact_rest(coder, model, branches, mesh, is_float64, rest);
     for (int32_t b = 0; b < branch_count; b++)
         for (int32_t i = 0; i < branches[b].count; i++) {
             double predicted[3], *out = rest + 3 * (size_t)(branches[b].first + i);

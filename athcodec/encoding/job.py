@@ -27,8 +27,8 @@ from athcodec.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.decoder import Decoder
 from athcodec.decoder import open as open_ath
 from athcodec.discovery import Found, with_branches
+from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
-from athcodec.encoding import streams
 from athcodec.encoding.layers import (
     DEFAULT_LADDER,
     MOST_LAYERS,
@@ -47,6 +47,7 @@ from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 
@@ -251,6 +252,7 @@ class EncodingJob:
             None if factors is None else factors[seen.hierarchy.vertex_source],
             pool,
             options.host_rest,
+            polygons=_polygons(clip, options),
         )
 
     @property
@@ -466,22 +468,25 @@ class EncodingJob:
         )
         if metadata:
             store.add(ct.METADATA, ct.pack_metadata(metadata))
-        if self._keeps_static and self.clip.faces is not None:
-            store.add(ct.FACES, ct.pack_array(self.clip.faces))
+        if self.source.polygons is not None:
+            store.add(ct.FACES, polygons.pack(self.source.polygons, self.clip.vertex_count))
         if self._keeps_static and self.clip.edges is not None:
             store.add(ct.EDGES, self._edges())
 
     def _edges(self) -> bytes:
         derived = derived_edges(self.source.hierarchy)
         if derived.shape == self.clip.edges.shape and (derived == self.clip.edges).all():
-            return ct.pack_array(None, derived=self.clip.edges.dtype.str)
-        return ct.pack_array(self.clip.edges)
+            return ct.pack_derived_edges(type_code(self.clip.edges.dtype))
+        return polygons.pack(Polygons.of_rows(self.clip.edges), self.clip.vertex_count)
 
     def _add_static(self, store: ct.ChunkStore) -> None:
         if self._keeps_static and len(self.clip.attributes) > ct.Limits.attributes:
             raise ClipError(f"attributes: got {len(self.clip.attributes)}; expected at most {ct.Limits.attributes}")
+        in_faces = POLYGON_ARRAYS if self.source.polygons is not None and self.clip.faces is None else ()
         if self._keeps_static:
             for name, array in self.clip.attributes.items():
+                if name in in_faces:
+                    continue
                 store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
@@ -526,6 +531,13 @@ class EncodingJob:
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         return errors
+
+
+def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
+    """What is stored as FACES."""
+    if options.attributes == "none":
+        return None
+    return Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
 
 
 def _summary(

@@ -20,6 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
+from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.search import Choice
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -194,22 +195,24 @@ def _rests(
     if source.exact_rest or len(ratios) == 1:
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
-    coded = _first_rests(prelude.plan, first_step, source.rest)
+    branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
+    coded = _first_rests(prelude.plan, first_step, source.rest, mesh)
     for step in steps:
-        coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1]))
+        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], rest.connected, mesh=mesh))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
     return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
 
 
-def _first_rests(plan: Plan, step: float, rest: np.ndarray) -> list[streams.CodedRest]:
+def _first_rests(plan: Plan, step: float, rest: np.ndarray, mesh: Mesh | None) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    at_once = streams.encode_rest(plan.branches, step, rest)
+    connected = mesh is not None
+    at_once = streams.encode_rest(plan.branches, step, rest, None, connected, mesh=mesh)
     if not plan.level_0_stands_alone:
         return [at_once]
-    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest)
-    refined = streams.encode_rest(plan.branches, step, rest, level_0)
+    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, connected, mesh=mesh)
+    refined = streams.encode_rest(plan.branches, step, rest, level_0, connected, mesh=mesh)
     both = len(level_0.stream) + len(refined.stream)
     return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
 

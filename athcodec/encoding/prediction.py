@@ -58,6 +58,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         loose=none,
         lags=np.zeros(branches, np.int32),
         adaptive_rest=False,
+        connected_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,
         learned_bases=(False,) * levels,

@@ -38,6 +38,7 @@ from athcodec.encoding.segment import (
     thread_count,
     time_components,
     with_best_lags,
+    with_connected_rest,
 )
 from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
@@ -142,6 +143,7 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         loose=loose_branches(source, wildest.positions),
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
         adaptive_rest=False,
+        connected_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,
         learned_bases=(False,) * levels,
@@ -149,7 +151,7 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         node_steps=np.full(levels, step),
     )
     if layered:  # adaptive rest poses are worth less to those that refine them
-        return replace(settings, lags=lags(source, rest_step))
+        return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step)))
     return with_best_lags(source, ath, settings)
 
 
@@ -381,6 +383,7 @@ class Search:
             sheet=sheet,
             lags=self.start.lags,
             adaptive_rest=self.start.adaptive_rest,
+            connected_rest=self.start.connected_rest,
             loose=self.start.loose,
             learned_pieces=None,
         )
@@ -610,6 +613,7 @@ class Search:
             settings.rest_step,
             settings.rest_slack,
             settings.adaptive_rest,
+            settings.connected_rest,
             settings.lags.tobytes(),
             settings.sheet.tobytes(),
         )

@@ -20,15 +20,18 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
+from athcodec.polygons import Polygons
 from athcodec.segmentation import split_segments
 from athcodec.threads import SERIAL, ThreadPool, default_jobs
 
 FINER = 32  # step over that of segments that bases and modes are learned from
 ROWS_AT_ONCE = 1 << 14  # of coefficients
 WORK_BYTES = 1536 << 20  # of the segments coded at once, where `jobs` does not say how many these are
+CONNECTED_SHARE = 0.8  # of a rest pose at once, that one by faces may take where layers refine it
 SEGMENT_WORK = 8  # memory of a segment while it is coded, over its float32 positions
 
 
@@ -43,7 +46,7 @@ class Source:
     """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion.
 
     exact_rest: the numbers of its rest pose are to come back. reference: (N, 3) float64 less the origin, file order;
-    None: the rest pose.
+    None: the rest pose. polygons: what the file stores as FACES.
     """
 
     clip: MotionClip
@@ -55,6 +58,7 @@ class Source:
     pool: ThreadPool = SERIAL
     host_rest: bool = False
     reference: np.ndarray | None = None
+    polygons: Polygons | None = None
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
     rest: np.ndarray = field(init=False)  # likewise: the reference pose
     origin: np.ndarray = field(init=False)  # (3,) float64
@@ -109,6 +113,11 @@ class Source:
     def clip_range_starts(self) -> list[int]:
         """The first segment of each clip of the file."""
         return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
+
+    @cached_property
+    def mesh(self) -> Mesh | None:
+        """What rest poses may go by."""
+        return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 
     @cached_property
     def still(self) -> bool:
@@ -190,6 +199,7 @@ class Settings:
     loose: np.ndarray  # (B,) bool, file order
     lags: np.ndarray  # (B,) int32, file order
     adaptive_rest: bool
+    connected_rest: bool  # then it is adaptive, or exact
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
     learned_pieces: np.ndarray | None  # (P,) bool: pieces that have learned modes; None: none has
@@ -245,20 +255,22 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
         return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]
-        head.exact, head.stream = True, streams.encode_exact_rest(branches, pose)
+        head.exact, head.connected = True, settings.connected_rest
+        head.stream = streams.encode_exact_rest(branches, pose, source.mesh if head.connected else None)
         return head, pose.astype(np.float64) - source.origin
-    coded = _rest_within(source.rest, branches, settings)
-    head.step, head.stream, head.adaptive = coded.step, coded.stream, coded.adaptive
+    coded = _rest_within(source, branches, settings)
+    head.step, head.stream, head.adaptive, head.connected = coded.step, coded.stream, coded.adaptive, coded.connected
     return head, coded.decoded
 
 
-def _rest_within(rest: np.ndarray, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
+def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
     """At the step of the settings, or the first finer one that keeps the bound."""
 
     def encode(step: float) -> streams.CodedRest:
-        return streams.encode_rest(branches, step, rest, None, settings.adaptive_rest, settings.rest_slack)
+        mesh = source.mesh if settings.connected_rest else None
+        return streams.encode_rest(branches, step, source.rest, None, settings.adaptive_rest, settings.rest_slack, mesh)
 
-    return _within(settings.bound, rest, encode, settings.rest_step)
+    return _within(settings.bound, source.rest, encode, settings.rest_step)
 
 
 def _within(
@@ -273,18 +285,36 @@ def _within(
 
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
-    """The lags, and adaptive or not, that make hierarchy and rest pose smallest at these steps."""
+    """The lags, and adaptive, connected or neither, that make hierarchy and rest pose smallest at these steps."""
     own = lags(source, settings.rest_step)
-    candidates = [replace(settings, lags=own, adaptive_rest=False)]
+    candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
     if not source.reference_is_exact:
         candidates += _lag_candidates(source, settings, own)
+    if source.mesh is not None and not source.host_rest:
+        is_adaptive = not source.reference_is_exact
+        candidates += [
+            replace(settings, lags=lag, adaptive_rest=is_adaptive, connected_rest=True)
+            for lag in (own, np.ones_like(own))
+        ]
 
-    def size(candidate: Settings) -> int:
-        hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, candidate)
-        stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
-        return len(stream) + len(_rest_within(source.rest, branches, candidate).stream)
+    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
 
-    return candidates[0] if len(candidates) == 1 else min(candidates, key=size)
+
+def _poses_size(source: Source, ath: Ath, settings: Settings) -> int:
+    """Bytes of hierarchy and rest pose."""
+    hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, settings)
+    stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
+    return len(stream) + len(_coded_rest(source, branches, settings)[0].stream)
+
+
+def with_connected_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
+    """For layers: a rest pose that goes by faces where that is much smaller at once, or the one given."""
+    if source.mesh is None or source.host_rest:
+        return settings
+    connected = replace(settings, adaptive_rest=not source.reference_is_exact, connected_rest=True)
+    share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
+    much = _poses_size(source, ath, connected) < share * _poses_size(source, ath, settings)
+    return connected if much else settings
 
 
 def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list[Settings]:
@@ -300,7 +330,7 @@ def _lag_candidates(source: Source, settings: Settings, own: np.ndarray) -> list
         for lag in some
     }
     return [
-        replace(settings, lags=np.frombuffer(lag, np.int32), adaptive_rest=is_adaptive)
+        replace(settings, lags=np.frombuffer(lag, np.int32), adaptive_rest=is_adaptive, connected_rest=False)
         for lag, is_adaptive in sorted(tried)
     ]
 

@@ -6,6 +6,7 @@ the container's business. Reading streams is the core's.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from athcodec._native import BRANCH, address, encode_stream, lib
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import Plan, SegmentMotion
+from athcodec.encoding.polygons import Mesh
 from athcodec.threads import SERIAL, ThreadPool, ranges
 
 
@@ -39,6 +41,7 @@ class CodedRest:
     decoded: np.ndarray
     steps: np.ndarray | None = None
     adaptive: bool = False
+    connected: bool = False
 
 
 def encode_rest(
@@ -48,27 +51,30 @@ def encode_rest(
     coarse: CodedRest | None = None,
     adaptive: bool = False,
     slack: float = 0.0,
+    mesh: Mesh | None = None,
 ) -> CodedRest:
     """A rest pose, (N, 3) float64 less the origin; about that of the layer before, if there is one.
 
-    slack: how far from its place a vertex may be put to save bits, where `adaptive`.
+    slack: how far from its place a vertex may be put to save bits, where `adaptive`. mesh: that it goes by, then.
     """
     decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
-    data = encode_stream(
-        "ath_encode_rest",
-        1024 + 8 * rest.size,
-        address(branches, BRANCH, 1),
-        len(branches),
-        step,
-        adaptive,
-        slack,
-        None if coarse is None else address(coarse.steps, np.int32, rest.size),
-        None if coarse is None else address(coarse.decoded, np.float64, rest.size),
-        address(steps, np.int32, rest.size),
-        address(rest, np.float64, rest.size),
-        address(decoded, np.float64, rest.size),
-    )
-    return CodedRest(step, data, decoded, steps, adaptive)
+    with nullcontext() if mesh is None else mesh.lock:
+        data = encode_stream(
+            "ath_encode_rest",
+            1024 + 8 * rest.size,
+            address(branches, BRANCH, 1),
+            len(branches),
+            step,
+            adaptive,
+            slack,
+            None if mesh is None else mesh.address,
+            None if coarse is None else address(coarse.steps, np.int32, rest.size),
+            None if coarse is None else address(coarse.decoded, np.float64, rest.size),
+            address(steps, np.int32, rest.size),
+            address(rest, np.float64, rest.size),
+            address(decoded, np.float64, rest.size),
+        )
+    return CodedRest(step, data, decoded, steps, adaptive, mesh is not None)
 
 
 def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
@@ -88,14 +94,16 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
     return CodedRest(step, data, decoded)
 
 
-def encode_exact_rest(branches: np.ndarray, pose: np.ndarray) -> bytes:
-    """The stream of a rest pose that comes back bit for bit: (N, 3) float32 or float64, origin included."""
+def encode_exact_rest(branches: np.ndarray, pose: np.ndarray, mesh: Mesh | None = None) -> bytes:
+    """The stream of a rest pose that comes back bit for bit: (N, 3) float32 or float64, origin included. mesh: that it
+    goes by."""
     numbers = pose.astype(np.float64, order="C")
     return encode_stream(
         "ath_encode_exact_rest",
         1024 + 10 * pose.size,
         address(branches, BRANCH, 1),
         len(branches),
+        None if mesh is None else mesh.address,
         pose.dtype == np.float64,
         address(numbers, np.float64, pose.size),
     )

@@ -147,8 +147,15 @@ export interface Parts {
   readonly index: Int32Array;
 }
 
+export interface Polygons {
+  array: Uint32Array;
+  columns: number;
+  counts: Uint32Array | null;
+  derived: boolean;
+}
+
 /** Kinds and what they hold: FORMAT.md, "Chunk table". Static data, as stored, zstd frames and all:
- * METADATA 0x8004, FACES 0x8005, EDGES 0x8006, ATTRIBUTE 0x8020. */
+ * METADATA 0x8004, ATTRIBUTE 0x8020; for FACES 0x8005 and EDGES 0x8006 see AthFile.polygons(). */
 export interface Chunk {
   readonly kind: number;
   /** 255: not of a level. */
@@ -256,6 +263,9 @@ export class AthFile {
   chunks(): Chunk[];
   /** The bytes of a chunk as stored, its checksum verified; null where they are not here. */
   chunkBytes(index: number): Uint8Array | null;
+  /** Faces or edges, null where the file has none: vertices in source order, of `columns` corners each or, where there are
+   * `counts`, of these. Edges that are `derived` are not stored: they follow from the branches. */
+  polygons(name: "faces" | "edges"): Polygons | null;
 
   /** Hands over `bytes`, the file's from `offset` on. Chunks that lie inside can be used from now on; one
    * that begins inside goes on with the piece that continues it, so the pieces of one download can be fed

@@ -34,6 +34,8 @@ const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree",
 const PART = ["first", "count", "branch", "index"];
 const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
 const FAULT_SIZE = 56, FAULT_TEXT = 256, LEVEL_NAME = 32;
+const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed: "u8", isDerived: "u8" };
+const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 0x8005, edges: 0x8006 };
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
 const TYPES = {
@@ -521,6 +523,26 @@ export class AthFile {
     if (this.#checkFault((fault) => c.ath_check_chunk(this.#at, index, fault), MISSING) === MISSING) return null;
     const at = (c.ath_chunks(this.#at) >>> 0) + index * CHUNK_SIZE;
     return this.#core.copy(Uint8Array, this.#core.view(Uint32Array, at, 1)[0], this.#chunks[index].length);
+  }
+
+  polygons(name) {
+    const c = this.#c, core = this.#core, kind = choice(name, POLYGON_KINDS, "polygons");
+    if (!this.#chunks.some((chunk) => chunk.kind === kind)) return null;
+    const { faceCount, cornerCount, columns, isMixed, isDerived } = core.with(POLYGONS_SIZE, (at) => {
+      this.#checkFault((fault) => c.ath_polygons_of(this.#at, kind, at, fault));
+      return core.struct(POLYGONS, at);
+    });
+    const size = c.ath_polygons_size(this.#at), corners = Math.ceil(size / 16) * 16, counts = corners + 4 * cornerCount;
+    return core.with(counts + 4 * isMixed * faceCount, (at) => {
+      this.#checkFault((fault) =>
+        c.ath_read_polygons(this.#at, kind, at, size, isMixed ? at + counts : 0, at + corners, fault));
+      return {
+        array: core.copy(Uint32Array, at + corners, cornerCount),
+        columns,
+        counts: isMixed ? core.copy(Uint32Array, at + counts, faceCount) : null,
+        derived: isDerived === 1,
+      };
+    });
   }
 
   // ---- bytes ----

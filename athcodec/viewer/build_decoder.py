@@ -26,7 +26,7 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
-SMALL = ("container.c", "decode.c", "fault.c", "file.c", "kept.c", "plan.c")
+SMALL = ("container.c", "decode.c", "fault.c", "file.c", "kept.c", "mesh.c", "plan.c")
 """Run once per file, or little: compiled for size, all else for speed."""
 FLAGS = [
     "-target",

@@ -120,27 +120,67 @@ static void decode_basis(void *model, ath_bytes stream, int32_t frames, int32_t 
 
 /* A rest pose that is not exact, and one of a refinement about it: the same bytes at a smaller step. */
 static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, double step,
-                              int adaptive, int32_t vertices, double *rest)
+                              int adaptive, ath_mesh *mesh, int32_t vertices, double *rest)
 {
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
     int result =
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step, adaptive, NULL, NULL, steps, rest);
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step, adaptive, mesh, NULL, NULL, steps, rest);
     if (result == ATH_OK && all_finite(rest, numbers))
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, adaptive, steps, rest, finer_steps,
-                        finer);
+        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, adaptive, mesh, steps, rest,
+                        finer_steps, finer);
     free(finer);
     free(finer_steps);
     free(steps);
     return result;
 }
 
+/* Faces from the bytes of a pose, whatever these are, and the mesh of those that are accepted; null: none. */
+static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, const uint8_t *head, ath_arena *arena)
+{
+    ath_polygons shape = {0, 0, 0, head[7] & 1, 0, 2, 2};
+    uint32_t size = (uint32_t)(head[8] % 6), faces = (uint32_t)(4 * vertices < 200 ? 4 * vertices : 200);
+    shape.face_count = size > 0 && faces * size > 8 * (uint32_t)vertices ? 8 * (uint32_t)vertices / size : faces;
+    shape.columns = size;
+    shape.corner_count = shape.face_count * size;
+    int32_t *corners = integers(shape.corner_count + 1);
+    uint32_t *counts = shape.is_mixed ? (uint32_t *)integers(shape.face_count + 1) : NULL;
+    void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
+    int32_t *order = integers((size_t)vertices);
+    for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
+    int result = ath_decode_faces(memory, body, &shape, head[7] >> 1 & 1, vertices, counts, corners);
+    for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
+        REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
+    if (result == ATH_OK) {
+        uint64_t work = ath_mesh_work((uint64_t)vertices, shape.corner_count) * sizeof(int32_t);
+        ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
+        arena->base = fuzz_memory((size_t)arena->used, 0xa5);
+        arena->used = 0;
+        ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
+        ath_build_mesh(mesh, &shape, counts, corners, order);
+    }
+    free(order);
+    free(memory);
+    free(counts);
+    free(corners);
+    return result == ATH_OK ? mesh : NULL;
+}
+
 static int decode_pose(void *model, ath_bytes body, const ath_branch *branches, int32_t count, const uint8_t *head,
                        int32_t vertices, double *rest)
 {
-    if (head[6] & 1) return ath_decode_exact_rest(model, body.bytes, body.size, branches, count, head[6] & 2, rest);
-    return decode_coarse_pose(model, body, branches, count, step_from(head + 6), head[6] & 2, vertices, rest);
+    ath_mesh mesh;
+    ath_arena arena = {NULL, 0};
+    ath_mesh *connected = decode_mesh(&mesh, body, vertices, head, &arena);
+    int exact = head[6] & 1, adaptive = head[6] & 2, result;
+    if (exact)
+        result = ath_decode_exact_rest(model, body.bytes, body.size, branches, count, connected, adaptive, rest);
+    else
+        result = decode_coarse_pose(model, body, branches, count, step_from(head + 6), adaptive,
+                                    adaptive ? connected : NULL, vertices, rest);
+    free(arena.base);
+    return result;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,9 +1,9 @@
-// Static data of a file: METADATA, FACES, EDGES and ATTRIBUTE chunks, as FORMAT.md has them. Chunks come from
+// Static data of a file: METADATA and ATTRIBUTE chunks, as FORMAT.md has them, and its polygons. Chunks come from
 // AthFile.chunkBytes(), which has verified their checksums; everything else about them is checked here.
 
 import { decompress } from "fzstd";
 
-const METADATA = 0x8004, FACES = 0x8005, EDGES = 0x8006, ATTRIBUTE = 0x8020;
+const METADATA = 0x8004, ATTRIBUTE = 0x8020;
 const MOST_BYTES = 2 ** 30; // of one array
 const MOST_TEXT = 2 ** 24;
 const NUMBERS = {
@@ -91,15 +91,6 @@ function readArray(bytes) {
   return { name, dtype, shape, array: new Type(values.buffer, values.byteOffset, count) };
 }
 
-// Vertex numbers as Uint32Array, each below `vertexCount`.
-function asVertices(found, vertexCount, what) {
-  if (!found?.array || found.shape.length !== 2) return null;
-  const vertices = Uint32Array.from(found.array, Number);
-  for (const vertex of vertices)
-    if (vertex >= vertexCount) throw wrong(`${what}: got vertex ${vertex}, expected one below ${vertexCount}`);
-  return { array: vertices, columns: found.shape[1] };
-}
-
 // The edges of a plant without stored ones, (u, v) for every vertex v but a root's first, in source order.
 function derivedEdges(file) {
   const { first, count, attach } = file.branches(), source = file.vertexSource(), before = new Int32Array(source.length);
@@ -117,16 +108,12 @@ function derivedEdges(file) {
 /** What stands in front of the motion: {metadata, faces, edges, skeleton}. `skeleton` is always there: the
  * stored edges, or those that follow from the branches. */
 export function readPrelude(file) {
-  const { vertexCount } = file.info, found = { metadata: {}, faces: null, edges: null };
-  for (const [index, { kind }] of file.chunks().entries()) {
-    if (kind === METADATA) found.metadata = readMetadata(file.chunkBytes(index));
-    if (kind === FACES) found.faces = asVertices(readArray(file.chunkBytes(index)), vertexCount, "faces");
-    if (kind === EDGES) {
-      const edges = readArray(file.chunkBytes(index));
-      if (edges.array && edges.shape[1] !== 2) throw wrong("edges: got rows of other than 2 columns");
-      found.edges = edges.array ? asVertices(edges, vertexCount, "edges").array : derivedEdges(file);
-    }
-  }
+  const index = file.chunks().findIndex(({ kind }) => kind === METADATA), edges = file.polygons("edges");
+  const found = {
+    metadata: index < 0 ? {} : readMetadata(file.chunkBytes(index)),
+    faces: file.polygons("faces"),
+    edges: edges?.derived ? derivedEdges(file) : edges?.array ?? null,
+  };
   return { ...found, skeleton: found.edges ?? derivedEdges(file) };
 }
 

@@ -1,0 +1,80 @@
+"""Polygons by the vertices of their corners, as FACES and EDGES hold them: all with as many corners, or each with a
+number of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec._native import CorePolygons
+
+POLYGON_ARRAYS = "face_vertex_counts", "face_vertex_indices"
+"""Attributes that stand for faces of different sizes."""
+_SIGNED, _BIG_ENDIAN = 4, 8
+
+
+def type_code(dtype: np.dtype) -> int:
+    """An integer type as FORMAT.md numbers them."""
+    size = dtype.itemsize.bit_length() - 1
+    return size | _SIGNED * (dtype.kind == "i") | _BIG_ENDIAN * (dtype.str[0] == ">")
+
+
+def type_of(code: int) -> np.dtype:
+    return np.dtype(f"{'>' if code & _BIG_ENDIAN else '<'}{'i' if code & _SIGNED else 'u'}{1 << (code & 3)}")
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Corners: (C,) int32, source order; counts: (F,) uint32, or None where all faces have `columns` corners; and the
+    types that both had in the source."""
+
+    corners: np.ndarray
+    counts: np.ndarray | None
+    face_count: int
+    columns: int
+    index_type: np.dtype
+    count_type: np.dtype | None = None
+    derived: bool = False  # edges that follow from the branches; they have no corners here
+
+    @classmethod
+    def of_rows(cls, rows: np.ndarray) -> Polygons:
+        """Of an array of vertex numbers, (F, k)."""
+        corners = np.ascontiguousarray(rows, np.int32).reshape(-1)
+        return cls(corners, None, len(rows), rows.shape[1], rows.dtype)
+
+    @classmethod
+    def of_attributes(cls, attributes: Mapping[str, np.ndarray]) -> Polygons | None:
+        """Of the arrays that stand for faces of different sizes, where these are there, and plain."""
+        counts, indices = (attributes.get(name) for name in POLYGON_ARRAYS)
+        if counts is None or indices is None or counts.ndim != 1 or indices.ndim != 1:
+            return None
+        if counts.dtype.kind not in "iu" or indices.dtype.kind not in "iu":
+            return None
+        corners = np.ascontiguousarray(indices, np.int32)
+        return cls(corners, np.ascontiguousarray(counts, np.uint32), len(counts), 0, indices.dtype, counts.dtype)
+
+    @property
+    def shape(self) -> CorePolygons:
+        mixed = self.count_type is not None
+        return CorePolygons(
+            self.face_count,
+            len(self.corners),
+            self.columns,
+            mixed,
+            False,
+            type_code(self.index_type),
+            type_code(self.count_type) if mixed else 0,
+        )
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(F, k) of the source's type, of faces of as many corners."""
+        return self.corners.astype(self.index_type).reshape(self.face_count, self.columns)
+
+    @property
+    def attributes(self) -> dict[str, np.ndarray]:
+        """Of faces of different sizes, of the source's types."""
+        arrays = self.counts.astype(self.count_type), self.corners.astype(self.index_type)
+        return dict(zip(POLYGON_ARRAYS, arrays))

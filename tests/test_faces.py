@@ -1,0 +1,180 @@
+"""Faces and edges in a file: they come back as they were, cost little, and serve the rest pose."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from files import Parts, opened
+from test_rest import cards, simple_bytes, terrain, tubes
+
+import athcodec
+from athcodec import container as ct
+from athcodec.encoding import polygons
+from athcodec.errors import AthError
+from athcodec.polygons import Polygons
+from spec import reference_decoder as rd
+
+CONNECTED = 1 << 4  # of Method of REST
+
+
+def grid_faces(rows: int, columns: int, quads: bool = False) -> np.ndarray:
+    first = (columns * np.arange(rows - 1)[:, None] + np.arange(columns - 1)).reshape(-1)
+    corners = np.stack([first, first + 1, first + columns + 1, first + columns], axis=1)
+    return corners if quads else np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
+def tube_faces(count: int, rings: int = 24, around: int = 8) -> np.ndarray:
+    ring, place = np.arange(rings - 1)[:, None] * around, np.arange(around)
+    following = (place + 1) % around
+    one = np.stack([ring + place, ring + following, ring + around + following, ring + around + place], axis=-1)
+    return (one.reshape(-1, 4) + rings * around * np.arange(count)[:, None, None]).reshape(-1, 4)
+
+
+def shuffled(points: np.ndarray, faces: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same mesh, its vertices by chance."""
+    order = np.random.default_rng(seed).permutation(len(points))
+    return points[order], np.argsort(order)[faces]
+
+
+def chunk_bytes(faces: np.ndarray, vertex_count: int) -> int:
+    return len(polygons.pack(Polygons.of_rows(faces), vertex_count))
+
+
+def zstd_bytes(faces: np.ndarray) -> int:
+    planes = np.ascontiguousarray(faces.astype("<i4").reshape(-1, 1).view(np.uint8).T)
+    return len(zstandard.compress(planes.tobytes(), 19))
+
+
+def still(points: np.ndarray, faces: np.ndarray) -> athcodec.MotionClip:
+    return athcodec.MotionClip(points[None], np.zeros(1), faces=faces.astype(np.int32))
+
+
+def encoded(clip: athcodec.MotionClip, **options) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        athcodec.encode(clip, Path(folder) / "a.ath", **options)
+        return (Path(folder) / "a.ath").read_bytes()
+
+
+def rest_bytes(data: bytes) -> int:
+    with opened(data) as decoder:
+        return decoder.file.find(ct.REST).length
+
+
+@pytest.mark.parametrize(
+    ("faces", "most"),
+    [
+        (grid_faces(60, 50), 100),
+        (grid_faces(60, 50, True), 80),
+        (tube_faces(30), 100),
+        (np.arange(4000).reshape(-1, 4), 40),
+    ],
+    ids=["triangles", "quads", "tubes", "cards"],
+)
+def test_faces_whose_numbers_repeat_cost_next_to_nothing(faces, most):
+    assert chunk_bytes(faces, int(faces.max()) + 1) < most
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_faces_by_chance_take_no_more_than_zstd(seed):
+    random = np.random.default_rng(seed)
+    _, mesh = shuffled(np.zeros((3000, 3)), grid_faces(60, 50), seed)
+    for faces in (mesh, random.permutation(mesh), random.integers(0, 3000, (2000, 3)), random.integers(0, 9, (900, 5))):
+        assert chunk_bytes(faces, 3000) <= 1.02 * zstd_bytes(faces) + 32
+
+
+@pytest.mark.parametrize("dtype", ["|u1", "<i2", ">u4", "<i8"])
+def test_faces_of_different_sizes_come_back(dtype):
+    random = np.random.default_rng(1)
+    counts = random.integers(0, 7, 200).astype("|i1")
+    arrays = {
+        "face_vertex_counts": counts,
+        "face_vertex_indices": random.integers(0, 100, counts.sum()).astype(dtype),
+        "uv": random.normal(size=(100, 2)),
+    }
+    clip = athcodec.MotionClip(terrain(10, 10, 0.1, 1)[None], np.zeros(1), attributes=arrays)
+    with opened(encoded(clip)) as decoder:
+        assert decoder.faces is None and set(decoder.attributes) == set(arrays)
+        for name, array in arrays.items():
+            assert decoder.attributes[name].dtype == array.dtype and np.array_equal(decoder.attributes[name], array)
+
+
+@pytest.mark.parametrize("share", [0.7, 0.85])
+def test_vertices_by_chance_cost_little_more_where_faces_are_stored(share):
+    points, faces = terrain(40, 40, 0.1, 5), grid_faces(40, 40)
+    mixed = shuffled(points, faces, 5)
+    bound = {0.7: 1e-3, 0.85: 1e-4}[share] * float(np.linalg.norm(np.ptp(points, axis=0)))
+    data = encoded(still(*mixed), max_error=bound)
+    with opened(data) as decoder:
+        assert np.array_equal(decoder.faces, mixed[1])
+        assert np.linalg.norm(decoder.positions(0).astype(float) - mixed[0], axis=1).max() <= bound
+    assert rest_bytes(data) < share * simple_bytes(mixed[0], bound)
+    assert rest_bytes(data) < 1.15 * rest_bytes(encoded(still(points, faces), max_error=bound))
+
+
+MESHES = {
+    "terrain": (terrain(30, 40, 0.1, 2), grid_faces(30, 40)),
+    "tubes": (tubes(6, 2), tube_faces(6)),
+    "cards": (cards(200, 2), np.arange(800).reshape(-1, 4)[:, [0, 1, 3, 2]]),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("relative", [1e-3, 1e-5])
+def test_a_rest_pose_with_faces_takes_at_most_nine_tenths_of_a_simple_one(name, relative):
+    points, faces = MESHES[name]
+    bound = relative * float(np.linalg.norm(np.ptp(points, axis=0)))
+    assert rest_bytes(encoded(still(points, faces), max_error=bound)) <= 0.9 * simple_bytes(points, bound)
+
+
+def test_faces_are_not_stored_without_attributes():
+    points, faces = shuffled(*MESHES["terrain"], 3)
+    data = encoded(still(points, faces), rel_error=1e-4, attributes="none")
+    assert rd.AthFile(data).content(rd.REST)[0] & CONNECTED == 0
+    with opened(data) as decoder:
+        assert decoder.faces is None
+
+
+@pytest.mark.parametrize(
+    "options", [{"ladder": "none"}, {}, {"exact_rest": True}], ids=["one layer", "layers", "exact"]
+)
+@pytest.mark.parametrize("frames", [1, 9])
+def test_the_reference_decoder_reads_the_same_connected_rest_pose(options, frames):
+    points, faces = shuffled(terrain(9, 11, 0.05, 4), grid_faces(9, 11, frames > 1), 4)
+    time = np.arange(frames) / 10
+    swayed = points + 0.5 * np.sin(time)[:, None, None] * points[:, ::-1]
+    clip = athcodec.MotionClip(swayed.astype(np.float32), time, rest=points, faces=faces.astype(np.int32))
+    data = encoded(clip, rel_error=1e-3, **options)
+    file = rd.AthFile(data, strict=True)
+    assert frames > 1 or file.content(rd.REST)[0] & CONNECTED
+    with opened(data) as decoder:
+        for level in range(decoder.level_count):
+            assert decoder.positions(level=level).tobytes() == file.positions(level).tobytes()
+        assert np.array_equal(decoder.faces, file.faces())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_bytes_as_faces_are_the_same_to_all_or_refused(seed):
+    random = np.random.default_rng(seed)
+    chunk = polygons.pack(Polygons.of_rows(random.integers(0, 60, (20, 3))), 60)
+    stream = random.integers(1, 256, random.integers(0, 60), np.uint8).tobytes()
+    shape, _ = rd.parse_polygons(chunk, rd.FACES, rd.Limits())
+    try:
+        expected = rd.decode_polygons(stream, shape, 60)[1]
+    except rd.AthError:
+        expected = None
+    clip = still(terrain(6, 10, 0.1, 1), np.zeros((1, 3), int))
+    data = with_faces(encoded(clip, rel_error=1e-3, ladder="none"), chunk[:9] + stream)
+    try:
+        with opened(data) as decoder:
+            found = decoder.faces.reshape(-1).tolist()
+    except AthError:
+        found = None
+    assert found == expected
+
+
+def with_faces(data: bytes, chunk: bytes) -> bytes:
+    return Parts.of(data).with_payload(ct.FACES, chunk)
