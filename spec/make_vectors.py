@@ -1165,6 +1165,20 @@ valid(
     lambda: Plant([Stem(-1, 6)], 18, scripts={(rd.CORRECTIONS, 1): lambda: Chance(54)}),
 )
 valid(
+    "corrections-footprints",
+    "corrections of all widths that overlap, are cut off at both ends of a segment, and sum up to 0 in a frame",
+    lambda: Plant(
+        [Stem(-1, 2)],
+        5,
+        scripts={
+            (rd.CORRECTIONS, 1): [
+                *(1, 1, *(1, 1), *(1, 0, 3), 0, 0, 0, 0, 0, 1, *(1, 1), *(1, 1, 3), 0, 0),  # 4 and -4 along x
+                *(1, 0, 1, *(1, 0), 0, *(1, 0, 0), 0, 1, 0, 0, 0, *(1, 1), 0, 0),  # 1 along y, -2 along z
+            ]
+        },
+    ),
+)
+valid(
     "corrections-wide",
     "corrections of binary64 positions",
     lambda: Plant(FORK, 3, is_float64=True, origin=(0.1, 0.2, 0.3), scripts={(rd.CORRECTIONS, 2): lambda: Chance(55)}),

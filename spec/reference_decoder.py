@@ -2813,6 +2813,7 @@ def half_octave(exponent: int) -> float:
 # ---- corrections -------------------------------------------------------------------------------------------
 
 BLOCK_FRAMES = 8
+FOOTPRINTS = ((32,), (32, 16), (32, 27, 16, 5))
 
 
 class CorrectionModel:
@@ -2822,13 +2823,14 @@ class CorrectionModel:
         self.frame = [[[Context(32768 if i or j else 6000) for _ in range(2)] for j in range(3)] for i in range(3)]
         self.zero = [[Context(32768) for _ in range(3)] for _ in range(2)]
         self.sign = [[Context(32768) for _ in range(3)] for _ in range(3)]
+        self.width = [[Context(32768) for _ in range(2)] for _ in range(4)]
         self.size = NumberModel()
 
 
 def decode_corrections(stream: bytes, vertex_count: int, frames: int) -> np.ndarray:
-    """(vertices, 3, frames) integers."""
+    """(vertices, 4, frames) integers: vectors and their widths."""
     coder, model = RangeDecoder(stream), CorrectionModel()
-    none = [(0, 0, 0)] * frames
+    none = [(0, 0, 0, 0)] * frames
     above, before, result = none, 0, []
     for _ in range(vertex_count):
         corrected = coder.bit(model.vertex[before])
@@ -2841,7 +2843,7 @@ def decode_corrections(stream: bytes, vertex_count: int, frames: int) -> np.ndar
 
 def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: list, frames: int) -> list:
     """A vertex that has corrections: blocks of frames, frames of a block. What must be true is not coded."""
-    row = [(0, 0, 0)] * frames
+    row = [(0, 0, 0, 0)] * frames
     some = [any(q) for q in above]
     found_any = block_before = 0
     for start in range(0, frames, BLOCK_FRAMES):
@@ -2857,13 +2859,16 @@ def decode_corrected_frames(coder: RangeDecoder, model: CorrectionModel, above: 
             near = 2 if some[t] else 1 if any(some[max(t - 1, 0) : t + 2]) else 0
             if (t == stop - 1 and not found) or coder.bit(model.frame[earlier][near][found]):
                 found = 1
-                row[t] = decode_correction(coder, model, row[t - 1] if earlier == 2 else above[t])
+                row[t] = decode_correction(coder, model, above[t])
     return row
 
 
 def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) -> tuple:
-    """Three integers, not all 0, that are expected to be like others."""
-    q, nonzero_any = [0, 0, 0], 0
+    """Three integers, not all 0, and a width, that are expected to be like others."""
+    q, nonzero_any = [0, 0, 0, 0], 0
+    width = model.width[1 + like[3] if any(like) else 0]
+    while q[3] < len(FOOTPRINTS) - 1 and coder.bit(width[q[3]]):
+        q[3] += 1
     for axis in range(3):
         sign = 0 if like[axis] == 0 else 1 if like[axis] < 0 else 2
         if axis < 2 or nonzero_any:
@@ -2875,6 +2880,19 @@ def decode_correction(coder: RangeDecoder, model: CorrectionModel, like: tuple) 
         magnitude = code_unsigned(coder, model.size, clipped(like[axis]) * 16) + 1
         q[axis] = -magnitude if negative else magnitude
     return tuple(q)
+
+
+def corrected_parts(corrections: np.ndarray) -> np.ndarray:
+    """What the corrections of vertices add to their frames, (vertices, 3, frames) integers, in 1/32 of their step."""
+    vectors, widths = corrections[:, :3], corrections[:, 3:]
+    parts = np.zeros_like(vectors)
+    for width, footprint in enumerate(FOOTPRINTS):
+        own = np.where(widths == width, vectors, 0)
+        parts += footprint[0] * own
+        for away in range(1, min(len(footprint), own.shape[2])):
+            parts[:, :, away:] += footprint[away] * own[:, :, :-away]
+            parts[:, :, :-away] += footprint[away] * own[:, :, away:]
+    return parts
 
 
 # ---- reconstruction ----------------------------------------------------------------------------------------
@@ -3737,9 +3755,9 @@ class AthFile:
         if self.find(CORRECTIONS, shown, s):
             chunk = self.content(CORRECTIONS, shown, s)
             require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Correction_Step is not above 0")
-            q = decode_corrections(chunk[4:], self.header.vertex_count, frames)
-            corrected = (positions.astype(float) + q.astype(float) * f32(chunk, 0)).astype(self.position_type)
-            positions = np.where(q != 0, corrected, positions)
+            parts = corrected_parts(decode_corrections(chunk[4:], self.header.vertex_count, frames))
+            added = parts.astype(float) * (f32(chunk, 0) / 32.0)
+            positions = np.where(parts != 0, (positions.astype(float) + added).astype(self.position_type), positions)
         return positions
 
     def _needed(self, s: int, level: int) -> list[Chunk]:

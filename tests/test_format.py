@@ -933,7 +933,8 @@ class HandMade:
         vectors = self._rows(self.vertex_count, 3, frames).transpose(0, 2, 1)
         vectors = vectors * (self.random.random((self.vertex_count, frames, 1)) < 0.3)
         vertex, frame = np.nonzero(vectors.any(axis=2))
-        rows = np.column_stack([vertex, frame, vectors[vertex, frame]]).astype(np.int32)
+        widths = self.random.integers(0, 3, len(vertex))
+        rows = np.column_stack([vertex, frame, vectors[vertex, frame], widths]).astype(np.int32)
         return streams.encode_corrections(rows, self.vertex_count, frames)
 
 

@@ -227,9 +227,9 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
     for (int32_t v = 0; v < vertex_count; v++) {
         int64_t first = next;
         correction_row *row = next_row(model);
-        for (; next < count && corrections[5 * next] == v; next++) {
-            const int32_t *given = corrections + 5 * next;
-            memcpy(row->q[given[1]], given + 2, sizeof row->q[0]);
+        for (; next < count && corrections[ATH_CORRECTION_ROW * next] == v; next++) {
+            const int32_t *given = corrections + ATH_CORRECTION_ROW * next;
+            memcpy(row->of + given[1], given + 2, sizeof row->of[0]);
             set_correction(row, given[1]);
         }
         code_vertex(&coder, model, frames, next > first);

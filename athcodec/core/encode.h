@@ -111,8 +111,10 @@ ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_floa
                                const double *source, const double origin[3], double *max_error, double *sum_squares,
                                uint32_t *histogram);
 
-/* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of (vertex, frame, x, y,
- * z). Returns how many there are; -1: the step cannot express them. */
+enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
+
+/* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
+ * ath_correction. Returns how many there are; -1: the step cannot express them. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, double step, int32_t *corrections, int64_t capacity);

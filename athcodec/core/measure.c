@@ -1,4 +1,4 @@
-/* How the encoder decodes and measures what it has coded, and the corrections that keep the error bound. */
+/* How the encoder decodes and measures what it has coded. */
 #include "encode.h"
 
 enum { TILE = 16 }; /* of what is worked on at once */
@@ -131,19 +131,6 @@ void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_in
             pose_node(plan, motion, integers, n, &scratch, origin, is_float64, positions);
 }
 
-static double position_at(int is_float64, const void *positions, size_t at)
-{
-    return is_float64 ? ((const double *)positions)[at] : (double)((const float *)positions)[at];
-}
-
-static void set_position(int is_float64, void *positions, size_t at, double value)
-{
-    if (is_float64)
-        ((double *)positions)[at] = value;
-    else
-        ((float *)positions)[at] = (float)value;
-}
-
 /* A vertex's squared distances, frame by frame. `stride`: from axis to axis. */
 ATH_HOT
 static void square_distances(int32_t count, size_t stride, int is_float64, const void *positions, size_t first,
@@ -194,89 +181,4 @@ void ath_error(int32_t vertex_count, int32_t frames, int is_float64, const void 
         }
     *max_error = ath_sqrt(largest);
     *sum_squares = sum;
-}
-
-static double rounded(int is_float64, double value) { return is_float64 ? value : ath_single(value); }
-
-static double corrected_error(int is_float64, const double here[3], const double want[3], const int32_t q[3],
-                              double step)
-{
-    double square = 0.0;
-    for (int32_t k = 0; k < 3; k++) {
-        double e = rounded(is_float64, ath_corrected(here[k], q[k], step)) - want[k];
-        square += e * e;
-    }
-    return square;
-}
-
-static int32_t to_steps(double value) { return value < 0.0 ? -(int32_t)(0.5 - value) : (int32_t)(value + 0.5); }
-
-/* The correction with fewest non-zero axes, then the smallest error, that comes within the limit. */
-static int choose_correction(int is_float64, const double here[3], const double want[3], double limit, double step,
-                             int32_t best[3])
-{
-    int32_t steps[3], found = 0;
-    for (int32_t k = 0; k < 3; k++) {
-        double units = (want[k] - here[k]) / step;
-        if (!(units > -1e9 && units < 1e9)) return 0;
-        steps[k] = to_steps(units);
-        if (steps[k] == 0) steps[k] = units < 0.0 ? -1 : 1;
-    }
-    for (int32_t axes = 1; axes <= 3 && !found; axes++) {
-        double least = limit * limit;
-        for (int32_t mask = 1; mask < 8; mask++) {
-            int32_t q[3];
-            if ((mask & 1) + (mask >> 1 & 1) + (mask >> 2) != axes) continue;
-            for (int32_t k = 0; k < 3; k++) q[k] = mask >> k & 1 ? steps[k] : 0;
-            double square = corrected_error(is_float64, here, want, q, step);
-            if (square > least) continue;
-            least = square;
-            found = 1;
-            memcpy(best, q, sizeof q);
-        }
-    }
-    return found;
-}
-
-int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                             const double *source, const double origin[3], const double *limits, double step,
-                             int32_t *corrections, int64_t capacity)
-{
-    size_t T = (size_t)frames;
-    int64_t count = 0;
-    for (int32_t v = 0; v < vertex_count; v++)
-        for (int32_t t = 0; t < frames; t++) {
-            double here[3], want[3], square = 0.0, limit = limits[v];
-            for (size_t k = 0; k < 3; k++) {
-                size_t at = ((size_t)v * 3 + k) * T + (size_t)t;
-                here[k] = position_at(is_float64, positions, at);
-                want[k] = source[at] + origin[k];
-                square += (here[k] - want[k]) * (here[k] - want[k]);
-            }
-            if (!(square > limit * limit)) continue;
-            int32_t q[3];
-            if (!choose_correction(is_float64, here, want, limit, step, q)) return -1;
-            if (count < capacity) {
-                int32_t *row = corrections + 5 * count;
-                row[0] = v;
-                row[1] = t;
-                memcpy(row + 2, q, sizeof q);
-            }
-            count++;
-        }
-    return count;
-}
-
-void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step, const int32_t *corrections,
-                           int64_t count)
-{
-    size_t T = (size_t)frames;
-    for (int64_t i = 0; i < count; i++) {
-        const int32_t *row = corrections + 5 * i;
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = ((size_t)row[0] * 3 + k) * T + (size_t)row[1];
-            double here = position_at(is_float64, positions, at);
-            if (row[2 + k] != 0) set_position(is_float64, positions, at, ath_corrected(here, row[2 + k], step));
-        }
-    }
 }

@@ -185,12 +185,13 @@ enum { CORRECTION_BLOCK = 8, CORRECTION_BLOCKS = ATH_SEGMENT_FRAMES / CORRECTION
 /* The corrections of one vertex, and a bit for each frame that has one, a byte for each block; the bytes of the block
  * before the first and of the one behind the last are 0. */
 typedef struct {
-    int32_t q[ATH_SEGMENT_FRAMES][3];
+    ath_correction of[ATH_SEGMENT_FRAMES];
     uint8_t blocks[1 + CORRECTION_BLOCKS + 1];
 } correction_row;
 
 typedef struct {
     ath_context vertex[4], block[2][4], frame[3][3][2], zero[2][3], sign[3][3];
+    ath_context width[1 + ATH_FOOTPRINTS][ATH_FOOTPRINTS - 1];
     number_model size;
     correction_row row[2]; /* of the vertex before and of this one; which is which: `turn` */
     int32_t turn;
@@ -210,6 +211,8 @@ static void correction_model_init(correction_model *model)
         for (int32_t j = 0; j < 3; j++) context_init(&model->zero[i][j], 32768);
     for (int32_t i = 0; i < 3; i++)
         for (int32_t j = 0; j < 3; j++) context_init(&model->sign[i][j], 32768);
+    for (int32_t i = 0; i <= ATH_FOOTPRINTS; i++)
+        for (int32_t j = 0; j < ATH_FOOTPRINTS - 1; j++) context_init(&model->width[i][j], 32768);
     number_model_init(&model->size);
 }
 
@@ -227,28 +230,32 @@ static void set_correction(correction_row *row, int32_t t)
 static void clear_corrections(correction_row *row)
 {
     for (int32_t b = 0; b < CORRECTION_BLOCKS; b++) {
-        if (row->blocks[1 + b]) memset(row->q[b * CORRECTION_BLOCK], 0, sizeof row->q[0] * CORRECTION_BLOCK);
+        if (row->blocks[1 + b]) memset(row->of + b * CORRECTION_BLOCK, 0, sizeof row->of[0] * CORRECTION_BLOCK);
         row->blocks[1 + b] = 0;
     }
 }
 
-/* A vector that is not all zero; `like` is a neighbour's correction, or zeros. */
-static void code_correction(ath_coder *coder, correction_model *model, const int32_t like[3], int32_t q[3])
+/* Its vector is not all zero; `like` is a neighbour, or zeros. */
+static void code_correction(ath_coder *coder, correction_model *model, const ath_correction *like, ath_correction *own)
 {
-    int any = 0, alike = like[0] != 0 || like[1] != 0 || like[2] != 0;
+    int any = 0, alike = like->q[0] != 0 || like->q[1] != 0 || like->q[2] != 0;
+    ath_context *width = model->width[alike ? 1 + like->width : 0];
+    int32_t coded = 0;
+    while (coded < ATH_FOOTPRINTS - 1 && coder_bit(coder, &width[coded], coded < own->width)) coded++;
+    own->width = coded;
     for (int32_t axis = 0; axis < 3; axis++) {
-        int32_t sign = like[axis] == 0 ? 0 : like[axis] < 0 ? 1 : 2;
+        int32_t sign = like->q[axis] == 0 ? 0 : like->q[axis] < 0 ? 1 : 2;
         int nonzero = axis == 2 && !any;
-        if (!nonzero) nonzero = coder_bit(coder, &model->zero[any][sign != 0 ? 1 : alike ? 2 : 0], q[axis] != 0);
+        if (!nonzero) nonzero = coder_bit(coder, &model->zero[any][sign != 0 ? 1 : alike ? 2 : 0], own->q[axis] != 0);
         if (!nonzero) {
-            q[axis] = 0;
+            own->q[axis] = 0;
             continue;
         }
         any = 1;
-        int negative = coder_bit(coder, &model->sign[axis][sign], q[axis] < 0);
-        uint32_t expected = clipped(like[axis]) * 16;
-        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, expected, magnitude_of(q[axis]) - 1) + 1;
-        q[axis] = negative ? -magnitude : magnitude;
+        int negative = coder_bit(coder, &model->sign[axis][sign], own->q[axis] < 0);
+        uint32_t expected = clipped(like->q[axis]) * 16;
+        int32_t magnitude = (int32_t)code_unsigned(coder, &model->size, expected, magnitude_of(own->q[axis]) - 1) + 1;
+        own->q[axis] = negative ? -magnitude : magnitude;
     }
 }
 
@@ -275,7 +282,7 @@ static void code_corrected_frames(ath_coder *coder, correction_model *model, int
                            : coder_bit(coder, &model->frame[earlier][near][found], has_correction(row, t));
             if (!here) continue;
             found = 1;
-            code_correction(coder, model, earlier == 2 ? row->q[t - 1] : above->q[t], row->q[t]);
+            code_correction(coder, model, above->of + t, row->of + t);
             set_correction(row, t);
         }
     }
@@ -295,5 +302,14 @@ static const correction_row *code_vertex(ath_coder *coder, correction_model *mod
     model->turn = 1 - model->turn;
     return any ? row : 0;
 }
+
+#ifndef ATH_ENCODING
+static void correction_parts(const correction_row *row, int32_t frames, ath_corrected_parts parts)
+{
+    memset(parts, 0, (size_t)frames * sizeof parts[0]);
+    for (int32_t t = 0; t < frames; t++)
+        if (has_correction(row, t)) ath_add_correction(frames, t, row->of + t, parts);
+}
+#endif
 
 #endif

@@ -737,29 +737,35 @@ static void store_piece(ath_work *work, const ath_piece *piece, const double *pl
         store_floats(placed, 3 * piece->count, segment->frames, origin, (float *)segment->positions + at, frame_size);
 }
 
-static void correct(ath_segment *segment, size_t at, int32_t steps, double step)
+static void correct(ath_segment *segment, size_t at, double parts, double step)
 {
-    if (steps == 0) return;
+    if (parts == 0.0) return;
     if (segment->is_float64) {
         double *position = (double *)segment->positions + at;
-        *position = ath_corrected(*position, steps, step);
+        *position = ath_corrected(*position, parts, step);
     } else {
         float *position = (float *)segment->positions + at;
-        *position = (float)ath_corrected((double)*position, steps, step);
+        *position = (float)ath_corrected((double)*position, parts, step);
     }
+}
+
+static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
+                           size_t vertex)
+{
+    ath_corrected_parts parts;
+    correction_parts(row, segment->frames, parts);
+    for (int32_t t = 0; t < segment->frames; t++)
+        for (size_t k = 0; k < 3; k++)
+            correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k], reader->step);
 }
 
 static void correct_piece(ath_work *work, const ath_piece *piece)
 {
-    ath_segment *segment = work->segment;
     corrections_reader *reader = &work->corrections;
     ath_coder coder = reader->coder;
     for (int32_t i = 0; i < piece->count; i++) {
-        const correction_row *row = code_vertex(&coder, reader->model, segment->frames, 0);
-        size_t vertex = (size_t)(work->exact + i), vertices = (size_t)segment->exact_vertices;
-        for (int32_t t = 0; row && t < segment->frames; t++)
-            for (size_t k = 0; k < 3 && has_correction(row, t); k++)
-                correct(segment, ((size_t)t * vertices + vertex) * 3 + k, row->q[t][k], reader->step);
+        const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
+        if (row) correct_vertex(reader, row, work->segment, (size_t)(work->exact + i));
     }
     reader->coder = coder;
 }

@@ -467,7 +467,7 @@ def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict
 
 @dataclass
 class Coded:
-    """The stems of one segment: integers, streams by level, corrections (K, 5), and the corrected positions."""
+    """The stems of one segment: integers, streams by level, corrections (K, 6), and the corrected positions."""
 
     segment: SegmentMotion
     stems: dict[int, bytes]
@@ -537,7 +537,7 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
 def correct(
     decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings, pool: ThreadPool
 ) -> tuple[np.ndarray, float]:
-    """Corrections (K, 5) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
+    """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
     factor = 1.0
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)

@@ -195,13 +195,13 @@ def encode_affines(segment: SegmentMotion, level: int) -> bytes:
 
 
 def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) -> bytes:
-    """corrections: (K, 5) int32 rows of (vertex, frame, x, y, z), sorted by vertex, then frame."""
+    """corrections: (K, 6) int32 rows of (vertex, frame, x, y, z, width), sorted by vertex, then frame."""
     return encode_stream(
         "ath_encode_corrections",
         4096 + 16 * len(corrections),
         vertex_count,
         frames,
-        address(corrections, np.int32, 5 * len(corrections)),
+        address(corrections, np.int32, 6 * len(corrections)),
         len(corrections),
     )
 
@@ -264,7 +264,7 @@ def find_corrections(
 ) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
-    Returns the corrections applied, (K, 5) int32, or None where they cannot be expressed in this step.
+    Returns the corrections applied, (K, 6) int32, or None where they cannot be expressed in this step.
     """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
@@ -296,7 +296,7 @@ def _corrections(
     vertices, _, frames = positions.shape
     capacity = 1024
     while True:
-        rows = np.empty((capacity, 5), np.int32)
+        rows = np.empty((capacity, 6), np.int32)
         count = lib.ath_find_corrections(
             vertices,
             frames,

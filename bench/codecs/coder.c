@@ -117,10 +117,13 @@ BENCH_API int64_t bench_corrections(stream_bytes bytes, int64_t size, int32_t ve
     correction_model_init(model);
     for (int32_t v = 0; v < vertex_count; v++) {
         const correction_row *row = code_vertex(&coder, model, frames, 0);
-        for (int32_t t = 0; row && t < frames; t++)
-            for (int32_t axis = 0; has_correction(row, t) && axis < 3; axis++) {
-                float *at = positions + ((size_t)v * 3 + (size_t)axis) * (size_t)stride + t;
-                if (row->q[t][axis] != 0) *at = (float)ath_corrected((double)*at, row->q[t][axis], step);
+        if (!row) continue;
+        ath_corrected_parts parts;
+        correction_parts(row, frames, parts);
+        for (size_t axis = 0; axis < 3; axis++)
+            for (int32_t t = 0; t < frames; t++) {
+                float *at = positions + ((size_t)v * 3 + axis) * (size_t)stride + t;
+                if (parts[t][axis] != 0.0) *at = (float)ath_corrected((double)*at, parts[t][axis], step);
             }
     }
     free(model);

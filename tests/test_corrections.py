@@ -1,0 +1,91 @@
+"""Corrections: what brings vertices within the bound, and how it looks in motion."""
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec.encoding import quantise as qz
+from athcodec.encoding import streams
+
+VERTICES, FRAMES = 40, 96
+NOWHERE = np.zeros(3)
+
+
+def found(error: np.ndarray, limit, dtype=np.float32) -> tuple[np.ndarray, np.ndarray]:
+    """Corrections of positions that are off by (N, 3, T), and what is left."""
+    wanted = np.random.default_rng(1).normal(size=error.shape)
+    decoded = (wanted + error).astype(dtype)
+    rows = streams.find_corrections(decoded, wanted, NOWHERE, limit, qz.single(qz.CORRECTION_STEP * np.min(limit)))
+    assert rows is not None
+    return rows, decoded.astype(np.float64) - wanted
+
+
+def lengths(error: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(error, axis=1)
+
+
+def bends(error: np.ndarray) -> np.ndarray:
+    """Lengths of second differences over frames."""
+    return lengths(np.diff(error, 2, axis=2))
+
+
+def waves(amplitude: float) -> np.ndarray:
+    """An error that changes slowly."""
+    random = np.random.default_rng(2)
+    phase, period = random.uniform(0, 6, (VERTICES, 3, 1)), random.uniform(24, 48, (VERTICES, 3, 1))
+    return amplitude * np.sin(2 * np.pi * np.arange(FRAMES) / period + phase)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("sigma", [0.3, 1.0, 5.0, 1e3])
+def test_noise_of_any_size_is_brought_within_the_limit(sigma, dtype):
+    error = np.random.default_rng(3).normal(scale=sigma * 1e-3, size=(VERTICES, 3, FRAMES))
+    _, left = found(error, 1e-3, dtype)
+    assert lengths(left).max() <= 1e-3
+
+
+def test_every_vertex_keeps_a_limit_of_its_own():
+    limits = np.geomspace(1e-3, 1e-2, VERTICES)
+    _, left = found(waves(4e-3), limits)
+    assert (lengths(left).max(axis=1) <= limits).all()
+
+
+@pytest.mark.parametrize("frames", range(1, 8))
+def test_segments_shorter_than_a_footprint_are_corrected(frames):
+    _, left = found(np.full((VERTICES, 3, frames), 2e-3), 1e-3)
+    assert lengths(left).max() <= 1e-3
+
+
+def test_what_is_within_the_limit_is_left_alone():
+    rows, _ = found(waves(0.5e-3), 1e-3)
+    assert len(rows) == 0
+
+
+def test_an_error_that_changes_slowly_changes_slowly_when_corrected():
+    error = waves(0.8e-3)
+    rows, left = found(error, 1e-3)
+    beyond = (lengths(error) > 1e-3).sum()
+    assert beyond > 2 * len(rows) > 0
+    assert bends(left).max() < 1e-3
+
+
+def test_a_single_frame_that_is_off_is_corrected_alone():
+    error = np.zeros((1, 3, FRAMES))
+    error[0, 1, 40] = 1.2e-3
+    rows, left = found(error, 1e-3)
+    assert len(rows) == 1 and rows[0, 1] == 40
+    assert lengths(left)[0, 40] <= 1e-3 and bends(left).max() < bends(error).max()
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+def test_no_vertex_of_the_sample_pops_at_a_loose_bound(ladder, tmp_path):
+    """Where the ladder has layers, in none of them: seen against the error that each level has."""
+    with athcodec.read(athcodec.sample_path()) as clip:
+        source = clip.block(0, clip.frame_count)
+        path = athcodec.encode(clip, tmp_path / "tree.ath", rel_error=1e-3, ladder=ladder, attributes="none").path
+    with athcodec.open(path) as decoder:
+        for level in decoder.levels[decoder.file.core.info.depth_levels - 1 :]:
+            error = (decoder.positions(level=level.level).astype(np.float64) - source).transpose(1, 2, 0)
+            bound = max(level.max_error, decoder.max_error_bound)
+            assert bends(error).max() <= 1.5 * bound
+            assert ((bends(error) > bound).mean(axis=0) <= 0.02).all()
