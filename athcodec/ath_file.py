@@ -341,7 +341,8 @@ class AthFile:
     @property
     def header(self) -> ct.Header:
         """The fixed header."""
-        return ct.Header(**{field.name: getattr(self.core.info, field.name) for field in fields(ct.Header)})
+        counts = [field.name for field in fields(ct.Header) if field.name != "joins"]
+        return ct.Header(**{name: getattr(self.core.info, name) for name in counts}, joins=self.core.joins())
 
     @property
     def vertex_count(self) -> int:
@@ -587,6 +588,11 @@ class AthFile:
         """Error of each level in each segment, (levels, segments, 3) float64: the largest, that of the 99th percentile,
         the root mean square, scene units."""
         return self.core.errors()
+
+    @property
+    def joins(self) -> np.ndarray:
+        """How each segment goes on from the end of the one before it, (levels, segments) uint8; 0: it does not."""
+        return self.core.joins()
 
     def table1(self) -> dict[str, float]:
         """Table 1 of the paper: depth (levels of nodes), nodes, leaves and the four thresholds of the ATH."""
@@ -882,9 +888,9 @@ class AthFile:
         level : int
             One that is stored.
         spare : core_file.Segment, optional
-            A prepared segment that nobody needs any more. Where it is this one, at a coarser level of all vertices,
-            decoding goes on from there, and its bytes are not read again; else its memory is taken if it is large
-            enough.
+            A prepared segment that nobody needs any more. Where it is this one, at a coarser level of all vertices, or
+            the one that this is joined to, decoding goes on from there, and its bytes are not read again; else its
+            memory is taken if it is large enough.
 
         Returns
         -------
@@ -902,24 +908,41 @@ class AthFile:
         needed, limit = size + self.core.work_size(), self.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {level}, segment {segment}: got a need of {needed} bytes; the limit is {limit}")
-        before = (
-            spare
-            if spare and needed + len(spare.memory) <= limit and self.core.goes_on(spare, segment, level)
-            else None
-        )
-        ready = spare if spare and not before and len(spare.memory) >= size else core_file.Segment(size)
+        before = joined_to = None
+        if spare and needed + len(spare.memory) <= limit:
+            if self.core.goes_on(spare, segment, level):
+                before = spare
+            elif self.core.is_ready(spare, self.core.joined_to(segment, level), level):
+                joined_to = spare
+        is_free = spare and not before and not joined_to and len(spare.memory) >= size
+        ready = spare if spare and is_free else core_file.Segment(size)
         with self._lock:
-            self._decode(segment, level, ready, before)
+            self._decode(segment, level, ready, before, joined_to)
         return ready
 
-    def _decode(self, segment: int, level: int, ready: core_file.Segment, before: core_file.Segment | None) -> None:
-        after = self.core.level_of(before) if before else -1
-        with self._fed(self.core.missing(level, segment, after=after), f"level {level}, segment {segment}"):
+    def _decode(
+        self,
+        segment: int,
+        level: int,
+        ready: core_file.Segment,
+        before: core_file.Segment | None,
+        joined_to: core_file.Segment | None,
+    ) -> None:
+        with self._fed(self._missing(segment, level, before, joined_to), f"level {level}, segment {segment}"):
             needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
             if needed > limit:
                 raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
-            self.core.prepare(self._work, segment, level, ready, before)
+            self.core.prepare(self._work, segment, level, ready, before, joined_to)
         self._rests_read = max(self._rests_read, level)
+
+    def _missing(
+        self, segment: int, level: int, before: core_file.Segment | None, joined_to: core_file.Segment | None
+    ) -> list[tuple[int, int]]:
+        if not before and not joined_to:
+            return self.core.missing(level, segment)
+        own = self.core.missing_of(segment, level, self.core.level_of(before) if before else -1)
+        beside = -1 if joined_to else self.core.joined_to(segment, level)
+        return own if beside < 0 else sorted(own + self.core.missing_of(beside, level))
 
     @contextmanager
     def _fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:

@@ -113,6 +113,7 @@ class Header:
     is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
+    joins: np.ndarray | None = field(default=None, compare=False)  # (levels, segments) uint8; None: all are 0
 
 
 def is_prelude(kind: Any) -> Any:
@@ -172,8 +173,11 @@ def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> by
     for name in ("length", "segment", "kind", "level"):
         table[name] = [getattr(chunk, name) for chunk in chunks]
     data = np.empty(_FRONT_BYTES + _FRONT_BYTES_OF_EACH * (len(chunks) + errors.size // len(MEASURES)), np.uint8)
-    announced = address(errors, np.int32, header.level_count * header.segment_count * len(MEASURES))
-    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced)
+    entries = header.level_count * header.segment_count
+    announced = address(errors, np.int32, entries * len(MEASURES))
+    joins = np.zeros(entries, np.uint8) if header.joins is None else np.ascontiguousarray(header.joins)
+    widths = address(joins, np.uint8, entries)
+    size = lib.ath_encode_front(data.ctypes.data, len(data), counts, table.ctypes.data, announced, widths)
     assert size >= 0, "every front has a stream, and space enough"
     return data[:size].tobytes()
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import math
 import threading
+from collections.abc import Callable
 from ctypes import (
     POINTER,
     Structure,
@@ -331,6 +332,11 @@ class File:
         shape = self.info.level_count, self.info.segment_count, len(MEASURES)
         return self._array(lib.ath_errors(self._file), "<f8", math.prod(shape)).reshape(shape)
 
+    def joins(self) -> np.ndarray:
+        """(levels, segments) uint8: how each segment is joined to the one before it."""
+        shape = self.info.level_count, self.info.segment_count
+        return self._array(lib.ath_joins(self._file), np.uint8, math.prod(shape)).reshape(shape)
+
     def level_error(self, level: int, segments: range) -> tuple[float, float, float]:
         """Error of a level in these segments by each of MEASURES, scene units."""
         largest, p99, rms = (
@@ -359,13 +365,18 @@ class File:
 
     # ---- bytes ----
 
-    def missing(self, level: int, segment: int, last: int | None = None, after: int = -1) -> list[tuple[int, int]]:
-        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last, of the levels
-        behind `after`."""
-        last = segment if last is None else last
-        count = lib.ath_onward_ranges(self._file, after, level, segment, last, 0, None, 0)
+    def missing(self, level: int, segment: int, last: int | None = None) -> list[tuple[int, int]]:
+        """(offset, size) of the bytes that are still to be fed for a segment, or all from it to the last."""
+        return self._ranges(lib.ath_ranges, level, segment, segment if last is None else last)
+
+    def missing_of(self, segment: int, level: int, after: int = -1) -> list[tuple[int, int]]:
+        """The same of the levels behind `after`, without what it is joined to."""
+        return self._ranges(lib.ath_onward_ranges, after, level, segment, segment)
+
+    def _ranges(self, call: Callable[..., int], *of: int) -> list[tuple[int, int]]:
+        count = call(self._file, *of, 0, None, 0)
         ranges = (Range * count)()
-        lib.ath_onward_ranges(self._file, after, level, segment, last, 0, ranges, count)
+        call(self._file, *of, 0, ranges, count)
         return [(found.offset, found.size) for found in ranges]
 
     def feed(self, data: np.ndarray, offset: int) -> None:
@@ -388,12 +399,31 @@ class File:
         same = lib.ath_segment_index(before.pointer) == segment
         return same and bool(lib.ath_goes_on(self._file, before.pointer, before.kept_pointer, level))
 
+    def joined_to(self, segment: int, level: int) -> int:
+        """The segment whose end one goes on from at a level; -1: none."""
+        return lib.ath_joined_to(self._file, segment, level)
+
+    def is_ready(self, prepared: Segment, segment: int, level: int) -> bool:
+        """Whether what was prepared is this segment at this level."""
+        return lib.ath_segment_index(prepared.pointer) == segment and self.level_of(prepared) == level
+
     def level_of(self, segment: Segment) -> int:
         """That it is prepared at; -1: at none."""
         return lib.ath_segment_level(segment.pointer)
 
-    def prepare(self, work: Work, segment: int, level: int, into: Segment, before: Segment | None = None) -> None:
-        """Decodes a segment at a level, from the beginning or from what goes_on() is true of."""
+    def prepare(
+        self,
+        work: Work,
+        segment: int,
+        level: int,
+        into: Segment,
+        before: Segment | None = None,
+        joined_to: Segment | None = None,
+    ) -> None:
+        """Decodes a segment at a level, from the beginning or from what goes_on() is true of.
+
+        joined_to: the segment that it is joined to, where that is ready at the level.
+        """
         self.build()
         self.refine(level)
         fault, keeping = Fault(), self._room_to_keep(level, into)
@@ -404,6 +434,8 @@ class File:
             result = lib.ath_prepare_onward(*place, before.pointer, before.kept_pointer, level, *rooms)
         if result == OK:
             self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
+            if joined_to is not None:
+                self._check(lib.ath_follow(work.pointer, joined_to.pointer))
             result = lib.ath_prepare_step(work.pointer, MOST_STEPS)
         if result != OK:
             lib.ath_work_fault(work.pointer, byref(fault))

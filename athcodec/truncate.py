@@ -82,6 +82,7 @@ def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
     header = replace(
         file.header,
         level_count=level + 1,
+        joins=file.joins[: level + 1],
         max_error=file.max_error_bound if whole else float(file.errors[level, :, 0].max()),
     )
     return ct.pack_front(header, chunks, file.errors[: level + 1]), chunks

@@ -444,8 +444,9 @@ def short_float(stored: int) -> float:
     return from_bits(stored << 18, 32)
 
 
-def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list]:
-    """Counts, chunk table, and [level][segment] (largest, 99th percentile, root mean square) errors."""
+def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list, list]:
+    """Counts, chunk table, [level][segment] (largest, 99th percentile, root mean square) errors, and [level][segment]
+    joins."""
     check_magic(data)
     front_length, chunk_count = check_lengths(data, limits)
     checksums_at = front_length - CHECKSUM_BYTES * chunk_count
@@ -455,14 +456,15 @@ def read_front(data: bytes, limits: Limits) -> tuple[Header, list[Chunk], list]:
 
 def decode_front(
     stream: bytes, front_length: int, checksums: list[int], limits: Limits
-) -> tuple[Header, list[Chunk], list]:
+) -> tuple[Header, list[Chunk], list, list]:
     coder = RangeDecoder(stream)
     header = decode_counts(coder, front_length, len(checksums))
     check_counts(header, limits)
     chunks = decode_chunk_table(coder, header, checksums, limits)
     errors = decode_error_table(coder, header)
+    joins = decode_joins(coder, header)
     require(coder.is_finished(), "the front stream is not used up where it should be", "BAD_CHUNK_TABLE")
-    return header, chunks, errors
+    return header, chunks, errors, joins
 
 
 def check_magic(data: bytes) -> None:
@@ -636,6 +638,49 @@ def decode_errors(coder: RangeDecoder, model: NumberModel, before: list[int], me
         require(0 <= before[i] + change < SHORT_FLOATS, "an announced error is no short float", "BAD_CHUNK_TABLE")
         entry.append(before[i] + change)
     return entry
+
+
+MOST_WIDTH = 127
+
+
+@dataclass(frozen=True)
+class Join:
+    """How a segment goes on from the end of the one before it."""
+
+    width: int  # frames; 0: it does not
+    is_sloped: bool = False
+
+    def apply(self, end: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """end: the last two frames of the segment before; x: those of this one; frames come last."""
+        start, last, first, second = (y.astype(float) for y in (end[..., 0], end[..., 1], x[..., 0], x[..., 1]))
+        jump, slope = 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
+        joined, w = x.copy(), float(self.width)
+        for t in range(self.width):
+            u = (t + 0.5) / w
+            jumps, slopes = 1.0 - u * u * (3.0 - 2.0 * u), w * u * (1.0 - u) * (1.0 - u) if self.is_sloped else 0.0
+            joined[..., t] = x[..., t].astype(float) + (jump * jumps + slope * slopes)
+        return joined
+
+
+NO_JOIN = Join(0)
+
+
+def decode_joins(coder: RangeDecoder, header: Header) -> list[list[Join]]:
+    model, joined, sloped = NumberModel(), [Context(32768) for _ in range(3)], [Context(32768) for _ in range(2)]
+    last, table = Join(16), []
+    for _ in range(header.level_count):
+        row: list[Join] = []
+        for segment in range(header.segment_count):
+            before = 2 if segment == 0 else row[-1].width > 0
+            if header.segment_count == 1 or not coder.bit(joined[before]):
+                row.append(NO_JOIN)
+                continue
+            is_sloped = bool(coder.bit(sloped[last.is_sloped]))
+            last = Join(last.width + code_signed(coder, model, 64), is_sloped)
+            require(1 <= last.width <= MOST_WIDTH, "a segment is joined over too many frames", "BAD_CHUNK_TABLE")
+            row.append(last)
+        table.append(row)
+    return table
 
 
 # ---- hierarchy stream --------------------------------------------------------------------------------------
@@ -2963,6 +3008,14 @@ def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
     return stream.rotation_step_factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
 
 
+@dataclass(frozen=True)
+class End:
+    """The last two frames of a segment."""
+
+    maps: dict[int, tuple]  # (c, R) of the nodes shown
+    positions: np.ndarray  # (vertices, 3, 2), as output
+
+
 class Pose:
     """All vertices of one segment, placed piece by piece and node by node."""
 
@@ -2970,14 +3023,19 @@ class Pose:
         self.plan, self.motion, self.frames = plan, motion, motion.frames
         self.placed = np.empty((len(plan.rest), 3, motion.frames))
         self.kept: dict[int, tuple] = {}  # (c, R) of the pieces placed
+        self.maps: dict[int, tuple] = {}  # (c, R) of the nodes shown
+        self.is_exact = np.ones(len(plan.rest), bool)
 
-    def place_level(self, level: int) -> None:
+    def place_level(self, level: int, join: Join = NO_JOIN, end: End | None = None) -> None:
         for piece in self.plan.pieces:
             if piece.level <= level:
                 self.place_piece(piece)
         for node in self.plan.nodes:
             if node.level <= level <= node.last:
-                self.place_node(node)
+                c, R = self.node_frames(node)
+                if end is not None:
+                    c, R = (join.apply(of_end, own) for of_end, own in zip(end.maps[node.number], (c, R)))
+                self.place_node(node, c, R)
 
     # Attach frames: a piece hangs on a point c and in a rotation R.
 
@@ -3081,8 +3139,8 @@ class Pose:
 
     # Nodes.
 
-    def place_node(self, node: Node) -> None:
-        c, R = self.node_frames(node)
+    def place_node(self, node: Node, c: np.ndarray, R: np.ndarray) -> None:
+        self.maps[node.number], self.is_exact[node.vertices] = (c, R), False
         x = self.plan.rest[node.vertices] - self.plan.attach_point(self.plan.pieces[node.piece])
         self.placed[node.vertices] = c + mat_vec(R, x[:, :, None])
 
@@ -3485,7 +3543,7 @@ class AthFile:
 
     def __init__(self, data: bytes, strict: bool = False, limits: Limits | None = None):
         self.data, self.limits = bytes(data), limits or Limits()
-        self.header, self.chunks, self.errors = read_front(self.data, self.limits)
+        self.header, self.chunks, self.errors, self.joins = read_front(self.data, self.limits)
         self.file_length = self.chunks[-1].offset + self.chunks[-1].length
         self._places = {(c.kind, c.level, c.segment): c for c in self.chunks if not c.repeatable}
         self._check_length(strict)
@@ -3496,6 +3554,7 @@ class AthFile:
         with np.errstate(all="ignore"):  # infinities and NaN are results like others
             self._read_hierarchy(self.content(HIERARCHY))
             self._check_motion_chunks()
+            self._check_joins()
             self._read_rest(self.content(REST))
             self.times = frame_times(self.content(TIME), self.clips)
 
@@ -3574,6 +3633,28 @@ class AthFile:
             "motion chunks are not those that the hierarchy asks for",
             "BAD_CHUNK_TABLE",
         )
+
+    def _segment_before(self, s: int) -> int | None:
+        """In its clip; before the first of a loop of several segments the last."""
+        first = 0
+        for clip in self.clips:
+            if s < first + clip.segments:
+                break
+            first += clip.segments
+        if s > first:
+            return s - 1
+        return first + clip.segments - 1 if clip.seams is not None and clip.segments > 1 else None
+
+    def _check_joins(self) -> None:
+        levels = 1 if self.header.is_predicted else self.lossy_levels
+        for level, row in enumerate(self.joins):
+            for s, join in enumerate(row):
+                fits = level < levels and join.width <= self._segment_lengths[s] - 2
+                require(
+                    join.width == 0 or (fits and self._segment_before(s) is not None),
+                    f"level {level}, segment {s}: a join of {join.width} frames cannot be",
+                    "BAD_CHUNK_TABLE",
+                )
 
     def _read_rest(self, chunk: bytes) -> None:
         require(len(chunk) >= 17, "REST is too short")
@@ -3744,36 +3825,56 @@ class AthFile:
             coded = Prediction(chunk, self.branches, self.plan.rest, self.origin, self.position_type)
             positions = coded.decode(frames)
         else:
-            positions = self._layers(s, frames, shown)
+            positions = self._corrected(s, shown, self._joined(s, shown))
         return decode_exact(self.content(EXACT, level, s), positions) if level > shown else positions
 
-    def _layers(self, s: int, frames: int, shown: int) -> np.ndarray:
-        pose = self._first_layer(s, frames, min(shown, self.plan.height + 1))
+    def _joined(self, s: int, shown: int) -> np.ndarray:
+        """A segment as it goes on from the one before it."""
+        join = self.joins[shown][s]
+        if join.width == 0:
+            return self._layers(s, shown)[1]
+        before, positions = self._layers(self._segment_before(s), shown)
+        end = End({n: tuple(y[..., -2:] for y in own) for n, own in before.maps.items()}, positions[..., -2:])
+        pose, positions = self._layers(s, shown, join, end)
+        exact = pose.is_exact
+        positions[exact] = join.apply(end.positions[exact], positions[exact])
+        return positions
+
+    def _layers(self, s: int, shown: int, join: Join = NO_JOIN, end: End | None = None) -> tuple[Pose, np.ndarray]:
+        """The deepest layer shown, and (vertices, 3, frames) as output. end: what maps of nodes are joined to."""
+        frames = self._segment_lengths[s]
+        pose = self._first_layer(s, frames, min(shown, self.plan.height + 1), join, end)
         for q in range(1, self._layer_of(shown) + 1):
             pose = self._refinement(s, frames, q, pose)
-        positions = (pose.placed + self.origin[:, None]).astype(self.position_type)
+        return pose, (pose.placed + self.origin[:, None]).astype(self.position_type)
+
+    def _corrected(self, s: int, shown: int, positions: np.ndarray) -> np.ndarray:
         if self.find(CORRECTIONS, shown, s):
             chunk = self.content(CORRECTIONS, shown, s)
             require(len(chunk) >= 4 and finite(f32(chunk, 0)) and f32(chunk, 0) > 0.0, "Correction_Step is not above 0")
-            parts = corrected_parts(decode_corrections(chunk[4:], self.header.vertex_count, frames))
+            parts = corrected_parts(decode_corrections(chunk[4:], self.header.vertex_count, positions.shape[2]))
             added = parts.astype(float) * (f32(chunk, 0) / 32.0)
             positions = np.where(parts != 0, (positions.astype(float) + added).astype(self.position_type), positions)
         return positions
 
-    def _needed(self, s: int, level: int) -> list[Chunk]:
-        """Chunks that playing a segment at a level takes."""
+    def _needed(self, s: int, level: int, with_end: bool = True) -> list[Chunk]:
+        """Chunks that playing a segment at a level takes, with those of the end that it goes on from."""
         places = [(CORRECTIONS, min(level, self.lossy_levels - 1), s), (EXACT, level, s)]
         for d in range(level + 1):
             places += [(SHAPES, d, 0), (REFINED_REST, d, 0), (STEMS, d, s), (PREDICTED, d, s)]
             places += [(AFFINES, d, s)] if self.plan.has_affines(d, level) else []
-        return [self._places[place] for place in places if place in self._places]
+        needed = [self._places[place] for place in places if place in self._places]
+        if self.joins[min(level, self.lossy_levels - 1)][s].width == 0 or not with_end:
+            return needed
+        end = self._needed(self._segment_before(s), level, with_end=False)
+        return needed + [chunk for chunk in end if chunk.kind not in (CORRECTIONS, EXACT)]
 
     def _waves(self, s: int) -> np.ndarray:
         """Of a segment."""
         periodic = [clip.periodic for clip in self.clips for _ in range(clip.segments)]
         return waves_over_time(self._segment_lengths[s], periodic[s])
 
-    def _first_layer(self, s: int, frames: int, level: int) -> Pose:
+    def _first_layer(self, s: int, frames: int, level: int, join: Join, end: End | None) -> Pose:
         """All vertices of a segment at a level of the branch hierarchy."""
         plan, motion = self._plan_of(level, 0), Motion(frames, self._waves(s))
         for d in range(level + 1):
@@ -3784,7 +3885,7 @@ class AthFile:
             if plan.has_affines(d, level) and self.find(AFFINES, d, s):
                 decode_affines(self.content(AFFINES, d, s), plan, motion, d)
         pose = Pose(plan, motion)
-        pose.place_level(level)
+        pose.place_level(level, join, end)
         return pose
 
     def _refinement(self, s: int, frames: int, q: int, before: Pose) -> Refinement:

@@ -307,6 +307,15 @@ class FrontScript:
                 before = errors[at : at + 3]
             above = errors[start : start + 3]
 
+    def add_joins(self, joins: Sequence[rd.Join]) -> None:
+        """One of each level and segment."""
+        last = 16
+        for join in joins if self.counts["segment_count"] > 1 else ():
+            self.values.append(int(join.width != 0))
+            if join.width != 0:
+                self.values += [int(join.is_sloped), join.width - last]
+                last = join.width
+
 
 def _bits(value: int, count: int) -> list[int]:
     """From the top."""
@@ -320,6 +329,7 @@ class Draft:
     header: dict
     entries: tuple[Entry, ...]
     errors: tuple[int, ...] | None = None  # the error table as stored
+    joins: tuple[rd.Join, ...] | None = None  # of each level and segment
     stream: Callable[[bytes], bytes] | None = None  # what becomes of the front stream
 
     def file(self) -> bytes:
@@ -356,6 +366,7 @@ class Draft:
         entries = fields["level_count"] * fields["segment_count"]
         if entries <= MOST_ENTRIES:
             script.add_errors((0,) * (3 * entries) if self.errors is None else self.errors)
+            script.add_joins((rd.Join(0),) * entries if self.joins is None else self.joins)
         stream = write(rd.decode_front, script.values, 0, [0] * len(self.entries), rd.Limits())
         return self.stream(stream) if self.stream else stream
 
@@ -384,7 +395,9 @@ class Draft:
     def upto(self, level: int) -> Draft:
         """The file without the levels after one."""
         header = self.header | {"level_count": level + 1}
-        return replace(self, header=header, entries=tuple(e for e in self.entries if e.key[0] != 1 or e.level <= level))
+        joins = self.joins and self.joins[: (level + 1) * header["segment_count"]]
+        entries = tuple(e for e in self.entries if e.key[0] != 1 or e.level <= level)
+        return replace(self, header=header, entries=entries, joins=joins)
 
 
 # ---- plants ------------------------------------------------------------------------------------------------
@@ -591,6 +604,7 @@ class Plant:
     layers: int = 1
     ratio: int = 4  # of the steps of layers, as STEMS and REFINED_REST have it
     shift: int = 2  # of SHAPES
+    joins: tuple[rd.Join, ...] | None = None
     predicted: bytes | None = None  # of predicted motion, Step and Settings; then AFFINES are there only with a script
 
     def draft(self) -> Draft:
@@ -651,6 +665,7 @@ class Plant:
                 layer_count=self.layers,
             ),
             tuple(entries),
+            joins=self.joins,
         )
 
     def file(self) -> bytes:

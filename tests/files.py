@@ -24,6 +24,7 @@ from athcodec.segmentation import balanced_segments
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 
+from spec.reference_decoder import Join  # noqa: E402
 from spec.scripted import Draft, Entry  # noqa: E402
 
 COUNTS = (
@@ -82,14 +83,15 @@ def draft_of(data: bytes) -> Draft:
     parts = Parts.of(data)
     entries = tuple(Entry(chunk.kind, payload, chunk.level, chunk.segment) for chunk, payload in parts.chunks)
     counts = {name: getattr(parts.header, name) for name in COUNTS}
-    return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()))
+    joins = tuple(Join(join % 128, join >= 128) for join in parts.header.joins.ravel().tolist())
+    return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()), joins)
 
 
 def with_header(data: bytes, **fields) -> bytes:
     """The file with other values in its header or other counts, and a checksum that fits."""
     draft = draft_of(data).with_header(**fields)
     same_table = not fields.keys() & {"level_count", "segment_count"}
-    return (draft if same_table else replace(draft, errors=None)).file()
+    return (draft if same_table else replace(draft, errors=None, joins=None)).file()
 
 
 def with_checksum(front: bytes) -> bytes:

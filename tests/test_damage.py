@@ -408,7 +408,8 @@ def test_a_small_front_that_claims_much_is_refused_at_once(claim, data):
 def test_a_million_errors_from_no_bytes_cost_little(parts):
     """As many as the limit allows, all 0: they are decoded before a chunk is found to be missing."""
     entries = (1 << 19) - len(parts.chunks)
-    header = replace(parts.header, frame_count=entries, segment_count=entries, level_count=2, max_error=0.0)
+    counts = {"frame_count": entries, "segment_count": entries, "level_count": 2}
+    header = replace(parts.header, **counts, max_error=0.0, joins=None)
     front = ct.pack_front(header, [chunk for chunk, _ in parts.chunks], np.zeros((2, entries, 3)))
     assert len(front) < 2000
     start = time.perf_counter()
@@ -465,8 +466,9 @@ def change_a_count(rng: np.random.Generator, parts: Parts) -> None:
         value = near(rng, int(getattr(parts.header, name)), 2**30)
     changed = replace(parts.header, **{name: value})
     if changed.level_count * changed.segment_count < 4096:
-        parts.header = changed
-        parts.errors = np.resize(parts.errors, (changed.level_count, changed.segment_count, 3))
+        shape = changed.level_count, changed.segment_count
+        parts.header = replace(changed, joins=np.resize(parts.header.joins, shape))
+        parts.errors = np.resize(parts.errors, (*shape, 3))
 
 
 def some_limits(rng: np.random.Generator) -> Limits:
@@ -480,7 +482,7 @@ def some_limits(rng: np.random.Generator) -> Limits:
 def both_readings(data: bytes, limits: Limits) -> str:
     """What a file says of a front, once the reference decoder has said the same."""
     try:
-        header, chunks, announced = reference_front(data, rd.Limits(**vars(limits)))
+        header, chunks, announced, joins = reference_front(data, rd.Limits(**vars(limits)))
     except rd.AthError as error:
         with pytest.raises(errors.FormatError) as caught:
             AthFile(BytesIO(data), limits=limits)
@@ -493,18 +495,19 @@ def both_readings(data: bytes, limits: Limits) -> str:
     for name in COUNTS:
         assert getattr(file.header, name) == getattr(header, name)
     assert np.array_equal(file.errors, announced)
+    assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in joins]
     assert [astuple(chunk)[:6] for chunk in file.chunks] == [
         astuple(chunk) for chunk in chunks if chunk.kind in ct.KIND_NAMES
     ]
     return "opened"
 
 
-def reference_front(data: bytes, limits: rd.Limits) -> tuple[rd.Header, list[rd.Chunk], list]:
-    header, chunks, announced = rd.read_front(data, limits)
+def reference_front(data: bytes, limits: rd.Limits) -> tuple[rd.Header, list[rd.Chunk], list, list]:
+    header, chunks, announced, joins = rd.read_front(data, limits)
     end = chunks[-1].offset + chunks[-1].length
     prelude = next((chunk.offset for chunk in chunks if chunk.key[0] > 0), end)
     rd.require(len(data) >= prelude, "ends inside its prelude", "TRUNCATED")
-    return header, chunks, announced
+    return header, chunks, announced, joins
 
 
 def read_corrupted_fronts(data: bytes, count: int, seed: int) -> set[str]:

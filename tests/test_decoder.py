@@ -142,10 +142,11 @@ def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_stems_above_a_level_have_their_final_shape_but_for_the_corrections(name, plants):
+def test_stems_above_a_level_have_their_final_shape_but_for_corrections_and_joins(name, plants):
     parts = Parts.of(plants[name][0].read_bytes())
+    parts.header.joins = None
     bare = opened(parts.without(ct.CORRECTIONS), strict=True)
-    with athcodec.open(plants[name][0]) as decoder:
+    with opened(parts.file(), strict=True) as decoder:
         last, order = decoder.file.core.info.depth_levels - 1, decoder.hierarchy.vertex_source
         final = bare.positions(level=last)[:, order]
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
@@ -268,11 +269,12 @@ def test_a_frame_at_a_level_reads_only_that_segment_and_the_levels_up_to_it(leve
         before = decoder.file.bytes_read
         start, _ = decoder.segments[1]
         decoder.positions(start, level)
-        allowed = {
-            c for c in decoder.file.chunks if c.is_motion and c.level <= level and (c.segment == 1 or c.kind in SHARED)
-        }
-        read = chunks_read(file, decoder)
+        motion = [c for c in decoder.file.chunks if c.is_motion and c.level <= level]
+        allowed = {c for c in motion if c.segment == 1 or c.kind in SHARED}
         needed = {c for c in allowed if c.length and (c.kind == ct.STEMS or c.level == level)}
+        if decoder.file.joins[level, 1]:
+            allowed |= {c for c in motion if c.segment == 0 and c.kind in (ct.STEMS, ct.AFFINES)}
+        read = chunks_read(file, decoder)
         assert needed and needed <= read <= allowed
         assert decoder.file.bytes_read - before == sum(chunk.length for chunk in read)
 

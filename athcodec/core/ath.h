@@ -141,6 +141,7 @@ typedef enum ath_field {
     ATH_FIELD_MAX_ERROR,
     ATH_FIELD_FRONT_CHECKSUM,
     ATH_FIELD_ERROR,         /* an entry of the error table, of this level and segment */
+    ATH_FIELD_JOIN,          /* frames that a segment is joined over at a level, of this level and segment */
     ATH_FIELD_FRONT,         /* the end of its stream */
     ATH_FIELD_MEMORY,        /* bytes that a segment may take */
     ATH_FIELD_MISSING_CHUNK, /* a chunk that the table lacks: kind, level and segment say which */
@@ -385,7 +386,8 @@ typedef struct ath_range {
 } ath_range;
 
 /* Bytes that the segments first to last need for `level` and that have not been fed; with `all` those that have been,
- * too. Ascending, neighbours joined. Returns their number, of which at most `capacity` are written. */
+ * too; those of segments that they are joined to among them. Ascending, neighbours joined. Returns their number, of which
+ * at most `capacity` are written. */
 ATH_API int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
                            ath_range *ranges, int32_t capacity);
 
@@ -414,14 +416,27 @@ ATH_API size_t ath_work_size(const ath_file *file);
 ATH_API size_t ath_segment_size(const ath_file *file, int32_t level);
 
 /* Begins to prepare a segment at a level, once ath_build has run; the ath_work and the ath_segment are their memories.
- * Only bytes of this segment and of levels up to this one are read. ATH_OK, ATH_MISSING, ATH_NO_MEMORY,
- * ATH_BAD_ARGUMENT, ATH_NEEDS_HOST_MESH. */
+ * Only bytes of this segment, of the one that it is joined to, and of levels up to this one are read. ATH_OK, ATH_MISSING,
+ * ATH_NO_MEMORY, ATH_BAD_ARGUMENT, ATH_NEEDS_HOST_MESH. */
 ATH_API int ath_prepare_start(void *work, size_t work_bytes, const ath_file *file, int32_t segment, int32_t level,
                               void *memory, size_t memory_bytes);
 /* Goes on for `steps` steps, each a bounded piece of work: at most 64 vertices, or one matrix, over the segment's
  * frames. ATH_MORE until it is done: ATH_OK, and the segment can be played. ATH_BAD_CHECKSUM, ATH_BAD_CHUNK: it
  * cannot be, and further steps are an ATH_BAD_ARGUMENT. */
 ATH_API int ath_prepare_step(ath_work *work, int32_t steps);
+/* Segments may be joined to the one before them in their clip, the first of a loop to its last, so that motion does not
+ * tick where they meet. Such a segment takes the end of that one: the first steps decode it anew, ATH_MISSING where it lacks
+ * bytes, unless
+ *     ath_follow, between the call that begins the preparation and its first step, hands over the segment that it is joined
+ * to, prepared at the same level. It is read at once. ATH_BAD_ARGUMENT: it is not that; nothing has changed. ATH_OK, too, for
+ * a preparation that takes no end.
+ *     ath_joined_to: the segment that one is joined to at a level, -1: to none. */
+ATH_API int ath_follow(ath_work *work, const ath_segment *before);
+ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level);
+/* Over how many frames, 0: not at all; ATH_JOIN_SLOPED above that where velocities are joined, too: level_count x
+ * segment_count of them. */
+enum { ATH_JOIN_SLOPED = 128 };
+ATH_API const uint8_t *ath_joins(const ath_file *file);
 /* What the error of the preparation is about, and which bytes ATH_MISSING: of _start once it had its memory, of
  * _step. */
 ATH_API void ath_work_fault(const ath_work *work, ath_fault_info *fault);
@@ -442,7 +457,8 @@ ATH_API int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int
  * are until the last step, which comes after at most ath_prepare_steps; `from` can be played whatever comes of it.
  * ATH_BAD_ARGUMENT, too, where ath_goes_on says 0: `level` is no deeper than that of `from`, or `kept` is not of its
  * segment and level.
- *     ath_onward_ranges: ath_ranges without what only levels up to `from_level` need.
+ *     ath_onward_ranges: ath_ranges without what only levels up to `from_level` need, and of these segments alone: what
+ * the one that the first is joined to needs is left to ath_ranges, or to ath_follow.
  * ath_keep_size is 0 where nothing is to be kept: at levels that no other goes on from, and at the one before the
  * source's own numbers, which go on from the positions of `from`, and null for `kept`. */
 ATH_API size_t ath_keep_size(const ath_file *file, int32_t level);

@@ -252,18 +252,39 @@ static int read_errors(ath_coder *coder, const ath_header *header, double *error
             }
         }
     }
+    return ATH_OK;
+}
+
+static int read_joins(ath_coder *coder, const ath_header *header, uint8_t *joins, ath_fault_info *fault)
+{
+    join_model model;
+    join_model_init(&model);
+    for (int32_t level = 0; level < header->level_count; level++) {
+        int32_t width = -1;
+        for (uint32_t segment = 0; segment < header->segment_count; segment++) {
+            width = header->segment_count > 1 ? code_join(coder, &model, width, 0) : 0;
+            if (width < 0) {
+                ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
+                fault->level = (uint8_t)level;
+                fault->segment = segment;
+                return ATH_BAD_CHUNK_TABLE;
+            }
+            if (joins) *joins++ = (uint8_t)width;
+        }
+    }
     if (coder_finish(coder)) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_FRONT, 0, 0, 0);
 }
 
 int ath_read_tables(const uint8_t *bytes, size_t available, const ath_limits *limits, ath_header *header,
-                    uint64_t *needed, ath_chunk *chunks, double *errors, ath_fault_info *fault)
+                    uint64_t *needed, ath_chunk *chunks, double *errors, uint8_t *joins, ath_fault_info *fault)
 {
     ath_coder coder;
     const uint8_t *checksums = bytes + (header->front_length - (uint64_t)CHECKSUM_SIZE * header->chunk_count);
     start_stream(&coder, bytes, header);
     int result = read_chunks(&coder, checksums, limits, header, needed, chunks, fault);
     if (result == ATH_OK) result = read_errors(&coder, header, errors, fault);
+    if (result == ATH_OK) result = read_joins(&coder, header, joins, fault);
     return result != ATH_OK ? result : check_size(available, *needed, ATH_FIELD_PRELUDE_SIZE, fault);
 }
 

@@ -11,10 +11,11 @@
 static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
 
 int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *header, const ath_chunk *chunks,
-                         const int32_t *errors)
+                         const int32_t *errors, const uint8_t *joins)
 {
     ath_coder coder;
     chunk_model keys;
+    join_model widths;
     error_model table;
     ath_header counts = *header;
     int32_t first[ATH_MEASURES];
@@ -40,6 +41,10 @@ int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const ath_header *head
             errors += ATH_MEASURES;
         }
     }
+    join_model_init(&widths);
+    for (int32_t level = 0; header->segment_count > 1 && level < header->level_count; level++)
+        for (uint32_t segment = 0; segment < header->segment_count; segment++, joins++)
+            valid = valid && code_join(&coder, &widths, segment > 0 ? joins[-1] : -1, *joins) >= 0;
     return written(&coder, valid);
 }
 

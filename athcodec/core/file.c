@@ -54,6 +54,7 @@ static uint64_t carve(ath_file *file, const ath_header *header, uint8_t *base)
     ath_take(&arena, sizeof *file);
     file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
     file->errors = (double *)ath_take(&arena, entries * ATH_MEASURES * sizeof(double));
+    file->joins = (uint8_t *)ath_take(&arena, entries);
     file->clips = (ath_clip *)ath_take(&arena, clips * sizeof(ath_clip));
     file->names = (char *)ath_take(&arena, clips * NAME_BYTES);
     file->seams = (float *)ath_take(&arena, clips * (uint64_t)header->full_level_count * sizeof(float));
@@ -104,7 +105,7 @@ int ath_front(const uint8_t *bytes, size_t available, const ath_limits *limits, 
     uint64_t needed;
     why->code = ATH_OK;
     int result = ath_read_header(bytes, available, &chosen, &header, &needed, why), has_front = result == ATH_OK;
-    if (has_front) result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, why);
+    if (has_front) result = ath_read_tables(bytes, available, &chosen, &header, &needed, 0, 0, 0, why);
     *front_bytes = ath_size_or_most(needed);
     *memory_bytes = 0;
     if (needed > SIZE_MAX)
@@ -336,6 +337,25 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
+/* The segments of a clip differ by a frame at most: where the one has three, the one before has the two that this takes. */
+static int check_joins(ath_file *file, ath_fault_info *fault)
+{
+    int32_t segments = file->info.segment_count, lossy = ath_lossy_levels(file);
+    if (file->header.is_predicted) lossy = 1; /* what is predicted is not joined, the maps before it may be */
+    for (int32_t i = 0; i < file->info.level_count * segments; i++) {
+        int32_t level = i / segments, segment = i % segments, width = file->joins[i] % ATH_JOIN_SLOPED;
+        if (width == 0) continue;
+        int32_t before = ath_segment_before(file, segment);
+        file->has_joins = 1;
+        if (before >= 0 && level < lossy && width <= ath_file_frames(file, segment) - 2) continue;
+        ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_JOIN, 0, 0, 0);
+        fault->level = (uint8_t)level;
+        fault->segment = (uint32_t)segment;
+        return ATH_BAD_CHUNK_TABLE;
+    }
+    return ATH_OK;
+}
+
 static int has_source_rest(const ath_file *file)
 {
     return ath_find_chunk(file->chunks, file->header.chunk_count, ATH_SOURCE_REST, ATH_NO_LEVEL, 0) != 0;
@@ -481,6 +501,7 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
+    if ((result = check_joins(file, fault)) != ATH_OK) return result;
     plan_layers(file);
     if ((result = read_rest(file, fault)) != ATH_OK) return result;
     if ((result = read_time(file, fault)) != ATH_OK) return result;
@@ -501,7 +522,8 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     if (memory_bytes < carve(file, &header, 0)) return ath_refuse(fault, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     memset(file, 0, sizeof *file);
     carve(file, &header, (uint8_t *)file);
-    result = ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, fault);
+    result =
+        ath_read_tables(bytes, available, limits, &header, &needed, file->chunks, file->errors, file->joins, fault);
     file->header = header;
     set_info(file, needed);
     if (result == ATH_OK) result = check_least_memory(&header, limits, fault);
@@ -780,6 +802,8 @@ void ath_get_info(const ath_file *file, ath_info *info) { *info = file->info; }
 
 const double *ath_errors(const ath_file *file) { return file->errors; }
 
+const uint8_t *ath_joins(const ath_file *file) { return file->joins; }
+
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 
 const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
@@ -933,6 +957,24 @@ int32_t ath_file_frames(const ath_file *file, int32_t segment)
     return ath_segment_start(file, segment + 1) - ath_segment_start(file, segment);
 }
 
+int32_t ath_segment_before(const ath_file *file, int32_t segment)
+{
+    const ath_clip *clip = clip_at(file, offsetof(ath_clip, first_segment), segment);
+    if (segment > clip->first_segment) return segment - 1;
+    return clip->loop && clip->segment_count > 1 ? clip->first_segment + clip->segment_count - 1 : -1;
+}
+
+int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
+    return file->has_joins ? file->joins[shown * file->info.segment_count + segment] : 0;
+}
+
+int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t level)
+{
+    return ath_join_at(file, segment, level) > 0 ? ath_segment_before(file, segment) : -1;
+}
+
 int32_t ath_segment_of(const ath_file *file, int32_t frame)
 {
     const ath_clip *clip = ath_file_clip(file, frame);
@@ -1037,17 +1079,25 @@ void ath_drop(ath_file *file, uint64_t offset, uint64_t size)
         if (file->chunks[i].length > 0) file->chunks[i].bytes = 0;
 }
 
-/* Nothing where the chunk is null, empty, or there and not asked for. `end`: of the chunk written or counted last. */
-static void add_range(const ath_chunk *chunk, int all, uint64_t *end, ath_range *ranges, int32_t capacity,
-                      int32_t *count)
+/* Ranges in the making, of what is asked for. */
+typedef struct {
+    const ath_file *file;
+    int32_t level, all;
+    uint64_t end; /* of the chunk written or counted last */
+    ath_range *ranges;
+    int32_t capacity, count;
+} range_list;
+
+/* Nothing where the chunk is null, empty, or there and not asked for. */
+static void add_range(range_list *list, const ath_chunk *chunk, int all)
 {
     if (!chunk || chunk->length == 0 || (chunk->bytes && !all)) return;
-    int joined = *count > 0 && chunk->offset == *end;
-    *end = chunk->offset + chunk->length;
-    if (!joined) (*count)++;
-    if (*count > capacity) return;
-    if (!joined) ranges[*count - 1].offset = chunk->offset;
-    ranges[*count - 1].size = *end - ranges[*count - 1].offset;
+    int joined = list->count > 0 && chunk->offset == list->end;
+    list->end = chunk->offset + chunk->length;
+    if (!joined) list->count++;
+    if (list->count > list->capacity) return;
+    if (!joined) list->ranges[list->count - 1].offset = chunk->offset;
+    list->ranges[list->count - 1].size = list->end - list->ranges[list->count - 1].offset;
 }
 
 /* As ath_file_needs; not, unless `all` are asked for, of a rest pose that has been read. */
@@ -1057,43 +1107,71 @@ static int is_used(const ath_file *file, int32_t kind, int32_t d, int32_t level,
     return all || kind != ATH_REFINED_REST || !file->layers[ath_layer_of(file, d)].rest_known;
 }
 
-/* Looks at the chunks of these levels and segments alone: who asks for one segment after the other must not look at all
- * chunks for each. */
+/* Looks at the chunks of these segments alone: who asks for one segment after the other must not look at all chunks for
+ * each. only_end: what those joined to them need of them. */
+static void add_segments(range_list *list, int32_t d, int32_t first, int32_t last, int only_end)
+{
+    const ath_file *file = list->file;
+    uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first);
+    for (; i < file->header.chunk_count; i++) {
+        const ath_chunk *chunk = file->chunks + i;
+        if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last) break;
+        if (only_end && !ath_shapes_end(chunk->kind)) continue;
+        if (is_used(file, chunk->kind, d, list->level, list->all)) add_range(list, chunk, list->all);
+    }
+}
+
+/* What all segments share, where it does not stand with segments that are looked at. */
+static void add_shared(range_list *list, int32_t d)
+{
+    for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
+        if (ath_is_shared(kind) && is_used(list->file, kind, d, list->level, list->all))
+            add_range(list, ath_file_chunk(list->file, kind, d, 0), list->all);
+}
+
 int32_t ath_onward_ranges(const ath_file *file, int32_t from_level, int32_t level, int32_t first_segment,
                           int32_t last_segment, int all, ath_range *ranges, int32_t capacity)
 {
-    int32_t count = 0;
-    uint64_t end = 0;
+    range_list list = {file, level, all, 0, ranges, capacity, 0};
     for (int32_t d = from_level + 1; d <= level; d++) {
-        if (first_segment > 0) /* what all segments share stands with segment 0 */
-            for (int32_t kind = ATH_SHAPES; kind <= ATH_REFINED_REST; kind++)
-                if (ath_is_shared(kind) && is_used(file, kind, d, level, all))
-                    add_range(ath_file_chunk(file, kind, d, 0), all, &end, ranges, capacity, &count);
-        uint32_t i = ath_first_chunk(file->chunks, file->header.chunk_count, ATH_STEMS, d, (uint32_t)first_segment);
-        for (; i < file->header.chunk_count; i++) {
-            const ath_chunk *chunk = file->chunks + i;
-            if (!ath_is_motion(chunk) || chunk->level != d || (int32_t)chunk->segment > last_segment) break;
-            if (is_used(file, chunk->kind, d, level, all)) add_range(chunk, all, &end, ranges, capacity, &count);
-        }
+        if (first_segment > 0) add_shared(&list, d);
+        add_segments(&list, d, first_segment, last_segment, 0);
     }
-    return count;
+    return list.count;
 }
 
 int32_t ath_ranges(const ath_file *file, int32_t level, int32_t first_segment, int32_t last_segment, int all,
                    ath_range *ranges, int32_t capacity)
 {
-    return ath_onward_ranges(file, -1, level, first_segment, last_segment, all, ranges, capacity);
+    range_list list = {file, level, all, 0, ranges, capacity, 0};
+    const ath_clip *last = clip_at(file, offsetof(ath_clip, first_segment), last_segment);
+    int32_t of_loop = last->first_segment < first_segment ? -1 : ath_joined_to(file, last->first_segment, level);
+    int32_t before = ath_joined_to(file, first_segment, level);
+    if (before > first_segment) before = -1; /* a loop's */
+    for (int32_t d = 0; d <= level; d++) {
+        if (before != 0 && first_segment > 0) add_shared(&list, d);
+        if (before >= 0) add_segments(&list, d, before, before, 1);
+        add_segments(&list, d, first_segment, last_segment, 0);
+        if (of_loop > last_segment) add_segments(&list, d, of_loop, of_loop, 1);
+    }
+    return list.count;
 }
 
-static int is_ready(const ath_file *file, int32_t segment, int32_t level)
+static int has_chunks(const ath_file *file, int32_t segment, int32_t level, int only_end)
 {
     for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind++)
         for (int32_t d = 0; d <= level; d++) {
-            if (!is_used(file, kind, d, level, 0)) continue;
+            if (!is_used(file, kind, d, level, 0) || (only_end && !ath_shapes_end(kind))) continue;
             const ath_chunk *chunk = ath_file_chunk(file, kind, d, segment);
             if (chunk && !chunk->bytes) return 0;
         }
     return 1;
+}
+
+static int is_ready(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t before = ath_joined_to(file, segment, level);
+    return has_chunks(file, segment, level, 0) && (before < 0 || has_chunks(file, before, level, 1));
 }
 
 int32_t ath_ready_level(const ath_file *file, int32_t segment)

@@ -24,6 +24,7 @@ struct ath_file {
     ath_plan plan;
     ath_chunk *chunks;
     double *errors; /* level_count x segment_count x ATH_MEASURES */
+    uint8_t *joins; /* level_count x segment_count, see ath_joins */
     ath_clip *clips;
     char *names;  /* of the clips, NAME_BYTES each */
     float *seams; /* clip_count x full_level_count */
@@ -45,21 +46,29 @@ struct ath_file {
     double
         *waves[2][ATH_SEGMENT_FRAMES + 1]; /* of segments, periodic or not, of so many frames; null: there are none */
     uint64_t bases_count;
-    int32_t rest_known;                 /* 0 until the host gives it */
-    int32_t source_rest_known;          /* 0 until SOURCE_REST has been read */
-    int32_t first_layer;                /* 0 where level 1 has a rest pose of its own, else 1 */
-    int32_t rest_is_exact;              /* the reference pose is in the very numbers of source_rest */
-    int32_t longest;                    /* frames of the longest segment */
+    int32_t rest_known;        /* 0 until the host gives it */
+    int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
+    int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */
+    int32_t rest_is_exact;     /* the reference pose is in the very numbers of source_rest */
+    int32_t longest;           /* frames of the longest segment */
+    int32_t has_joins;
     uint32_t stems_levels;              /* bit d: level d has STEMS */
     uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of level d serve to show level L */
 };
 
 int32_t ath_file_frames(const ath_file *file, int32_t segment);
+/* The one before a segment in its clip; before the first of a loop of several its last; -1: none. */
+int32_t ath_segment_before(const ath_file *file, int32_t segment);
+/* How the positions that a level shows are joined: an entry of ath_joins. */
+int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t level);
 const ath_clip *ath_file_clip(const ath_file *file, int32_t frame);
 const double *ath_file_waves(const ath_file *file, int32_t segment);
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
 /* Kinds whose one chunk of a level stands with segment 0 and serves all segments. */
 ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind == ATH_REFINED_REST; }
+
+/* Kinds that the end of a segment depends on, as what is joined to it takes it. */
+ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && kind != ATH_EXACT; }
 
 /* Levels that are not the source's very numbers. */
 ATH_INLINE int32_t ath_lossy_levels(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }

@@ -160,6 +160,33 @@ static int code_errors(ath_coder *coder, error_model *model, int first_segment, 
     return 1;
 }
 
+typedef struct {
+    number_model change;
+    ath_context joined[3]; /* by whether the segment before is, 2: there is none */
+    ath_context sloped[2]; /* by whether the join coded last is */
+    int32_t last;          /* of the joins coded last; its width is not 0 */
+} join_model;
+
+static void join_model_init(join_model *model)
+{
+    number_model_init(&model->change);
+    for (int32_t i = 0; i < 3; i++) context_init(&model->joined[i], 32768);
+    for (int32_t i = 0; i < 2; i++) context_init(&model->sloped[i], 32768);
+    model->last = 16;
+}
+
+/* How a segment is joined to the one before it; `before`: how that one is, -1: it is the first. -1: what was decoded is no
+ * such number. */
+static int32_t code_join(ath_coder *coder, join_model *model, int32_t before, int32_t join)
+{
+    if (!coder_bit(coder, &model->joined[before < 0 ? 2 : before > 0], join > 0)) return 0;
+    int32_t width = model->last % ATH_JOIN_SLOPED, sloped = model->last >= ATH_JOIN_SLOPED;
+    sloped = coder_bit(coder, &model->sloped[sloped], join >= ATH_JOIN_SLOPED);
+    width += code_change(coder, &model->change, 64, join % ATH_JOIN_SLOPED - width);
+    model->last = width + ATH_JOIN_SLOPED * sloped;
+    return width > 0 && width < ATH_JOIN_SLOPED ? model->last : -1;
+}
+
 /* What the errors of the first level in the first segment are coded about. */
 static int32_t first_error(double max_error)
 {

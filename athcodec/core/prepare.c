@@ -9,7 +9,7 @@
 
 enum { CHECKSUM_STEP = 1 << 16, TILE = 8, MOST_SHAPES = ATH_SHAPE_NUMBERS };
 
-typedef enum { CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
+typedef enum { BEFORE, CHECKSUMS, HEADS, FRAMES, PIECES, DONE, FAILED } prepare_phase;
 
 typedef struct {
     ath_coder coder;
@@ -61,9 +61,31 @@ typedef struct {
     ath_piece_before before; /* the piece as the layer before has it */
 } layer_work;
 
+/* What is prepared, and from what. */
+typedef struct {
+    const ath_file *file;
+    void *memory; /* of the segment */
+    int32_t index, level;
+    const ath_segment *from; /* the same segment at an earlier level; null: none */
+    const void *kept;        /* of that; null: nothing */
+    kept_head *keeps;        /* what this preparation keeps, written at `keeping`; null: nothing */
+    kept_writer keeping;
+} preparation;
+
+/* How a segment goes on where the one before it ends. */
+typedef struct {
+    double *maps;                                           /* ATH_END_FRAMES x nodes x ATH_MAP: the end of that one */
+    void *positions;                                        /* ATH_END_FRAMES x exact vertices x 3: likewise */
+    int32_t width;                                          /* frames; 0: it does not */
+    double jumps[ATH_JOIN_SLOPED], slopes[ATH_JOIN_SLOPED]; /* what is left of either at each of them */
+} ath_join;
+
 struct ath_work {
     const ath_file *file;
     ath_segment *segment;
+    preparation asked;
+    ath_join join;
+    int32_t only_end; /* what is in preparation is the segment before the one asked for */
     shapes_reader shapes[ATH_LEVELS];
     stems_reader stems[ATH_LEVELS];
     affines_reader affines[ATH_LEVELS];
@@ -78,7 +100,7 @@ struct ath_work {
     prepare_phase phase;
     const ath_segment *shown_before; /* whose positions are those before make_exact; null: none */
     const uint8_t *kept;             /* what the next piece is restored from; null: it is decoded */
-    kept_head *keeps;                /* what this preparation keeps, written at `keeping`; null: nothing */
+    kept_head *keeps;                /* of `asked`, while that is in preparation */
     kept_writer keeping;
     int32_t index, level;       /* of the segment in preparation */
     int32_t first_level;        /* whose chunks are read: those before serve what was prepared before */
@@ -135,12 +157,23 @@ static void carve_layer(layer_work *layer, const ath_file *file, int32_t q, int3
         (double *)ath_take(arena, (uint64_t)file->plan.attach_cache_rows * 3 * T * sizeof(double));
 }
 
+static size_t number_size(const ath_file *file) { return file->info.is_float64 ? sizeof(double) : sizeof(float); }
+
+/* Of any level. */
+static void carve_end(ath_join *join, const ath_file *file, ath_arena *arena)
+{
+    uint64_t nodes = (uint64_t)file->plan.node_count, vertices = (uint64_t)file->plan.vertex_count;
+    join->maps = (double *)ath_take(arena, ATH_END_FRAMES * nodes * ATH_MAP * sizeof(double));
+    join->positions = ath_take(arena, ATH_END_FRAMES * vertices * 3 * number_size(file));
+}
+
 static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
     uint64_t row = 3 * (uint64_t)frames * sizeof(int32_t);
     uint32_t affines = levels_with_affines(file);
     ath_take(&arena, sizeof *work);
+    if (file->has_joins) carve_end(&work->join, file, &arena);
     for (int32_t d = 0; d < file->info.level_count; d++) {
         if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
         if (affines >> d & 1) {
@@ -162,7 +195,7 @@ static uint64_t carve(ath_work *work, const ath_file *file, int32_t frames, uint
 static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t T = (uint64_t)frames, number = file->info.is_float64 ? sizeof(double) : sizeof(float);
+    uint64_t T = (uint64_t)frames, number = number_size(file);
     segment->frames = frames;
     segment->is_float64 = file->info.is_float64;
     ath_cut_size(file, level, &segment->part_count, &segment->node_count, &segment->exact_vertices);
@@ -170,6 +203,8 @@ static uint64_t carve_segment(ath_segment *segment, const ath_file *file, int32_
     segment->parts = (ath_part *)ath_take(&arena, (uint64_t)segment->part_count * sizeof(ath_part));
     segment->maps = (double *)ath_take(&arena, T * (uint64_t)segment->node_count * ATH_MAP * sizeof(double));
     segment->positions = ath_take(&arena, T * (uint64_t)segment->exact_vertices * 3 * number);
+    if (file->has_joins)
+        segment->end = ath_take(&arena, ATH_END_FRAMES * (uint64_t)segment->exact_vertices * 3 * number);
     return arena.used;
 }
 
@@ -217,9 +252,10 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
     if (!can_be_kept(work->file, work->level)) return ATH_OK;
     head->segment = work->index;
     head->level = work->level;
-    work->keeps = head;
+    work->asked.keeps = work->keeps = head;
     work->keeping.at = (uint8_t *)(head + 1);
     work->keeping.end = (uint8_t *)memory + memory_bytes;
+    work->asked.keeping = work->keeping;
     return ATH_OK;
 }
 
@@ -303,7 +339,8 @@ static const ath_chunk *wanted_chunk(const ath_file *file, int32_t segment, int3
 
 static const ath_chunk *chunk_of(const ath_work *work, int32_t kind, int32_t d)
 {
-    return d >= work->first_level ? wanted_chunk(work->file, work->index, work->level, kind, d) : 0;
+    if (d < work->first_level || (work->only_end && !ath_shapes_end(kind))) return 0;
+    return wanted_chunk(work->file, work->index, work->level, kind, d);
 }
 
 static int32_t checksum_steps(const ath_chunk *chunk)
@@ -314,7 +351,7 @@ static int32_t checksum_steps(const ath_chunk *chunk)
 /* Rest poses have been read. */
 static int32_t kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED : kind + 1; }
 
-int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
+static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
 {
     int32_t checks = 0, heads = level + 2;
     for (int32_t d = 0; d <= level; d++)
@@ -324,6 +361,12 @@ int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
                               ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment))
                               : 0;
     return checks + heads + predictions + file->plan.piece_count + 1;
+}
+
+int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
+{
+    int32_t before = ath_joined_to(file, segment, level);
+    return steps_of(file, segment, level) + (before < 0 ? 0 : 1 + steps_of(file, before, level));
 }
 
 static int refuse(ath_work *work, int code, ath_field field, const ath_chunk *chunk, double found, double expected)
@@ -399,47 +442,124 @@ static void ready_motion(ath_work *work)
     }
 }
 
+/* Begins with a segment: the one asked for, or for its end the one before that. */
+static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
+{
+    const ath_file *file = asked->file;
+    ath_segment *segment = (ath_segment *)asked->memory;
+    int32_t frames = ath_file_frames(file, index);
+    ath_join join = work->join;
+    memset(work, 0, sizeof *work);
+    memset(segment, 0, sizeof *segment);
+    carve(work, file, frames, (uint8_t *)work);
+    carve_segment(segment, file, level, frames, (uint8_t *)segment);
+    segment->index = segment->level = -1;
+    segment->start = ath_segment_start(file, index);
+    work->file = file;
+    work->segment = segment;
+    work->asked = *asked;
+    work->only_end = index != asked->index;
+    work->index = index;
+    work->level = level;
+    work->next_kind = ATH_STEMS;
+    if (!work->only_end) {
+        join.maps = work->join.maps;
+        join.positions = work->join.positions;
+        work->join = join;
+        work->keeps = asked->keeps;
+        work->keeping = asked->keeping;
+    }
+    if (asked->from && !work->only_end) {
+        work->first_level = asked->from->level + 1;
+        work->first_layer = ath_layer_of(file, asked->from->level);
+        work->shown_before = asked->kept ? 0 : asked->from;
+        work->kept = (const uint8_t *)asked->kept;
+    }
+    ready_motion(work);
+    if (work->kept) restore_streams(work);
+    int result = find_chunks(work);
+    work->phase = result == ATH_OK ? CHECKSUMS : FAILED;
+    return result;
+}
+
+/* Hermite's polynomials: no jump is left where the join ends, and no jump of the slope. */
+static void set_join(ath_join *join, int32_t how)
+{
+    join->width = how % ATH_JOIN_SLOPED;
+    for (int32_t t = 0; t < join->width; t++) {
+        double w = (double)join->width, u = ((double)t + 0.5) / w;
+        join->jumps[t] = 1.0 - u * u * (3.0 - 2.0 * u);
+        join->slopes[t] = how >= ATH_JOIN_SLOPED ? w * u * (1.0 - u) * (1.0 - u) : 0.0;
+    }
+}
+
 /* `before` and `kept`: what was prepared before, null: nothing. */
 static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
                  void *segment_memory, size_t segment_bytes, const ath_segment *before, const void *kept)
 {
     ath_work *work = (ath_work *)memory;
-    ath_segment *segment = (ath_segment *)segment_memory;
+    preparation asked;
     if (index < 0 || index >= file->info.segment_count || level < 0 || level >= file->info.level_count)
         return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     if (!file->bases || !ath_level_plan(file, level)->bases || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, ath_segment_size(file, level)))
         return ATH_NO_MEMORY;
-    int32_t frames = ath_file_frames(file, index);
+    memset(&asked, 0, sizeof asked);
+    asked.file = file;
+    asked.memory = segment_memory;
+    asked.index = index;
+    asked.level = level;
+    asked.from = before;
+    asked.kept = kept;
     memset(work, 0, sizeof *work);
-    memset(segment, 0, sizeof *segment);
-    carve(work, file, frames, (uint8_t *)memory);
-    carve_segment(segment, file, level, frames, (uint8_t *)segment_memory);
-    segment->index = segment->level = -1;
-    segment->start = ath_segment_start(file, index);
-    work->file = file;
-    work->segment = segment;
-    work->index = index;
-    work->level = level;
-    work->next_kind = ATH_STEMS;
-    if (before) {
-        work->first_level = before->level + 1;
-        work->first_layer = ath_layer_of(file, before->level);
-        work->shown_before = kept ? 0 : before;
-        work->kept = (const uint8_t *)kept;
-    }
-    ready_motion(work);
-    if (kept) restore_streams(work);
-    int result = find_chunks(work);
-    work->phase = result == ATH_OK ? CHECKSUMS : FAILED;
-    return result;
+    int result = begin(work, &asked, index, level), join = ath_join_at(file, index, level);
+    if (result != ATH_OK || join == 0 || work->shown_before) return result; /* that is joined */
+    set_join(&work->join, join);
+    work->phase = BEFORE;
+    return ATH_OK;
 }
 
 int ath_prepare_start(void *memory, size_t work_bytes, const ath_file *file, int32_t index, int32_t level,
                       void *segment_memory, size_t segment_bytes)
 {
     return start(memory, work_bytes, file, index, level, segment_memory, segment_bytes, 0, 0);
+}
+
+/* The end of a prepared segment, for the one that is joined to it. */
+static void take_end(ath_join *join, const ath_segment *before)
+{
+    size_t maps = ATH_END_FRAMES * (size_t)before->node_count * ATH_MAP;
+    size_t all_maps = (size_t)before->frames * (size_t)before->node_count * ATH_MAP;
+    size_t number = before->is_float64 ? sizeof(double) : sizeof(float);
+    memcpy(join->maps, before->maps + (all_maps - maps), maps * sizeof(double));
+    memcpy(join->positions, before->end, ATH_END_FRAMES * 3 * (size_t)before->exact_vertices * number);
+}
+
+int ath_follow(ath_work *work, const ath_segment *before)
+{
+    if (work->phase != BEFORE) return ATH_OK;
+    if (before->index != ath_segment_before(work->file, work->index) || before->level != work->level)
+        return ATH_BAD_ARGUMENT;
+    take_end(&work->join, before);
+    work->phase = CHECKSUMS;
+    return ATH_OK;
+}
+
+/* The segment before is prepared in the memory of the one asked for. */
+static int go_back(ath_work *work)
+{
+    preparation asked = work->asked;
+    return begin(work, &asked, ath_segment_before(work->file, asked.index),
+                 ath_min(asked.level, ath_lossy_levels(work->file) - 1));
+}
+
+static int go_on(ath_work *work)
+{
+    preparation asked = work->asked;
+    take_end(&work->join, work->segment);
+    set_join(&work->join, ath_join_at(work->file, asked.index, asked.level));
+    return begin(work, &asked, asked.index, asked.level);
 }
 
 /* ---- steps ---- */
@@ -799,6 +919,73 @@ static int make_exact(ath_work *work, const ath_piece *piece)
     return ATH_OK;
 }
 
+/* Of frames of exact vertices, as many as the segment has. */
+static void *vertex_at(const ath_segment *segment, void *frames, size_t t, size_t vertex)
+{
+    size_t at = 3 * (t * (size_t)segment->exact_vertices + vertex);
+    return (uint8_t *)frames + at * (segment->is_float64 ? sizeof(double) : sizeof(float));
+}
+
+/* Keeps the end of the piece as it is placed. */
+static void keep_end(ath_work *work, const ath_piece *piece)
+{
+    ath_segment *segment = work->segment;
+    size_t vertex = (size_t)work->exact, frames = (size_t)segment->frames;
+    size_t size = 3 * (size_t)piece->count * number_size(work->file);
+    if (!segment->end || frames < ATH_END_FRAMES) return;
+    for (size_t t = 0; t < ATH_END_FRAMES; t++)
+        memcpy(vertex_at(segment, segment->end, t, vertex),
+               vertex_at(segment, segment->positions, frames - ATH_END_FRAMES + t, vertex), size);
+}
+
+/* How far numbers are off where the two that end the segment before go on to, in value and in slope, midway between that
+ * and their own first two. */
+ATH_INLINE void set_off(double start, double end, double first, double second, double off[2])
+{
+    off[0] = 0.5 * (3.0 * (end - first) - (start - second));
+    off[1] = (end - start) - (second - first);
+}
+
+ATH_INLINE double joined(const ath_join *join, int32_t t, double x, const double off[2])
+{
+    return x + (off[0] * join->jumps[t] + off[1] * join->slopes[t]);
+}
+
+ATH_HOT static void join_floats(const ath_join *join, const float *start, const float *end, float *x, size_t count,
+                                size_t frame_size)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    for (size_t i = 0; i < count; i++)
+        set_off((double)start[i], (double)end[i], (double)x[i], (double)x[frame_size + i], off[i]);
+    for (int32_t t = 0; t < join->width; t++, x += frame_size)
+        for (size_t i = 0; i < count; i++) x[i] = (float)joined(join, t, (double)x[i], off[i]);
+}
+
+static void join_doubles(const ath_join *join, const double *start, const double *end, double *x, size_t count,
+                         size_t frame_size)
+{
+    double off[3 * ATH_PIECE_VERTICES][2];
+    for (size_t i = 0; i < count; i++) set_off(start[i], end[i], x[i], x[frame_size + i], off[i]);
+    for (int32_t t = 0; t < join->width; t++, x += frame_size)
+        for (size_t i = 0; i < count; i++) x[i] = joined(join, t, x[i], off[i]);
+}
+
+static void join_piece(ath_work *work, const ath_piece *piece)
+{
+    ath_segment *segment = work->segment;
+    const ath_join *join = &work->join;
+    size_t vertex = (size_t)work->exact, count = 3 * (size_t)piece->count,
+           frame_size = 3 * (size_t)segment->exact_vertices;
+    const void *start = vertex_at(segment, join->positions, 0, vertex);
+    const void *end = vertex_at(segment, join->positions, 1, vertex);
+    if (segment->is_float64)
+        join_doubles(join, (const double *)start, (const double *)end, (double *)segment->positions + 3 * vertex, count,
+                     frame_size);
+    else
+        join_floats(join, (const float *)start, (const float *)end, (float *)segment->positions + 3 * vertex, count,
+                    frame_size);
+}
+
 /* The piece as the level before, the last lossy one, shows it. */
 static void copy_piece(ath_work *work, const ath_piece *piece)
 {
@@ -809,6 +996,9 @@ static void copy_piece(ath_work *work, const ath_piece *piece)
         memcpy((uint8_t *)work->segment->positions + at, (const uint8_t *)from->positions + at,
                (size_t)piece->count * row);
     }
+    for (size_t t = 0; from->end && t < ATH_END_FRAMES; t++)
+        memcpy(vertex_at(from, work->segment->end, t, (size_t)work->exact),
+               vertex_at(from, from->end, t, (size_t)work->exact), (size_t)piece->count * row);
 }
 
 static int do_frames(ath_work *work)
@@ -828,6 +1018,8 @@ static int place_piece(ath_work *work, int32_t p)
         if (refine_piece(work, q, p, &placed) != ATH_OK) return ATH_BAD_CHUNK;
     if (work->keeping.at) keep_piece(work, piece);
     store_piece(work, piece, placed);
+    keep_end(work, piece);
+    if (work->join.width > 0) join_piece(work, piece);
     if (work->corrections.chunk) correct_piece(work, piece);
     return ATH_OK;
 }
@@ -856,6 +1048,9 @@ static void show_node(ath_work *work, int32_t n)
         for (size_t k = 0; k < 9; k++) map[k] = layer->scratch.at.rotation[k * T + t];
         for (size_t k = 0; k < 3; k++) map[9 + k] = layer->scratch.at.point[k * T + t];
     }
+    if (work->join.width == 0) return;
+    const double *end = work->join.maps + (maps - segment->maps);
+    join_doubles(&work->join, end, end + nodes * ATH_MAP, maps, ATH_MAP, nodes * ATH_MAP);
 }
 
 static int read_node(ath_work *work, int32_t n)
@@ -884,6 +1079,7 @@ static int finish(ath_work *work)
     const corrections_reader *corrections = &work->corrections;
     for (int32_t d = 0; d <= work->level; d++)
         if (finish_level(work, d) != ATH_OK) return ATH_BAD_CHUNK;
+    if (work->only_end) return go_on(work);
     if (corrections->chunk && !coder_finish(&corrections->coder)) return blame(work, corrections->chunk, ATH_BAD_CHUNK);
     if (work->exact_level.chunk && !coder_finish(&work->exact_level.coder))
         return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
@@ -919,10 +1115,11 @@ int ath_prepare_step(ath_work *work, int32_t steps)
     int result = ATH_OK;
     if (work->phase == FAILED) return ATH_BAD_ARGUMENT;
     for (; steps > 0 && work->phase != DONE && result == ATH_OK; steps--)
-        result = work->phase == CHECKSUMS ? check_some(work)
-                 : work->phase == HEADS   ? open_level(work)
-                 : work->phase == FRAMES  ? do_frames(work)
-                                          : do_piece(work);
+        result = work->phase == BEFORE      ? go_back(work)
+                 : work->phase == CHECKSUMS ? check_some(work)
+                 : work->phase == HEADS     ? open_level(work)
+                 : work->phase == FRAMES    ? do_frames(work)
+                                            : do_piece(work);
     if (result != ATH_OK) work->phase = FAILED;
     return result != ATH_OK || work->phase == DONE ? result : ATH_MORE;
 }

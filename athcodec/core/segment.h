@@ -4,7 +4,8 @@
 
 #include "file.h"
 
-enum { ATH_MAP = 12 }; /* doubles of a map x = c + R (x0 - a): R row by row, c relative to the origin */
+enum { ATH_END_FRAMES = 2 }; /* of a segment, that the next one is joined to */
+enum { ATH_MAP = 12 };       /* doubles of a map x = c + R (x0 - a): R row by row, c relative to the origin */
 
 struct ath_segment {
     int32_t index, level; /* level -1: not prepared */
@@ -14,6 +15,7 @@ struct ath_segment {
     ath_part *parts;
     double *maps;    /* frames x node_count x ATH_MAP */
     void *positions; /* frames x exact_vertices x 3, float or (is_float64) double, absolute */
+    void *end;       /* ATH_END_FRAMES x exact_vertices x 3: the last ones, not corrected */
 };
 
 #endif

@@ -33,8 +33,8 @@ from athcodec.encoding.layers import (
     DEFAULT_LADDER,
     MOST_LAYERS,
     MOST_LEVELS,
+    CodedMotion,
     Layers,
-    code_segment,
     ladder_of,
     layer_chunks,
     layer_ratios,
@@ -114,11 +114,13 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, and (levels, 3) errors of stopping at each level."""
+    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) how each is
+    joined to the segment before."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]
     errors: np.ndarray
+    joins: np.ndarray
 
 
 def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
@@ -316,7 +318,8 @@ class EncodingJob:
         for segment, frames in typical_segments(self.source):
             first, stop = self.source.segments[segment]
             if segment not in decided.tried:
-                decided.tried[segment] = self._code(decided, segment, self.source.block(segment))
+                motion = self._motion(decided, segment, self.source.block(segment))
+                decided.tried[segment] = CodedSegment(segment, *motion.joined_to())
             coded = decided.tried[segment]
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
@@ -396,7 +399,7 @@ class EncodingJob:
         self._add_prelude(store, decided)
         for (level, kind), content in layer_chunks(layers).items():
             store.add(kind, content, level)
-        errors = self._add_motion(store, decided, coded)
+        errors, joins = self._add_motion(store, decided, coded)
         self._add_static(store)
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.clip_ranges)))
@@ -412,6 +415,7 @@ class EncodingJob:
             len(self.clip.clip_range_frames),
             len(layers.each),
             decided.choice.predicted is not None,
+            joins=joins,
         )
         return _Result(store, header, errors)
 
@@ -491,46 +495,84 @@ class EncodingJob:
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Some segments, coded a few at a time, while the next one is read."""
-
-        def code(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
-            index, blocks = taken
-            return self._code(decided, index, blocks.pop()) if blocks else decided.tried[index]
-
         source = decided.source
+        if len(source.segments) == 1 and decided.tried:
+            return iter(decided.tried.values())
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
-        items = ((index, [] if index in decided.tried else [source.block(index)]) for index in segments)
-        return pool.ordered(code, items, at_once)
 
-    def _code(self, decided: _Decided, index: int, block: np.ndarray) -> CodedSegment:
-        positions, exact = self._positions(block)
+        def read(some: Iterable[int]) -> Iterator[tuple[int, list[np.ndarray]]]:
+            return ((index, [source.block(index)]) for index in some)
+
+        def predict(taken: tuple[int, list[np.ndarray]]) -> CodedSegment:
+            positions, exact = self._positions(taken[1].pop())  # not held any longer
+            chunks, errors = code_predicted_segment(decided.prelude, decided.choice, positions, exact)
+            return CodedSegment(taken[0], chunks, errors, np.zeros(len(errors), int))
+
+        def code(taken: tuple[int, list[np.ndarray]]) -> tuple[int, CodedMotion, list[np.ndarray | None]]:
+            motion = self._motion(decided, taken[0], taken[1].pop())
+            return taken[0], motion, motion.ends() if len(source.segments) > 1 else []
+
+        def join(taken: tuple[int, CodedMotion, list[np.ndarray | None]]) -> CodedSegment:
+            index, motion, ends = taken
+            return CodedSegment(index, *motion.joined_to(ends))
+
         if decided.choice.predicted is not None:
-            return CodedSegment(index, *code_predicted_segment(decided.prelude, decided.choice, positions, exact))
-        whole_loop = decided.source.is_whole_loop(index)
-        return CodedSegment(
-            index, *code_segment(decided.prelude, decided.layers, self.segment_count, positions, exact, whole_loop)
-        )
+            return pool.ordered(predict, read(segments), at_once)
+        coded = pool.ordered(code, read(self._with_those_before(source, segments)), max(1, at_once - 1))
+        return pool.ordered(join, _beside_ends(source, coded, frozenset(segments)), 0)
+
+    def _motion(self, decided: _Decided, index: int, block: np.ndarray) -> CodedMotion:
+        positions, exact = self._positions(block)
+        layers = decided.layers.of_segment(decided.source.is_whole_loop(index))
+        return CodedMotion(decided.prelude, layers, self.segment_count, positions, exact)
+
+    @staticmethod
+    def _with_those_before(source: Source, segments: Sequence[int]) -> Iterator[int]:
+        """The segments, each right behind the one that it is joined to."""
+        last = None
+        for index in segments:
+            before = source.segment_before(index)
+            if before is not None and before != last:
+                yield before
+            yield index
+            last = index
 
     def _positions(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """What is coded of a block, and its own numbers where these are to come back."""
         return self.source.relative(block), self.source.exact(block) if self.options.lossless else None
 
-    def _add_motion(self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> np.ndarray:
-        """Returns (levels, segments, 3) errors. Raises ValueError unless each segment comes once."""
+    def _add_motion(
+        self, store: ct.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns (levels, segments, 3) errors and (levels, segments) joins. Raises ValueError unless each segment
+        comes once."""
         levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
-        errors = np.zeros((levels, count, len(MEASURES)))
+        errors, joins = np.zeros((levels, count, len(MEASURES))), np.zeros((levels, count), np.uint8)
         missing = set(range(count))
         for segment in coded:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
-            errors[:, segment.index] = segment.errors
+            errors[:, segment.index], joins[:, segment.index] = segment.errors, segment.joins
             for (level, kind), payload in segment.chunks.items():
                 store.add(kind, payload, level, segment.index)
             self.report("motion", 1 - len(missing) / count)
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
-        return errors
+        return errors, joins
+
+
+def _beside_ends(
+    source: Source, coded: Iterable[tuple[int, CodedMotion, list[np.ndarray | None]]], wanted: frozenset[int]
+) -> Iterator[tuple[int, CodedMotion, list[np.ndarray | None]]]:
+    """Those that are wanted, with the ends that they go on from in place of their own."""
+    last, last_ends = None, []
+    for index, motion, ends in coded:
+        before = source.segment_before(index)
+        if index in wanted and (before is None or before == last):
+            yield index, motion, [] if before is None else last_ends
+        last, last_ends = index, ends
 
 
 def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:

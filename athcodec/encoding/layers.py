@@ -8,8 +8,9 @@ it, motion, rest pose and learned modes. A refinement is coded about the positio
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +19,7 @@ from athcodec import container as ct
 from athcodec._native import MEASURES
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
+from athcodec.encoding.joins import END_FRAMES, CorrectionPrice, ErrorPrice, best_join, end_of, joined
 from athcodec.encoding.learned_modes import LearnedModes, nested
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.polygons import Mesh
@@ -267,6 +269,14 @@ class _TimeBases:
         return {stream: own}
 
 
+@dataclass(frozen=True)
+class _ShownLevel:
+    """The positions of a level before they are joined and corrected, and the layer that ends with it, if one does."""
+
+    pose: Callable[[], np.ndarray]
+    layer: Layer | None = None
+
+
 class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
@@ -278,7 +288,9 @@ class _SegmentCoder:
         self._bases = _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
-        self.decoded = self._uncorrected = np.empty(0)
+        self._shown: list[_ShownLevel] = []
+        self._decoded = np.empty(0)  # at the last level
+        self.joins = [0] * layers.level_count
 
     def first(self, layer: Layer) -> SegmentMotion:
         """The levels of the branch hierarchy."""
@@ -291,16 +303,19 @@ class _SegmentCoder:
         segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
-        self._keep_last_level_best(layer, plan.level_count - 1)
+        self._shown = [
+            _ShownLevel(partial(own.pose, level, self._origin, self._dtype)) for level, own in enumerate(shown)
+        ] + self._shown
+        self._keep_last_level_best(layer, plan.level_count - 1, self._shown[-1].pose())
         for level, nodes in enumerate(shown):
             if plan.has_affines(level):
                 self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
         return segment
 
-    def _keep_last_level_best(self, layer: Layer, level: int) -> None:
+    def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
         """More corrections where the exact stems are worse than the maps before them, as far as they are cheap."""
-        decoded, before = self._uncorrected, self.errors[level - 1][RMS]
-        most = len(self.chunks.get((level, ct.CORRECTIONS), b"")) + EVEN_SHARE * sum(map(len, self.chunks.values()))
+        before, known = self.errors[level - 1][RMS], len(self.chunks.get((level, ct.CORRECTIONS), b""))
+        most = known + EVEN_SHARE * (self._bytes_up_to(level) + known)
         for factor in TIGHTER_LIMITS:
             if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
                 break
@@ -308,10 +323,7 @@ class _SegmentCoder:
             corrected, chunk = self._corrected(decoded, tighter)
             if len(chunk) > most:
                 break
-            self.decoded = corrected
-            if chunk:
-                self.chunks[level, ct.CORRECTIONS] = chunk
-            self.errors[level] = self.error(self.decoded)
+            self.errors[level] = self._set_last(layer, level, corrected, chunk)
 
     def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
         """The segment as level 0 shows it, which may have a rest pose of its own."""
@@ -333,14 +345,69 @@ class _SegmentCoder:
 
     def _finish_with(self, segment: SegmentMotion, layer: Layer, level: int) -> None:
         """Corrections of the level that a layer ends with, and its errors."""
-        self._uncorrected = decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
+        decoded = self.pose(segment, layer.plan.level_count - 1)
+        self._shown.append(_ShownLevel(lambda: decoded, layer))
+        self.errors.append(self._finish_level(layer, level, decoded))
+
+    def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
         if layer.ratio == 1:
-            self.decoded, chunk = self._corrected(decoded, layer.settings)
-        else:
-            self.decoded, chunk = self._tightest(decoded, layer.settings)
+            return self._set_last(layer, level, *self._corrected(decoded, layer.settings))
+        return self._set_last(layer, level, *self._tightest(decoded, layer.settings, level))
+
+    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, chunk: bytes) -> tuple[float, ...]:
+        """The positions and the corrections of the level that a layer ends with; returns its errors."""
+        self.chunks.pop((level, ct.CORRECTIONS), None)
         if chunk:
             self.chunks[level, ct.CORRECTIONS] = chunk
-        self.errors.append(self.error(self.decoded))
+        if layer.ratio == 1:
+            self._decoded = decoded
+        return self.error(decoded)
+
+    def _bytes_up_to(self, level: int) -> int:
+        """Of this level and those before it, without its corrections."""
+        return sum(
+            len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
+        )
+
+    def ends(self) -> list[np.ndarray | None]:
+        """What each level of the segment behind this one goes on from."""
+        return [end_of(shown.pose()) for shown in self._shown]
+
+    def join(self, ends: Sequence[np.ndarray | None]) -> None:
+        """Lets the levels go on from the ends of the segment before, where they are better for it."""
+        source = self.positions + self._origin[:, None]
+        for level, (end, shown) in enumerate(zip(ends, self._shown)):
+            if end is None or self.positions.shape[2] <= END_FRAMES:
+                continue
+            positions, layer = shown.pose(), shown.layer
+            if layer is None:
+                price = ErrorPrice(positions, source, self.errors[level - 1][RMS] if level > 0 else math.inf)
+            else:
+                price = CorrectionPrice(layer.settings.limit, self._shared_bytes + self._bytes_up_to(level))
+            join = best_join(end, positions, source, price)
+            if join == 0:
+                continue
+            self.joins[level], positions = join, joined(end, positions, join)
+            if layer is None:
+                rounding = 2 * float(np.spacing(np.abs(positions).max()))  # of maps, which are what is joined
+                largest, p99, rms = self.error(positions)
+                self.errors[level] = largest + rounding, p99, rms + rounding
+            else:
+                self.errors[level] = self._finish_level(layer, level, positions)
+            if level == self._level_0.level_count - 1:
+                self._keep_last_level_best(layer, level, positions)
+
+    def coded(
+        self, exact: np.ndarray | None, largest_bound: float
+    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
+        """Chunks, (levels, 3) errors and (levels,) joins."""
+        if self.errors[-1][0] > largest_bound:
+            raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {largest_bound}")
+        if exact is None:
+            return self.chunks, np.array(self.errors), np.array(self.joins)
+        chunk = streams.encode_exact(self._decoded, exact)
+        exact_level = (len(self.errors), ct.EXACT)
+        return self.chunks | {exact_level: chunk}, np.array([*self.errors, (0.0,) * 3]), np.array([*self.joins, 0])
 
     def _corrected(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
         """Positions within the limit, and the corrections that bring them there."""
@@ -348,14 +415,14 @@ class _SegmentCoder:
         corrections, step = correct(decoded, self.positions, self._origin, settings, self._pool)
         return decoded, correction_chunk(corrections, step, decoded.shape)
 
-    def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
+    def _tightest(self, decoded: np.ndarray, settings: Settings, level: int) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
 
         def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
             corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
             return corrected if len(corrected[1]) <= share * bytes_ else None
 
-        bytes_ = self._shared_bytes + sum(map(len, self.chunks.values()))
+        bytes_ = self._shared_bytes + self._bytes_up_to(level)
         best, loosest, tightest = (decoded, b""), 0, len(CORRECTED_LIMITS)
         if named := within(1 / COARSER, NAMED_SHARE):
             best, loosest = named, sum(factor >= 1 / COARSER for factor in CORRECTED_LIMITS)
@@ -369,7 +436,11 @@ class _SegmentCoder:
 
     def error_at(self, shown: SegmentMotion, level: int) -> tuple[float, ...]:
         """Of a level without corrections."""
-        return self.error(shown.pose(level, self._origin, self._dtype))
+        return self.error(self.pose(shown, level))
+
+    def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
+        """As it is put out, neither joined nor corrected."""
+        return shown.pose(level, self._origin, self._dtype)
 
     def error(self, decoded: np.ndarray) -> tuple[float, ...]:
         return position_errors(decoded, self.positions, self._origin, self._pool)
@@ -428,29 +499,37 @@ class _EvenLevels:
         self._shown[level].analyse_nodes(self._coder.positions, self._steps, qz.DEAD_ZONE, level)
 
 
-def code_segment(
-    prelude: CodedPrelude,
-    layers: Layers,
-    segment_count: int,
-    positions: np.ndarray,
-    exact: np.ndarray | None = None,
-    whole_loop: bool = False,
-) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """Chunks {(level, kind): payload} of one of so many segments and (levels, 3) errors of stopping at each level.
+class CodedMotion:
+    """The motion of one segment in layers, all but how it goes on from the segment before it.
 
-    exact: the source's own numbers (see Source.exact), which one more level is to give. whole_loop: whether the segment
-    is all of a loop.
+    layers: with the settings of the segment (see Layers.of_segment). exact: the source's own numbers (see
+    Source.exact), which one more level is to give.
     """
-    layers = layers.of_segment(whole_loop)
-    coder, level = _SegmentCoder(prelude, layers, segment_count, positions), layers.level_0.level_count
-    segment = coder.first(layers.each[0])
-    for before, layer in pairwise(layers.each):
-        segment = coder.refine(layer, segment, round(before.ratio / layer.ratio), level)
-        level += 1
-    largest_bound = layers.each[-1].settings.largest_bound
-    if coder.errors[-1][0] > largest_bound:
-        raise AssertionError(f"decoded error {coder.errors[-1][0]} is beyond the bound {largest_bound}")
-    if exact is not None:
-        coder.chunks[level, ct.EXACT] = streams.encode_exact(coder.decoded, exact)
-        coder.errors.append((0.0, 0.0, 0.0))
-    return coder.chunks, np.array(coder.errors)
+
+    def __init__(
+        self,
+        prelude: CodedPrelude,
+        layers: Layers,
+        segment_count: int,
+        positions: np.ndarray,
+        exact: np.ndarray | None = None,
+    ):
+        coder = _SegmentCoder(prelude, layers, segment_count, positions)
+        self._coder: _SegmentCoder | None = coder
+        self._exact, self._largest_bound = exact, layers.each[-1].settings.largest_bound
+        segment = coder.first(layers.each[0])
+        for level, (before, layer) in enumerate(pairwise(layers.each), layers.level_0.level_count):
+            segment = coder.refine(layer, segment, round(before.ratio / layer.ratio), level)
+
+    def ends(self) -> list[np.ndarray | None]:
+        """What the levels of the next segment go on from."""
+        return self._coder.ends()
+
+    def joined_to(
+        self, ends: Sequence[np.ndarray | None] = ()
+    ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray]:
+        """Chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, and (levels,) how each is
+        joined to the ends of the segment before; there are none for the first of a clip. To be called once."""
+        coder, self._coder = self._coder, None  # which takes much memory
+        coder.join(ends)
+        return coder.coded(self._exact, self._largest_bound)

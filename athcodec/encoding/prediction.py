@@ -145,7 +145,7 @@ def _predicted(prelude: CodedPrelude, settings: Settings, positions: np.ndarray,
 def code_predicted_segment(
     prelude: CodedPrelude, choice: Choice, positions: np.ndarray, exact: np.ndarray | None = None
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray]:
-    """As layers.code_segment."""
+    """Chunks and errors as CodedMotion.joined_to gives them; predicted motion is not joined."""
     assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, settings, positions, choice.predicted)

@@ -114,6 +114,14 @@ class Source:
         """The first segment of each clip of the file."""
         return np.cumsum([0, *map(len, self.clip_range_segments[:-1])]).tolist()
 
+    def segment_before(self, segment: int) -> int | None:
+        """The one before it in its clip; before the first of a loop of several, the last."""
+        for i, (start, own) in enumerate(zip(self.clip_range_starts, self.clip_range_segments)):
+            if start == segment:
+                loop = len(own) > 1 and bool(self.clip.clip_ranges) and self.clip.clip_ranges[i].loop
+                return start + len(own) - 1 if loop else None
+        return segment - 1
+
     @cached_property
     def mesh(self) -> Mesh | None:
         """What rest poses may go by."""

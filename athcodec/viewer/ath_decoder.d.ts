@@ -176,8 +176,8 @@ export interface ByteRange {
   readonly size: number;
 }
 
-/** How a preparation goes on from another, and others from it: see prepare(). */
-export type GoingOn = { from?: Segment | null; keep?: boolean };
+/** How a preparation goes on from others, and others from it: see prepare(). */
+export type GoingOn = { from?: Segment | null; keep?: boolean; following?: Segment | null };
 
 /** A range of frames, decoded at one level. It holds its own memory: free() it, or let go of the whole
  * file. */
@@ -275,8 +275,8 @@ export class AthFile {
    * preparation. */
   drop(offset: number, size: number): void;
   /** Bytes that segments `first` to `last` (default: all) need for `level` and that are not here; with
-   * `all` those that are, too; without what only levels up to `after` (default: -1) need. Ascending, neighbours
-   * joined. */
+   * `all` those that are, too, those of segments that they are joined to among them; with `after` without what only
+   * levels up to that need, and of these segments alone. Ascending, neighbours joined. */
   ranges(level: number, first?: number, last?: number, all?: boolean, after?: number): ByteRange[];
   /** The deepest level that a segment can be prepared at with what is here; -1: none. */
   readyLevel(segment: number): number;
@@ -288,11 +288,15 @@ export class AthFile {
   levelFor(distance: number, fov: number, height: number, pixels: number, first?: number, last?: number,
            measure?: Measure): number;
 
+  /** The segment that one goes on from the end of at a level, so that motion does not tick where they meet; -1: none. */
+  joinedTo(segment: number, level: number): number;
   /** Decodes a segment at a level. Throws AthError: "MISSING", "BAD_CHECKSUM", "BAD_CHUNK", "NO_MEMORY".
    * keep: so that a level that refines this one can be prepared `from` it, in less time and without the bytes of the
    * levels up to its own; takes about a hundredth of the segment's memory. `from` is of no use where it is of another
    * segment, of a level below info.depthLevels - 1, or prepared without `keep`: then decoding starts anew. It can be
-   * shown whatever comes of it, and is freed after the preparation. */
+   * shown whatever comes of it, and is freed after the preparation.
+   * following: the segment that this one is joined to, prepared at the same level, so that its end is not decoded again;
+   * of no use where it is another. */
   prepare(segment: number, level: number, options?: GoingOn): Segment;
   /** The same, to be spread over frames. Throws AthError: "MISSING", "NO_MEMORY". */
   preparation(segment: number, level: number, options?: GoingOn): Preparation;

@@ -319,7 +319,7 @@ export class AthFile {
   #at = 0;                // the ath_file
   #chunks = [];           // as chunks() has them; `at`: a copy of their bytes, of which `filled` are there
   #pointers = new Map();  // of segments that are prepared: {at, kept}
-  #preparing = new Map(); // index of a segment: how many preparations of it are under way
+  #preparing = new Map(); // index of a segment: how many preparations that may read it are under way
   #works = [];            // ath_works that nobody uses
   #scratch = { at: 0, size: 0 };
   #cutSizes = [];
@@ -593,9 +593,11 @@ export class AthFile {
     this.#segment(first);
     this.#segment(last);
     whole(after, -1, level, "after");
-    const count = c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, 0, 0);
+    const list = (at, capacity) => (after < 0 ? c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, at, capacity)
+      : c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, at, capacity));
+    const count = list(0, 0);
     return this.#core.with(count * RANGE_SIZE, (at) => {
-      c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, at, count);
+      list(at, count);
       return Array.from({ length: count }, (_, i) => this.#core.struct(RANGE, at + i * RANGE_SIZE));
     });
   }
@@ -631,18 +633,25 @@ export class AthFile {
 
   // ---- preparing ----
 
-  preparation(segment, level, { from = null, keep = false } = {}) {
+  joinedTo(segment, level) {
+    return this.#c.ath_joined_to(this.#at, this.#segment(segment), this.#level(level));
+  }
+
+  preparation(segment, level, { from = null, keep = false, following = null } = {}) {
     const c = this.#c, core = this.#core;
     this.#segment(segment);
     this.#level(level);
     const workSize = c.ath_work_size(this.#at) >>> 0, size = c.ath_segment_size(this.#at, level) >>> 0;
     let before = this.#pointer(from) && from.index === segment ? this.#pointers.get(from) : null, at = 0, kept = 0;
     const work = this.#works.pop() ?? core.take(workSize);
+    const reads = [segment, this.joinedTo(segment, level)].filter((index) => index >= 0);
     const end = () => {
       this.#works.push(work);
-      const left = this.#preparing.get(segment) - 1;
-      if (left > 0) this.#preparing.set(segment, left);
-      else this.#preparing.delete(segment);
+      for (const index of reads) {
+        const left = this.#preparing.get(index) - 1;
+        if (left > 0) this.#preparing.set(index, left);
+        else this.#preparing.delete(index);
+      }
     };
     const fail = () => {
       end();
@@ -665,7 +674,7 @@ export class AthFile {
       end();
       return this.#prepared(segment, level, at, kept && core.shrunk(kept, this.#c.ath_kept_size(kept) >>> 0));
     };
-    this.#preparing.set(segment, (this.#preparing.get(segment) ?? 0) + 1);
+    for (const index of reads) this.#preparing.set(index, (this.#preparing.get(index) ?? 0) + 1);
     try {
       this.#refine(level);
       at = core.take(size);
@@ -679,6 +688,7 @@ export class AthFile {
       this.#check(code, `segment ${segment} at level ${level}`);
       const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, size >>> 1) : 0; // a hundredth is usual
       if (room >= 16) c.ath_keep(work, kept = core.take(room), room);
+      if (this.#pointer(following)) c.ath_follow(work, this.#pointers.get(following).at); // or decodes it anew
     } catch (error) {
       fail();
       throw error;

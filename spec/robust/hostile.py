@@ -143,7 +143,7 @@ def repaired(data: bytes) -> bytes:
         return data
     front, behind = with_checksum(data[:length]), data[length:]
     try:
-        _, chunks, _ = rd.read_front(front + behind, rd.Limits())
+        _, chunks, *_ = rd.read_front(front + behind, rd.Limits())
     except rd.AthError:
         return front + behind
     checksums = b"".join(struct.pack("<I", crc32c(data[c.offset : c.offset + c.length])) for c in chunks)
@@ -163,7 +163,8 @@ def header_field(data: bytes, change: tuple[str, float]) -> int:
     header = replace(parts.header, **{name: value})
     if header.level_count * header.segment_count > MOST_ENTRIES:
         return 0
-    errors = np.resize(parts.errors, (header.level_count, header.segment_count, 3))
+    shape = header.level_count, header.segment_count
+    errors, header.joins = np.resize(parts.errors, (*shape, 3)), np.resize(parts.header.joins, shape)
     return within_limits(Parts(header, errors, parts.chunks).file())
 
 

@@ -77,7 +77,7 @@ ath_chunk *fuzz_chunks(uint8_t *file, size_t size, uint32_t *count, uint32_t *ve
     repair_front(file, front);
     if (ath_read_header(file, size, &limits, &header, &needed, &fault) != ATH_OK) return NULL;
     ath_chunk *chunks = fuzz_memory(header.chunk_count * sizeof *chunks, 0);
-    int result = ath_read_tables(file, size, &limits, &header, &needed, chunks, NULL, &fault);
+    int result = ath_read_tables(file, size, &limits, &header, &needed, chunks, NULL, NULL, &fault);
     *count = header.chunk_count;
     *vertices = header.vertex_count;
     if (result == ATH_OK || result == ATH_MISSING) return chunks;

@@ -203,6 +203,7 @@ static int start(player *p, int32_t segment, int32_t level)
     refine(p, level);
     check(begin(p, segment, level, size), "preparing");
     keep(p, level);
+    if (p->playing) ath_follow(p->work, p->playing); /* if that is what it is joined to */
     p->steps = ath_prepare_steps(p->file, segment, level);
     return p->preparing = 1;
 }

@@ -353,7 +353,7 @@ export class Session {
   async #prepareInSteps(segment, level) {
     try {
       const from = this.#goingOnFrom = this.#before(segment, level);
-      const preparation = this.#file.preparation(segment, level, { from, keep: true });
+      const preparation = this.#file.preparation(segment, level, this.#known(segment, level, from));
       let start = performance.now();
       while (!preparation.step(STEPS)) {
         if (performance.now() - start < SLICE_MS) continue;
@@ -374,6 +374,12 @@ export class Session {
     let before = null;
     while (!before && level > 0) before = this.#prepared.get(`${index}/${--level}`);
     return before;
+  }
+
+  // What a preparation begins with: what it goes on from, and the segment that it is joined to, if that is decoded.
+  #known(index, level, from) {
+    const following = this.#prepared.get(`${this.#file.joinedTo(index, level)}/${level}`) ?? null;
+    return { from, keep: true, following };
   }
 
   #damaged(segment, level, error) {
@@ -446,7 +452,7 @@ export class Session {
   #now(index, level) {
     const there = this.#segment(index, level);
     if (there) return there;
-    const segment = this.#file.prepare(index, level, { from: this.#before(index, level), keep: true });
+    const segment = this.#file.prepare(index, level, this.#known(index, level, this.#before(index, level)));
     this.#keep(segment);
     return segment;
   }

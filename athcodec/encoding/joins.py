@@ -1,0 +1,102 @@
+"""Joins: what makes a decoded segment go on where the one before it ends (FORMAT.md, "Joins").
+
+A segment is coded on its own; where two meet, their errors have nothing to do with each other, and plants would tick.
+The decoder moves the first frames of the later one by what is left of the jump, and the encoder chooses over how many.
+Positions are vertex-major, (N, 3, T), as decoded, not corrected.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+END_FRAMES = 2  # of a segment, that the next one looks at
+WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)  # frames
+SLOPED = 128
+# Ticks, changes of velocity at a seam over those of a usual frame: up to the first nobody sees them, beyond the second
+# they weigh more.
+SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.45, 3.0
+ERROR_WORTH = 8.0  # ticks that an error twice as large weighs
+ORDER_WORTH = 400.0  # likewise, of one that is twice that of the level before
+BYTES_WORTH = 40.0  # likewise twice as many bytes
+CORRECTION_BYTES = 1.25  # that a correction takes
+
+
+def end_of(positions: np.ndarray) -> np.ndarray | None:
+    """(N, 3, END_FRAMES) that the segment behind goes on from; None: it is too short."""
+    return positions[:, :, -END_FRAMES:].copy() if positions.shape[2] > END_FRAMES else None
+
+
+def offsets(end: np.ndarray, positions: np.ndarray, join: int) -> np.ndarray:
+    """What a join adds to its frames, (N, 3, width) float64."""
+    start, last = (end[:, :, i].astype(np.float64) for i in range(END_FRAMES))
+    first, second = (positions[:, :, i].astype(np.float64) for i in range(2))
+    jump, slope = 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
+    width, is_sloped = join % SLOPED, join >= SLOPED
+    u = (np.arange(width) + 0.5) / width if width else np.empty(0)
+    slopes = width * u * (1.0 - u) * (1.0 - u) if is_sloped else np.zeros(width)
+    return jump[:, :, None] * (1.0 - u * u * (3.0 - 2.0 * u)) + slope[:, :, None] * slopes
+
+
+def joined(end: np.ndarray, positions: np.ndarray, join: int) -> np.ndarray:
+    """The positions as a decoder joins them, bit for bit but where maps of nodes make them."""
+    result, width = positions.copy(), join % SLOPED
+    result[:, :, :width] = positions[:, :, :width] + offsets(end, positions, join)
+    return result
+
+
+class ErrorPrice:
+    """What a larger error costs a level without corrections, in ticks; most_rms: that of the level before."""
+
+    def __init__(self, positions: np.ndarray, source: np.ndarray, most_rms: float):
+        self._squares, self._most_rms = float(_squares(positions - source).sum()), most_rms
+        self._count = positions.shape[0] * positions.shape[2]
+
+    def __call__(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Of squared errors in some frames, (N, frames), that become others."""
+        if self._squares == 0:
+            return 0.0
+        squares = self._squares + float(after.sum() - before.sum())
+        rms, own_rms = ((max(total, 0.0) / self._count) ** 0.5 for total in (squares, self._squares))
+        beyond = max(0.0, rms / self._most_rms - 1.0) if self._most_rms > 0 else 0.0
+        return ERROR_WORTH * max(0.0, rms / own_rms - 1.0) + ORDER_WORTH * beyond
+
+
+class CorrectionPrice:
+    """What is beyond a limit, one or (N,), costs in corrections, in ticks; bytes_: of the file up to the level."""
+
+    def __init__(self, limit: float | np.ndarray, bytes_: float):
+        self._squared_limit, self._bytes = np.reshape(np.square(limit), (-1, 1)), bytes_
+
+    def __call__(self, before: np.ndarray, after: np.ndarray) -> float:
+        """As ErrorPrice."""
+        known, now = ((squares > self._squared_limit).sum(dtype=int) for squares in (before, after))
+        return BYTES_WORTH * max(0.0, CORRECTION_BYTES * (now - known) / self._bytes)
+
+
+def _squares(away: np.ndarray) -> np.ndarray:
+    """Of the lengths of vectors, (N, frames)."""
+    return np.einsum("nkt,nkt->nt", away, away, dtype=np.float64)
+
+
+def _changes(positions: np.ndarray) -> np.ndarray:
+    """RMS over vertices of the change of velocity at each frame but the first and the last."""
+    return np.sqrt(_squares(np.diff(positions.astype(np.float64), 2, axis=2)).mean(axis=0))
+
+
+def best_join(end: np.ndarray, positions: np.ndarray, source: np.ndarray, price: ErrorPrice | CorrectionPrice) -> int:
+    """How to join a level of a segment to the end of the one before: over how many frames, SLOPED above that where
+    slopes are joined too; 0: not at all. source: (N, 3, T) what is coded, in the coordinates of the positions."""
+    usual = float(np.median(_changes(positions)))
+
+    def cost(join: int) -> float:
+        width = join % SLOPED
+        own, aim = positions[:, :, :width], source[:, :, :width]
+        moved = own + offsets(end, positions, join)
+        shown = np.concatenate([end, moved, positions[:, :, width : width + 2]], axis=2)
+        tick = float(_changes(shown).max()) / usual if usual > 0 else 0.0
+        return (
+            max(tick, SMOOTH) + ROUGH_WORTH * max(0.0, tick - ROUGH) + price(_squares(own - aim), _squares(moved - aim))
+        )
+
+    widths = [width for width in WIDTHS if width <= positions.shape[2] - END_FRAMES]
+    return min([0, *widths, *(SLOPED + width for width in widths)], key=cost)

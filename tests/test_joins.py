@@ -1,0 +1,147 @@
+"""Segments that go on from the end of the one before them: no tick where they meet, in any way of decoding."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from files import Parts
+from plants import plant
+
+import athcodec
+from athcodec.encoding import encoder
+from athcodec.joining import looped
+from athcodec.sources import read_hdf5, sample_path
+
+SEGMENT = 40
+LADDERS = {"one layer": "none", "layers": "decades"}
+
+
+def changes(positions: np.ndarray) -> np.ndarray:
+    """RMS over vertices of the change of velocity at each frame but the first and the last."""
+    second = np.diff(positions.astype(np.float64), 2, axis=0)
+    return np.sqrt((second**2).sum(axis=2).mean(axis=1))
+
+
+def tick(positions: np.ndarray, seams: list[int]) -> float:
+    """The largest change of velocity within two frames of a seam over the usual one."""
+    found = changes(positions)
+    return max(float(found[seam - 3 : seam + 2].max()) for seam in seams) / float(np.median(found))
+
+
+def without_joins(data: bytes) -> athcodec.Decoder:
+    parts = Parts.of(data)
+    parts.header.joins = None
+    return athcodec.open(io.BytesIO(parts.file()))
+
+
+@pytest.fixture(scope="module", params=LADDERS.values(), ids=LADDERS.keys())
+def coded(request, tmp_path_factory) -> bytes:
+    path = tmp_path_factory.mktemp("joins") / "sample.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, path, rel_error=1e-3, segment_frames=SEGMENT, ladder=request.param, effort="fast")
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory) -> bytes:
+    """Of three segments."""
+    path = tmp_path_factory.mktemp("joins") / "loop.ath"
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(looped(clip, blend=12), path, rel_error=1e-3, segment_frames=SEGMENT, effort="fast")
+    return path.read_bytes()
+
+
+def test_levels_without_corrections_hardly_tick_where_segments_meet(coded):
+    with athcodec.open(io.BytesIO(coded)) as decoder, without_joins(coded) as bare:
+        seams = [start for start, _ in decoder.segments[1:]]
+        for level in range(decoder.file.core.info.depth_levels - 1):
+            before, after = tick(bare.positions(level=level), seams), tick(decoder.positions(level=level), seams)
+            assert after < 3.5 and after < 0.5 * before
+
+
+def test_a_loop_does_not_tick_where_it_begins_again(loop):
+    with athcodec.open(io.BytesIO(loop)) as decoder, without_joins(loop) as bare:
+        for level in range(3):
+            once, alone = decoder.positions(level=level), bare.positions(level=level)
+            twice, twice_alone = np.concatenate([once, once]), np.concatenate([alone, alone])
+            assert tick(twice, [len(once)]) < 5.0 and tick(twice, [len(once)]) < 0.5 * tick(twice_alone, [len(once)])
+
+
+def test_the_bound_holds_for_what_is_joined(coded, sample_positions):
+    with athcodec.open(io.BytesIO(coded)) as decoder:
+        assert decoder.file.joins[:, 1:].any(axis=1).all() and not decoder.file.joins[:, 0].any()
+        for level in decoder.levels:
+            away = np.linalg.norm(decoder.positions(level=level.level, dtype=np.float64) - sample_positions, axis=2)
+            assert away.max() <= level.max_error
+        assert away.max() <= decoder.max_error_bound
+
+
+def test_a_frame_is_the_same_however_one_comes_to_it(coded):
+    assert_the_same_however_one_comes_to_it(coded)
+
+
+def test_a_frame_of_a_loop_is_the_same_however_one_comes_to_it(loop):
+    assert_the_same_however_one_comes_to_it(loop)
+
+
+def assert_the_same_however_one_comes_to_it(data: bytes) -> None:
+    with athcodec.open(io.BytesIO(data)) as decoder:
+        for level in range(decoder.level_count):
+            forwards = decoder.positions(level=level)
+            for start, stop in reversed(decoder.segments):
+                assert np.array_equal(decoder.positions(stop - 1, level), forwards[stop - 1])
+                with athcodec.open(io.BytesIO(data)) as other:
+                    assert np.array_equal(other.positions(slice(start, stop), level), forwards[start:stop])
+
+
+def test_a_segment_goes_on_from_one_alone(coded):
+    """What the segments before that are does not matter."""
+    parts = Parts.of(coded)
+    with athcodec.open(io.BytesIO(coded)) as decoder:
+        start, stop = decoder.segments[2]
+        expected = decoder.positions(slice(start, stop))
+        first = {(c.kind, c.level): data for c, data in parts.chunks if c.is_motion and c.segment == 1}
+    chunks = [(c, first.get((c.kind, c.level), data) if c.segment == 0 else data) for c, data in parts.chunks]
+    with athcodec.open(io.BytesIO(parts.with_chunks(chunks))) as other:
+        assert np.array_equal(other.positions(slice(start, stop)), expected)
+
+
+def test_segments_coded_apart_are_those_of_one_run(tmp_path):
+    """A process that codes some of the segments joins them to ones that it does not hand over."""
+    with read_hdf5(sample_path()) as clip:
+        options = {"rel_error": 1e-3, "segment_frames": SEGMENT, "ladder": "none", "effort": "fast"}
+        athcodec.encode(clip, tmp_path / "whole.ath", **options)
+        draft = encoder.draft(clip, **options)
+        apart = [own for s in (2, 0, 1) for own in encoder.code_segments(clip, draft, [s])]
+        encoder.write(clip, draft, apart, tmp_path / "apart.ath")
+    assert (tmp_path / "apart.ath").read_bytes() == (tmp_path / "whole.ath").read_bytes()
+
+
+@pytest.mark.parametrize("frames", [17, 33, 50])
+def test_short_segments_keep_the_bound(frames, tmp_path):
+    clip = plant(frames, frames=frames)
+    athcodec.encode(clip, tmp_path / "short.ath", rel_error=1e-4, segment_frames=16, effort="fast")
+    with athcodec.open(tmp_path / "short.ath") as decoder:
+        away = np.linalg.norm(decoder.positions() - clip.block(0, frames), axis=2)
+        assert away.max() <= decoder.max_error_bound
+
+
+def test_a_clip_of_one_segment_has_no_joins(tmp_path):
+    with read_hdf5(sample_path()) as clip:
+        athcodec.encode(clip, tmp_path / "one.ath", rel_error=1e-3, effort="fast")
+    with athcodec.open(tmp_path / "one.ath") as decoder:
+        assert len(decoder.segments) == 1 and not decoder.file.joins.any()
+
+
+def test_the_end_of_a_segment_is_part_of_what_the_next_one_needs(coded):
+    """A file cut off inside the second segment of a level shows neither that nor the third at the level."""
+    with athcodec.open(io.BytesIO(coded)) as decoder:
+        level = decoder.level_count - 1
+        core = decoder.file.core
+        assert core.joined_to(2, level) == 1 and core.joined_to(0, level) == -1
+        of_second = {(c.offset, c.length) for c in decoder.file.chunks if c.level == level and c.segment == 1}
+        stems = min(of_second)
+        assert any(offset <= stems[0] < offset + size for offset, size in core.missing(level, 2))
+        assert not any(offset <= stems[0] < offset + size for offset, size in core.missing_of(2, level))
