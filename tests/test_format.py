@@ -452,7 +452,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     branches, rest = prelude_by_document(spec, parts.header, chunks)
     plan = spec.make_plan(branches, rest.rest)
     motion = spec.decode_motion(chunks, plan, 0, parts.header.frame_count, False, level - 1)
-    before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1))
+    before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1)[0])
     added, step = [], 2.0**-9
     if refines_rest:
         arguments = branches, step, rest, spec.content(chunks, container.REST)[0] & 8 != 0
