@@ -23,7 +23,7 @@ SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 MEASURES = "max", "p99", "rms"
 """ath_measure, in its order."""
 
-BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
+BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth detail".split()])
 PIECE = np.dtype(
     [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
     + [(name, "<i4") for name in "first count parent attach branch flags rank level low_level low_modes".split()]
@@ -203,7 +203,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_encode_rest": (
         c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 5],
+        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 6],
     ),
     "ath_encode_refined_shapes": (
         c_int64,
@@ -221,10 +221,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
             c_int32,
         ],
     ),
-    "ath_encode_source_rest": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p, c_void_p, c_void_p],
-    ),
+    "ath_encode_source_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, *[c_void_p] * 5]),
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),

@@ -622,6 +622,7 @@ class Branch:
     attach: int = -1  # the vertex it hangs on
     subtree: int = 1  # branches in it
     last_place: int = 0  # where on this stem the last child so far hangs
+    detail: int = 0
 
 
 PLACES = 256  # of a stem, whose numbers are expected from those of other stems
@@ -632,6 +633,7 @@ def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
     coder = RangeDecoder(stream)
     branches = decode_branches(coder, branch_count, vertex_count)
     decode_attaches(coder, branches)
+    decode_details(coder, branches)
     branch_source = decode_numbers(coder, [(0, branch_count)], branch_count)
     stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
     for b in sorted(range(branch_count), key=lambda b: branch_source[b]):
@@ -685,6 +687,16 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         branch.attach = parent.first + place
         parent.last_place = place
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
+
+
+def decode_details(coder: RangeDecoder, branches: list[Branch]) -> None:
+    any_detail, details, last = coder.bit(Context(32768)), NumberModel(), [0] * 16
+    for branch in branches:
+        c = min(branch.lag, 15)
+        if any_detail:
+            last[c] += code_signed(coder, details, 0)
+        require(0 <= last[c] <= 255, "a Detail is out of range")
+        branch.detail = last[c]
 
 
 def decode_numbers(coder: RangeDecoder, runs: list, total: int) -> list[int]:
@@ -756,7 +768,7 @@ class RestLayer:
 
 
 def decode_rest(
-    stream: bytes, branches: list[Branch], step: float, before: RestLayer | None = None, is_adaptive: bool = False
+    stream: bytes, branches: list[Branch], usual_step: float, before: RestLayer | None = None, is_adaptive: bool = False
 ) -> RestLayer:
     """Coded rest poses: beams (Lag 0) by the modes of a cantilever, other stems vertex by vertex; of a refinement,
     about the rest pose of the layer before."""
@@ -765,12 +777,14 @@ def decode_rest(
     mean = [[64, 64, 64], [64, 64, 64]]
     rest: list[list[float]] = []
     all_steps: list[list[int]] = []
-    adaptive = AdaptiveRest()
+    adaptive = AdaptiveRest(), AdaptiveRest()  # of branches without detail, and with it
     for branch in branches:
+        step = rest_step(branch, usual_step)
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
             if is_adaptive:
-                point, steps = decode_adaptive_vertex(coder, adaptive, branch, i, 0.625 * step, rest, before)
+                model = adaptive[branch.detail > 0]
+                point, steps = decode_adaptive_vertex(coder, model, branch, i, 0.625 * step, rest, before)
                 rest.append(point)
                 all_steps.append(steps)
                 continue
@@ -834,6 +848,11 @@ def decode_refined_run(
         coarse[k][:n] = numbers[k * n : k * n + n]
         predicted[k][:n] = [steps_in(total, step) if known != 0 else 0 for total, known in zip(sums, coarse[k])]
     return decode_refined_row(coder, model, n, 0, predicted, 1, magnitudes(coarse)).row
+
+
+def rest_step(branch: Branch, step: float) -> float:
+    most = half_octave(branch.detail - 128) if branch.detail > 0 else step
+    return most if most < step else step
 
 
 def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
@@ -1024,7 +1043,7 @@ class BentPose:
 
     def __init__(self, stream: bytes, branches: list[Branch], step: float, reference: np.ndarray):
         self.coder, self.rows, self.numbers = RangeDecoder(stream), CoefficientModel(), NumberModel()
-        self.mean, self.step = [64, 64, 64], step
+        self.mean, self.step = [64, 64, 64], step  # that of the branch at hand
         self.reference, self.rest = reference[:, :, None], np.zeros((*reference.shape, 1))
         turns: list[np.ndarray] = []  # of the branches
         for branch in branches:
@@ -1033,6 +1052,7 @@ class BentPose:
                 parent = branches[branch.parent]
                 last = parent.first + parent.count - 1
                 turn = self._turn_at(parent, branch.attach, last, turns[branch.parent])
+            self.step = rest_step(branch, step)
             turns.append(self._beam(branch, turn) if branch.lag == 0 else self._sheet(branch, turn))
         self.coder.finish()
 

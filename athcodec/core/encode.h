@@ -120,15 +120,16 @@ ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const 
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* slack: how far from its place a vertex may be put to save bits, where `adaptive`. */
+/* slack: how far from its place a vertex may be put to save bits, where `adaptive`; moved: scratch, as large as the
+ * source. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                         int32_t branch_count, double step, int adaptive, double slack,
                                         const int32_t *coarse, const double *before, int32_t *steps,
-                                        const double *source, double *rest);
+                                        const double *source, double *moved, double *rest);
 /* turns: scratch, branch_count x 9. */
 ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                                int32_t branch_count, double step, const double *reference,
-                                               const double *source, double *turns, double *rest);
+                                               const double *source, double *moved, double *turns, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                               int32_t branch_count, int is_float64, const double *rest);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,

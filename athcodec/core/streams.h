@@ -11,7 +11,7 @@
 
 /* ---- hierarchy ---- */
 
-enum { PLACES = 256 };
+enum { PLACES = 256, MOST_DETAIL = 255, WHOLE_DETAIL = 128 /* of step 1 */ };
 
 /* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
  * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
@@ -24,7 +24,8 @@ typedef struct {
 } permutation_model;
 
 typedef struct {
-    number_model up, count, attach, lag;
+    number_model up, count, attach, lag, detail;
+    ath_context detailed;
     permutation_model branch_source, vertex_source;
     ath_context flag[3][2];
 } hierarchy_model;
@@ -46,6 +47,8 @@ static void hierarchy_model_init(hierarchy_model *model)
     number_model_init(&model->count);
     number_model_init(&model->attach);
     number_model_init(&model->lag);
+    number_model_init(&model->detail);
+    context_init(&model->detailed, 32768);
     permutation_model_init(&model->branch_source);
     permutation_model_init(&model->vertex_source);
     for (int32_t i = 0; i < 3; i++)
@@ -78,7 +81,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0};
+    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
@@ -192,6 +195,21 @@ static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_bra
     return 1;
 }
 
+/* Of branches, each expected to be that of the last one of such a lag. */
+static int code_details(ath_coder *coder, hierarchy_model *model, int32_t branch_count, ath_branch *branches)
+{
+    int32_t any = 0, last[16] = {0};
+    for (int32_t b = 0; ENCODING && b < branch_count; b++) any |= branches[b].detail != 0;
+    any = coder_bit(coder, &model->detailed, any);
+    for (int32_t b = 0; b < branch_count; b++) {
+        int32_t *expected = last + ath_min(branches[b].lag, 15);
+        if (any) *expected += code_signed(coder, &model->detail, 0, branches[b].detail - *expected);
+        if (*expected < 0 || *expected > MOST_DETAIL) return 0;
+        branches[b].detail = *expected;
+    }
+    return 1;
+}
+
 static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t branch_count, int32_t vertex_count,
                           ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
@@ -211,7 +229,8 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
         else if (!code_attach(coder, model, branches, b, &mean_attach))
             return 0;
     }
-    return code_branch_numbers(coder, model, branch_count, branch_source)
+    return code_details(coder, model, branch_count, branches)
+           && code_branch_numbers(coder, model, branch_count, branch_source)
            && code_vertex_numbers(coder, model, branches, branch_count, vertex_count, branch_source, vertex_source);
 }
 
@@ -228,7 +247,9 @@ typedef struct {
     const double *before;
     int32_t *steps; /* filled for the next layer; may be null */
     int adaptive;
-    double slack; /* an encoder's: how far from its place it may put a vertex to save bits */
+    /* An encoder's: how far from its place it may put a vertex to save bits; a copy of the source's pose, in which what
+     * has detail goes along with what it hangs on. */
+    double slack, *moved;
 } rest_layer;
 
 typedef struct {
@@ -243,8 +264,10 @@ typedef struct {
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
-    number_model lattice[3]; /* the first axis; others where that is even, and where it is odd */
-    rest_predictor predictor;
+    struct {
+        number_model lattice[3]; /* the first axis; others where that is even, and where it is odd */
+        rest_predictor predictor;
+    } adaptive[2]; /* of branches without detail, and with it */
 } rest_model;
 
 static void rest_model_init(rest_model *model, int is_refinement)
@@ -258,8 +281,15 @@ static void rest_model_init(rest_model *model, int is_refinement)
     else
         coefficient_model_init(&model->modes, REST_RUN, model->history);
     memset(model->made, 0, sizeof model->made);
-    for (int32_t i = 0; i < 3; i++) number_model_init(&model->lattice[i]);
-    rest_predictor_init(&model->predictor);
+    for (int32_t i = 0; i < 6; i++) number_model_init(&model->adaptive[i / 3].lattice[i % 3]);
+    for (int32_t i = 0; i < 2; i++) rest_predictor_init(&model->adaptive[i].predictor);
+}
+
+/* The step of a branch's rest pose, where `step` is that of others. */
+static double rest_step(const ath_branch *branch, double step)
+{
+    double most = branch->detail > 0 ? ath_node_step(branch->detail - WHOLE_DETAIL) : step;
+    return most < step ? most : step;
 }
 
 /* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
@@ -320,22 +350,22 @@ static void nearest_of_lattice(const double units[3], double slack, const uint32
 #endif
 
 /* A point of the body-centred cubic lattice: three integers, all even or all odd. */
-static void code_lattice_point(ath_coder *coder, rest_model *model, const rest_memory *phase, int32_t integers[3])
+static void code_lattice_point(ath_coder *coder, number_model lattice[3], const rest_memory *all,
+                               const rest_memory *phase, int32_t integers[3])
 {
-    const uint32_t *mean = model->predictor.all.mean, *own = phase->mean;
+    const uint32_t *mean = all->mean, *own = phase->mean;
     for (int32_t k = 0; k < 3; k++) {
         int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
                         / 2;
         int32_t half = ath_max(about - 2, 0), odd = integers[0] & 1;
         if (k == 0) {
-            integers[0] = code_signed_in_class(coder, &model->lattice[0], about, integers[0]);
+            integers[0] = code_signed_in_class(coder, &lattice[0], about, integers[0]);
         } else if (!odd) {
-            integers[k] = 2 * code_signed_in_class(coder, &model->lattice[1], half, integers[k] / 2);
+            integers[k] = 2 * code_signed_in_class(coder, &lattice[1], half, integers[k] / 2);
         } else {
             int negative = coder_raw_bit(coder, integers[k] < 0);
-            int32_t magnitude =
-                2 * (int32_t)code_in_class(coder, &model->lattice[2], half, magnitude_of(integers[k]) / 2) + 1;
+            int32_t magnitude = 2 * (int32_t)code_in_class(coder, &lattice[2], half, magnitude_of(integers[k]) / 2) + 1;
             integers[k] = negative ? -magnitude : magnitude;
         }
     }
@@ -346,20 +376,21 @@ static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest
                                  int32_t i, double step, const double *source, double *rest)
 {
     double unit = REST_UNIT * step, per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)(branch->first + i);
-    int32_t integers[3] = {0, 0, 0};
+    int32_t integers[3] = {0, 0, 0}, kind = branch->detail > 0;
+    rest_predictor *predictor = &model->adaptive[kind].predictor;
     rest_guess at;
-    rest_look_around(&model->predictor, branch, rest, layer->before, i, per_unit, &at);
-    for (int32_t k = 0; k < 3; k++) expected[k] = at.base[k] + rest_expected(&model->predictor.all, &at, k) * unit;
+    rest_look_around(predictor, branch, rest, layer->before, i, per_unit, &at);
+    for (int32_t k = 0; k < 3; k++) expected[k] = at.base[k] + rest_expected(&predictor->all, &at, k) * unit;
 #ifdef ATH_ENCODING
     double units[3];
     rest_term(units, expected, source + (out - rest), per_unit);
-    nearest_of_lattice(units, layer->slack * per_unit, at.phase->mean, integers);
+    nearest_of_lattice(units, kind ? 0.0 : layer->slack * per_unit, at.phase->mean, integers);
 #endif
     (void)source;
-    code_lattice_point(coder, model, at.phase, integers);
+    code_lattice_point(coder, model->adaptive[kind].lattice, &predictor->all, at.phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
-    rest_learn(&model->predictor, &at, per_unit, out, integers);
+    rest_learn(predictor, &at, per_unit, out, integers);
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
@@ -466,16 +497,31 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
     }
 }
 
+/* What has detail keeps its shape: it goes where the stem is that it hangs on, of less detail, and with it what hangs
+ * on it in turn. */
+static void take_along(const ath_branch *branches, const ath_branch *branch, const double *source, double *moved,
+                       const double *rest)
+{
+    if (branch->detail == 0 || branch->attach < 0) return;
+    const double *there = branches[branch->parent].detail > 0 ? moved : rest;
+    for (int32_t k = 0; k < 3; k++) {
+        double way = there[3 * branch->attach + k] - source[3 * branch->attach + k];
+        for (int32_t v = branch->first; v < branch->first + branch->count; v++) moved[3 * v + k] += way;
+    }
+}
+
 static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
                      int32_t branch_count, double step, const double *source, double *rest)
 {
     rest_model_init(model, layer->coarse != 0);
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
+        double own = rest_step(branches + b, step);
+        if (ENCODING) take_along(branches, branches + b, source, layer->moved, rest);
         if (branches[b].lag == 0)
-            code_rest_beam(coder, model, layer, branches + b, step, source, rest);
+            code_rest_beam(coder, model, layer, branches + b, own, layer->moved, rest);
         else
             for (int32_t i = 0; i < branches[b].count; i++)
-                code_rest_vertex(coder, model, layer, branches + b, i, step, source, rest);
+                code_rest_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
     }
     return !model->modes.invalid;
 }
@@ -485,6 +531,7 @@ static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *laye
 /* The poses less the origin; turns: of each branch the rotation that takes it from the one to the other. */
 typedef struct {
     const double *reference, *source;
+    double *moved; /* as rest_layer has it */
     double *rest, *turns;
     double step;
 } bent_pose;
@@ -521,8 +568,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
         predicted[k] = before < 0 ? here[k] : pose->rest[3 * (size_t)before + (size_t)k] + moved;
     }
     for (int32_t k = 0; k < 3; k++) {
-        int32_t given =
-            ENCODING ? steps_in(pose->source[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
+        int32_t given = ENCODING ? steps_in(pose->moved[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
         int32_t steps = code_signed(coder, &model->inner, (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
         out[k] = predicted[k] + (double)steps * pose->step;
         mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
@@ -562,7 +608,7 @@ static void code_bent_run(ath_coder *coder, rest_model *model, const bent_pose *
     const double *basis = rest_basis(model, n), *base = pose->rest + 3 * (size_t)before;
     const double *from = pose->reference + 3 * (size_t)before, *run = pose->reference + 3 * (size_t)first;
     for (int32_t i = 0; ENCODING && i < n; i++) {
-        const double *x = pose->source + 3 * (size_t)(first + i);
+        const double *x = pose->moved + 3 * (size_t)(first + i);
         for (int32_t k = 0; k < 3; k++)
             local[3 * i + k] = R[k] * (x[0] - base[0]) + R[3 + k] * (x[1] - base[1]) + R[6 + k] * (x[2] - base[2])
                                - (run[3 * i + k] - from[k]);
@@ -607,14 +653,17 @@ static int code_source_rest(ath_coder *coder, rest_model *model, const bent_pose
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
         const ath_branch *stem = branches + b, *parent = branches + ath_max(stem->parent, 0);
         double *turn = pose->turns + 9 * (size_t)b;
+        bent_pose own = *pose;
+        own.step = rest_step(stem, pose->step);
+        if (ENCODING) take_along(branches, stem, pose->source, pose->moved, pose->rest);
         if (stem->parent < 0)
             memcpy(turn, identity, sizeof identity);
         else
             turn_at(pose, parent, stem->attach, parent->first + parent->count - 1, turn - 9 * (b - stem->parent), turn);
         if (stem->lag == 0)
-            code_bent_beam(coder, model, pose, stem, turn);
+            code_bent_beam(coder, model, &own, stem, turn);
         else
-            code_bent_sheet(coder, model, pose, stem, turn);
+            code_bent_sheet(coder, model, &own, stem, turn);
     }
     return !model->modes.invalid;
 }

@@ -44,11 +44,13 @@ from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
+from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
+from athcodec.units import Length
 
 SPOOL_BYTES = 64 << 20
 PREDICTED_SHARE = 0.8  # of a file with layers, that one with predicted motion, which has none, may take
@@ -64,6 +66,7 @@ class EncodingOptions:
     tam: Thresholds | None = None
     exact_rest: bool = False
     host_rest: bool = False
+    rest_precision: RestPrecision = RestPrecision()
     lossless: bool = False
     weights: str | np.ndarray | None = None
     attributes: str = "all"
@@ -74,12 +77,17 @@ class EncodingOptions:
 
     @classmethod
     def of(
-        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = DEFAULT_LADDER, **options
+        cls,
+        *,
+        segment_frames: int | None = None,
+        ladder: str | Sequence[float] = DEFAULT_LADDER,
+        rest_error: float | str | Length | None = None,
+        **options,
     ) -> EncodingOptions:
-        """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
+        """None for segment_frames is its default; ladder: as `ladder_of` takes it; rest_error: as `RestPrecision.of`."""
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
-        return cls(ladder=ladder_of(ladder), **options)
+        return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
 
     def __post_init__(self) -> None:
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
@@ -249,6 +257,7 @@ class EncodingJob:
             None if factors is None else factors[seen.hierarchy.vertex_source],
             pool,
             options.host_rest,
+            options.rest_precision,
         )
 
     @property

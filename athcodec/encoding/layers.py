@@ -35,6 +35,7 @@ from athcodec.encoding.segment import (
     stems_head,
     time_components,
 )
+from athcodec.encoding.shape import rest_steps
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
@@ -192,12 +193,16 @@ def _rests(
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive)
     for step in steps:
+        if np.array_equal(rest_steps(prelude.plan.branches, step), rest_steps(prelude.plan.branches, coded[-1].step)):
+            coded.append(coded[-1])
+            continue
         slack = prelude.rest_slack if step == rest.step else 0.0
         coded.append(streams.encode_rest(prelude.plan.branches, step, source.rest, coded[-1], rest.adaptive, slack))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
-    return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
+    before = [coded[-len(ratios) - 1] if level_0 is not None else stored, *of_layers[:-1]]
+    return rest, level_0, [(own.decoded, None if own is last else own) for own, last in zip(of_layers, before)]
 
 
 def _first_rests(plan: Plan, step: float, rest: np.ndarray, adaptive: bool) -> list[streams.CodedRest]:

@@ -19,6 +19,7 @@ from athcodec.encoding.layers import Layer, Layers
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.search import Choice, SegmentSample, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
+from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
 MEMORIES = (2, 9, 0, 13)  # heads of PREDICTED to choose from
@@ -57,6 +58,7 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         sheet=none,
         loose=none,
         lags=np.zeros(branches, np.int32),
+        details=finer_than(source.details, bound),
         adaptive_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,

@@ -37,6 +37,7 @@ from athcodec.encoding.segment import (
     thread_count,
     with_best_lags,
 )
+from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 from athcodec.segmentation import DEFAULT_SEGMENT
 
@@ -131,6 +132,7 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         sheet=source.sheet_like,
         loose=loose_branches(source, wildest.positions),
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
+        details=source.details if layered else finer_than(source.details, bound),
         adaptive_rest=False,
         rotation_step_factors=(0,) * levels,
         only_tips=False,
@@ -138,8 +140,8 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         learned_pieces=None,
         node_steps=np.full(levels, step),
     )
-    if layered:  # adaptive rest poses are worth less to those that refine them
-        return replace(settings, lags=lags(source, rest_step))
+    if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
+        return replace(settings, lags=lags(source, rest_step, settings.details))
     return with_best_lags(source, ath, settings)
 
 

@@ -20,6 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
@@ -54,10 +55,12 @@ class Source:
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     pool: ThreadPool = SERIAL
     host_rest: bool = False
+    rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
     rest: np.ndarray = field(init=False)  # likewise: the reference pose
     origin: np.ndarray = field(init=False)  # (3,) float64
+    details: np.ndarray = field(init=False)  # (B,) int32: of the branches, FORMAT.md, Detail
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
@@ -67,6 +70,9 @@ class Source:
         self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
+        self.details = np.zeros(self.hierarchy.branch_count, np.int32)
+        if not self.reference_is_exact:
+            self.details = self.rest_precision.details(self.clip, self.hierarchy, self.seen.diagonal)
         self.clip_range_segments = [
             [
                 (start + a, start + b)
@@ -184,6 +190,7 @@ class Settings:
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
     lags: np.ndarray  # (B,) int32, file order
+    details: np.ndarray  # likewise
     adaptive_rest: bool
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
     learned_bases: tuple[bool, ...]  # per level: whether the time basis is
@@ -203,7 +210,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * settings.loose
-    branches["lag"] = settings.lags
+    branches["lag"], branches["detail"] = settings.lags, settings.details
     return branches
 
 
@@ -260,10 +267,12 @@ def _within(
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
     """The lags, and adaptive or not, that make hierarchy and rest pose smallest at these steps."""
-    own = lags(source, settings.rest_step)
+    own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False)]
     if not source.reference_is_exact:
         candidates += _lag_candidates(source, settings, own)
+    if settings.details.any():
+        candidates = [own for own in candidates if own.adaptive_rest]
 
     def size(candidate: Settings) -> int:
         hierarchy, branches = source.hierarchy, branch_records(source.hierarchy, ath, candidate)
@@ -308,11 +317,11 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
     return ct.pack_source_rest(coded.step, coded.stream)
 
 
-def lags(source: Source, step: float) -> np.ndarray:
+def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
     """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(source.sheet_like & (not source.host_rest)):
+    for b in np.flatnonzero((source.sheet_like | (details > 0)) & (not source.host_rest)):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)

@@ -53,7 +53,7 @@ def encode_rest(
 
     slack: how far from its place a vertex may be put to save bits, where `adaptive`.
     """
-    decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
+    decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
     data = encode_stream(
         "ath_encode_rest",
         1024 + 8 * rest.size,
@@ -66,6 +66,7 @@ def encode_rest(
         None if coarse is None else address(coarse.decoded, np.float64, rest.size),
         address(steps, np.int32, rest.size),
         address(rest, np.float64, rest.size),
+        address(moved, np.float64, rest.size),
         address(decoded, np.float64, rest.size),
     )
     return CodedRest(step, data, decoded, steps, adaptive)
@@ -73,7 +74,7 @@ def encode_rest(
 
 def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
     """The source's rest pose about the reference pose as decoded, both (N, 3) float64 less the origin."""
-    decoded, turns = np.zeros_like(rest), np.empty((len(branches), 9))
+    decoded, turns, moved = np.zeros_like(rest), np.empty((len(branches), 9)), np.empty_like(rest)
     data = encode_stream(
         "ath_encode_source_rest",
         1024 + 8 * rest.size,
@@ -82,6 +83,7 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
         step,
         address(reference, np.float64, rest.size),
         address(rest, np.float64, rest.size),
+        address(moved, np.float64, rest.size),
         address(turns, np.float64, turns.size),
         address(decoded, np.float64, rest.size),
     )
