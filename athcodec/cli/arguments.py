@@ -265,8 +265,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--rest-error",
         metavar="FRACTION|LENGTH",
         type=_argument(_rest_error),
-        help="how far the rest pose may be off: a fraction of the diagonal, a length such as 2mm, or bound (default: with "
-        "faces, so little that these keep their shape; else as the bound has it)",
+        help="how far the rest pose may be off: a fraction of the diagonal, a length such as 2mm, or bound (default: "
+        "with faces, so little that these keep their shape; else as the bound has it)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument(

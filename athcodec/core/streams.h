@@ -11,7 +11,7 @@
 
 /* ---- hierarchy ---- */
 
-enum { PLACES = 256, MOST_DETAIL = 255, WHOLE_DETAIL = 128 /* of step 1 */ };
+enum { PLACES = 256, MOST_LAYERS = 8, MOST_DETAIL = 255, WHOLE_DETAIL = 128 /* of step 1 */ };
 
 /* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
  * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
@@ -24,8 +24,13 @@ typedef struct {
 } permutation_model;
 
 typedef struct {
-    number_model up, count, attach, lag, detail;
-    ath_context detailed;
+    ath_context any;
+    number_model difference;
+} branch_number_model;
+
+typedef struct {
+    number_model up, count, attach, lag;
+    branch_number_model rigid, detail;
     permutation_model branch_source, vertex_source;
     ath_context flag[3][2];
 } hierarchy_model;
@@ -41,14 +46,20 @@ static void permutation_model_init(permutation_model *model)
     model->mean = 64;
 }
 
+static void branch_number_model_init(branch_number_model *model)
+{
+    context_init(&model->any, 32768);
+    number_model_init(&model->difference);
+}
+
 static void hierarchy_model_init(hierarchy_model *model)
 {
     number_model_init(&model->up);
     number_model_init(&model->count);
     number_model_init(&model->attach);
     number_model_init(&model->lag);
-    number_model_init(&model->detail);
-    context_init(&model->detailed, 32768);
+    branch_number_model_init(&model->rigid);
+    branch_number_model_init(&model->detail);
     permutation_model_init(&model->branch_source);
     permutation_model_init(&model->vertex_source);
     for (int32_t i = 0; i < 3; i++)
@@ -81,7 +92,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
+    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
@@ -195,17 +206,19 @@ static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_bra
     return 1;
 }
 
-/* Of branches, each expected to be that of the last one of such a lag. */
-static int code_details(ath_coder *coder, hierarchy_model *model, int32_t branch_count, ath_branch *branches)
+/* A number that most branches have none of, each expected to be that of the last branch of such a lag. */
+static int code_of_branches(ath_coder *coder, branch_number_model *model, int32_t branch_count, ath_branch *branches,
+                            int32_t *number, int32_t most)
 {
+    size_t stride = sizeof *branches / sizeof *number;
     int32_t any = 0, last[16] = {0};
-    for (int32_t b = 0; ENCODING && b < branch_count; b++) any |= branches[b].detail != 0;
-    any = coder_bit(coder, &model->detailed, any);
+    for (int32_t b = 0; ENCODING && b < branch_count; b++) any |= number[(size_t)b * stride] != 0;
+    any = coder_bit(coder, &model->any, any);
     for (int32_t b = 0; b < branch_count; b++) {
-        int32_t *expected = last + ath_min(branches[b].lag, 15);
-        if (any) *expected += code_signed(coder, &model->detail, 0, branches[b].detail - *expected);
-        if (*expected < 0 || *expected > MOST_DETAIL) return 0;
-        branches[b].detail = *expected;
+        int32_t *own = number + (size_t)b * stride, *expected = last + ath_min(branches[b].lag, 15);
+        if (any) *expected += code_signed(coder, &model->difference, 0, ENCODING ? *own - *expected : 0);
+        if (*expected < 0 || *expected > most) return 0;
+        *own = *expected;
     }
     return 1;
 }
@@ -229,7 +242,8 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
         else if (!code_attach(coder, model, branches, b, &mean_attach))
             return 0;
     }
-    return code_details(coder, model, branch_count, branches)
+    return code_of_branches(coder, &model->rigid, branch_count, branches, &branches->rigid, MOST_LAYERS)
+           && code_of_branches(coder, &model->detail, branch_count, branches, &branches->detail, MOST_DETAIL)
            && code_branch_numbers(coder, model, branch_count, branch_source)
            && code_vertex_numbers(coder, model, branches, branch_count, vertex_count, branch_source, vertex_source);
 }

@@ -44,7 +44,7 @@ from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
-from athcodec.encoding.shape import RestPrecision
+from athcodec.encoding.shape import RestPrecision, finer_than
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -84,7 +84,7 @@ class EncodingOptions:
         rest_error: float | str | Length | None = None,
         **options,
     ) -> EncodingOptions:
-        """None for segment_frames is its default; ladder: as `ladder_of` takes it; rest_error: as `RestPrecision.of`."""
+        """None for segment_frames is its default; ladder, rest_error: as `ladder_of`, `RestPrecision.of` take them."""
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
@@ -285,12 +285,13 @@ class EncodingJob:
             self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
         )
         ath = self.seen.ath(self.thresholds(bound))
-        ratio = self._layer_ratios(ath, bound)[0]
+        ratios = self._layer_ratios(ath, bound)
+        ratio = ratios[0]
         if self.source.still:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio > 1)
+        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
         prediction = self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
@@ -303,8 +304,11 @@ class EncodingJob:
         return best
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
-        """None for one who asks for a hierarchy of maps, which predicted motion has not."""
-        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
+        """None for one who asks for a hierarchy of maps, which predicted motion has not, and where vertices within the
+        bound would not keep shapes."""
+        if self.options.tam or finer_than(self.source.details, bound).any():
+            return None
+        return best_prediction(self._long_segments, bound, most_bytes)
 
     @property
     def _long_segments(self) -> Source:

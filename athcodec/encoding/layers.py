@@ -139,19 +139,20 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
     rest, level_0, rests = _rests(source, prelude, ratios)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
-        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, refined=i > 0)
+        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
         own = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
+            layer=i,
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
     return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
 
 
-def _plan_on(pose: np.ndarray, prelude: CodedPrelude, refined: bool = False) -> Plan:
-    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, refined)
+def _plan_on(pose: np.ndarray, prelude: CodedPrelude, layer: int = 0) -> Plan:
+    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, layer > 0, layer=layer)
     plan.set_rest(pose)
     return plan
 
@@ -162,7 +163,7 @@ def _modes(plan: Plan, choice: Choice, settings: Settings, ratio: int) -> Learne
         return choice.learned_modes
     if settings.learned_pieces is None:
         return None
-    return nested(plan, choice.learned_modes, settings.learned_pieces, _binary_digits(ratio))
+    return nested(plan, choice.learned_modes, settings.learned_pieces & ~plan.is_rigid, _binary_digits(ratio))
 
 
 def _binary_digits(ratio: int) -> int:
@@ -303,8 +304,7 @@ class _SegmentCoder:
         for factor in TIGHTER_LIMITS:
             if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
                 break
-            tighter = replace(layer.settings, limit=layer.settings.limit * factor)
-            corrected, chunk = self._corrected(decoded, tighter)
+            corrected, chunk = self._corrected(decoded, layer, factor)
             if len(chunk) > most:
                 break
             self.decoded = corrected
@@ -334,24 +334,27 @@ class _SegmentCoder:
         """Corrections of the level that a layer ends with, and its errors."""
         self._uncorrected = decoded = segment.pose(layer.plan.level_count - 1, self._origin, self._dtype)
         if layer.ratio == 1:
-            self.decoded, chunk = self._corrected(decoded, layer.settings)
+            self.decoded, chunk = self._corrected(decoded, layer)
         else:
-            self.decoded, chunk = self._tightest(decoded, layer.settings)
+            self.decoded, chunk = self._tightest(decoded, layer)
         if chunk:
             self.chunks[level, ct.CORRECTIONS] = chunk
         self.errors.append(self.error(self.decoded))
 
-    def _corrected(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
-        """Positions within the limit, and the corrections that bring them there."""
-        decoded = decoded.copy()
-        corrections, step = correct(decoded, self.positions, self._origin, settings, self._pool)
+    def _corrected(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> tuple[np.ndarray, bytes]:
+        """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of a
+        layer before the last, which keep their shape."""
+        decoded, settings = decoded.copy(), replace(layer.settings, limit=layer.settings.limit * factor)
+        corrections, step = correct(
+            decoded, self.positions, self._origin, settings, layer.plan, keeps_all=layer.ratio == 1
+        )
         return decoded, correction_chunk(corrections, step, decoded.shape)
 
-    def _tightest(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
+    def _tightest(self, decoded: np.ndarray, layer: Layer) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
 
         def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
-            corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
+            corrected = self._corrected(decoded, layer, factor)
             return corrected if len(corrected[1]) <= share * bytes_ else None
 
         bytes_ = self._shared_bytes + sum(map(len, self.chunks.values()))

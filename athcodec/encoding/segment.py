@@ -20,6 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
+from athcodec.encoding.rigid import TURN, move_rigid_parts
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
@@ -189,6 +190,10 @@ class Settings:
     rest_step: float
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
+    rigid: np.ndarray  # (B,) int32: in how many layers, from the first on, branches are rigid
+    layer: int  # that these settings are of
+    free_rigid: bool  # rigid branches are loose
+    turn_step: float  # largest of rotations of rigid pieces
     lags: np.ndarray  # (B,) int32, file order
     details: np.ndarray  # likewise
     adaptive_rest: bool
@@ -209,7 +214,9 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches = np.zeros(hierarchy.branch_count, BRANCH)
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
-    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * settings.loose
+    free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
+    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * (settings.loose | free)
+    branches["rigid"] = settings.rigid
     branches["lag"], branches["detail"] = settings.lags, settings.details
     return branches
 
@@ -221,7 +228,7 @@ class CodedPrelude:
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
-        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
@@ -370,7 +377,9 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     found = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
-        stream = LevelStream(settings.step_of(level), factor, only_tips=settings.only_tips)
+        stream = LevelStream(
+            settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step
+        )
         if level in bases:
             stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
         found.append(stream)
@@ -401,7 +410,7 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
     """A segment at a step FINER times smaller, in cosines and cantilever modes, to learn bases and modes from."""
-    fine = replace(settings, step=qz.single(settings.step / FINER))
+    fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(plan, positions.shape[2], level_streams(fine, plan.level_count, {}))
     segment.analyse(positions, qz.DEAD_ZONE)
     return segment
@@ -469,7 +478,12 @@ def analyse(
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
     """Of the stems of a level, whose time basis is among `bases` where it is learned."""
-    head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level], only_tips=settings.only_tips)
+    head = ct.StemsHead(
+        settings.step_of(level),
+        settings.rotation_step_factors[level],
+        only_tips=settings.only_tips,
+        turn=TURN if settings.turn_step else 0,
+    )
     if level in bases:
         own = bases[level]
         head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
@@ -492,15 +506,26 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
 
 
 def correct(
-    decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings, pool: ThreadPool
+    decoded: np.ndarray,
+    positions: np.ndarray,
+    origin: np.ndarray,
+    settings: Settings,
+    plan: Plan,
+    keeps_all: bool = True,
 ) -> tuple[np.ndarray, float]:
-    """Corrections (K, 5) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
-    factor = 1.0
+    """Corrections (K, 5) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
+    of it where that serves, and else, unless each vertex is to keep the limit, there are none. Raises BoundError."""
+    factor, stored, is_rigid = 1.0, decoded.dtype.type, np.repeat(plan.is_rigid, plan.pieces["count"])
+    limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = streams.find_corrections(decoded, positions, origin, settings.limit, step, pool)
+        tried = decoded.copy() if is_rigid.any() else decoded
+        parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
+        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool)
         if corrections is not None:
-            return corrections, step
+            decoded[...] = tried
+            corrections = np.concatenate([parts, corrections])
+            return corrections[np.lexsort(corrections[:, 1::-1].T)], step
         factor *= 0.5
         if factor < 1e-3:
             raise BoundError(
@@ -516,5 +541,5 @@ def code_stems(
     segment = analyse(prelude.plan, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)
-    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan.pool)
+    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan)
     return Coded(segment, stems, corrections, decoded, step, heads)

@@ -26,8 +26,8 @@ WHOLE_DETAIL, MOST_DETAIL = 128, 255  # FORMAT.md, Detail
 
 @dataclass(frozen=True)
 class RestPrecision:
-    """The option `rest_error` of `encode`, checked: None, what faces need; OF_BOUND; else a length, or a fraction of the
-    diagonal. Raises ValueError, BoundError."""
+    """The option `rest_error` of `encode`, checked: None, what faces need; OF_BOUND; else a length, or a fraction of
+    the diagonal. Raises ValueError, BoundError."""
 
     length: Length | None = None
     fraction: float | None = None
