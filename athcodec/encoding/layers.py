@@ -342,8 +342,8 @@ class _SegmentCoder:
         self.errors.append(self.error(self.decoded))
 
     def _corrected(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> tuple[np.ndarray, bytes]:
-        """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of a
-        layer before the last, which keep their shape."""
+        """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of
+        a layer before the last, which keep their shape."""
         decoded, settings = decoded.copy(), replace(layer.settings, limit=layer.settings.limit * factor)
         corrections, step = correct(
             decoded, self.positions, self._origin, settings, layer.plan, keeps_all=layer.ratio == 1
