@@ -695,7 +695,7 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
 
 def decode_of_branches(coder: RangeDecoder, branches: list[Branch], most: int) -> list[int]:
     """A number of each, which most have none of: expected to be that of the last branch of a like lag."""
-    has_any, differences, last, numbers = coder.bit(Context(32768)), NumberModel(), [0] * 16, []
+    has_any, differences, last, numbers = coder.bit(Context(2048)), NumberModel(), [0] * 16, []
     for branch in branches:
         c = min(branch.lag, 15)
         if has_any:

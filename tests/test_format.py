@@ -460,7 +460,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
         rest = rest if made == "invalid" else made
-    refined, motion = spec.refined_plan(branches, rest.rest, level), spec.no_motion(plan, parts.header.frame_count)
+    refined, motion = spec.refined_plan(branches, rest.rest, level, 1), spec.no_motion(plan, parts.header.frame_count)
     if seed % 3:
         stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
         added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))

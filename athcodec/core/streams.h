@@ -48,7 +48,7 @@ static void permutation_model_init(permutation_model *model)
 
 static void branch_number_model_init(branch_number_model *model)
 {
-    context_init(&model->any, 32768);
+    context_init(&model->any, 2048);
     number_model_init(&model->difference);
 }
 

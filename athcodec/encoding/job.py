@@ -44,7 +44,7 @@ from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
-from athcodec.encoding.shape import RestPrecision, finer_than
+from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
@@ -293,7 +293,7 @@ class EncodingJob:
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = self._best_prediction(bound, unsearched)
+        prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         choices, prelude = search.decide(ratio)
@@ -304,11 +304,8 @@ class EncodingJob:
         return best
 
     def _best_prediction(self, bound: float, most_bytes: float) -> FoundPrediction | None:
-        """None for one who asks for a hierarchy of maps, which predicted motion has not, and where vertices within the
-        bound would not keep shapes."""
-        if self.options.tam or finer_than(self.source.details, bound).any():
-            return None
-        return best_prediction(self._long_segments, bound, most_bytes)
+        """None for one who asks for a hierarchy of maps, which predicted motion has not."""
+        return None if self.options.tam else best_prediction(self._long_segments, bound, most_bytes)
 
     @property
     def _long_segments(self) -> Source:
