@@ -18,12 +18,14 @@ PIECE_VERTICES = 64
 SEGMENT_FRAMES = 256
 SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
+RIGID = 8
+"""Of a piece in a layer."""
 SHORT_SHIFT, SHORT_FLOATS = 18, 255 << 5
 """Of the error table: floats without sign, of which the top bits of binary32 are stored."""
 MEASURES = "max", "p99", "rms"
 """ath_measure, in its order."""
 
-BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth".split()])
+BRANCH = np.dtype([(name, "<i4") for name in "parent count attach flags lag first subtree depth rigid detail".split()])
 PIECE = np.dtype(
     [(name, "<i8") for name in ("modes", "basis", "attach_cache")]
     + [(name, "<i4") for name in "first count parent attach branch flags rank level low_level low_modes".split()]
@@ -66,6 +68,7 @@ class Stream(ctypes.Structure):
         ("temporal", c_void_p),
         ("temporal_rank", c_int32),
         ("root", c_int32),
+        ("turn_step", c_double),
         ("only_tips", c_int32),
         ("reserved", c_int32),
     ]
@@ -210,7 +213,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     ),
     "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
     "ath_error": (None, [c_int32, c_int32, c_int, *[c_void_p] * 6]),
-    "ath_find_corrections": (c_int64, [c_int32, c_int32, c_int, *[c_void_p] * 4, c_double, c_void_p, c_int64]),
+    "ath_find_corrections": (c_int64, [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, c_void_p, c_int64]),
     "ath_apply_corrections": (None, [c_int32, c_int, c_void_p, c_double, c_void_p, c_int64]),
     "ath_encode_front": (c_int64, [c_void_p, c_size_t, POINTER(Header), *[c_void_p] * 3]),
     "ath_encode_hierarchy": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
@@ -224,7 +227,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     ),
     "ath_encode_rest": (
         c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 6],
+        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_int, c_double, *[c_void_p] * 7],
     ),
     "ath_encode_refined_shapes": (
         c_int64,
@@ -242,10 +245,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
             c_int32,
         ],
     ),
-    "ath_encode_source_rest": (
-        c_int64,
-        [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, c_void_p, c_void_p, c_void_p, c_void_p],
-    ),
+    "ath_encode_source_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_double, *[c_void_p] * 5]),
     "ath_encode_exact_rest": (c_int64, [c_void_p, c_void_p, c_size_t, c_void_p, c_int32, c_void_p, c_int, c_void_p]),
     "ath_encode_times": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),
     "ath_encode_temporal": (c_int64, [c_void_p, c_void_p, c_size_t, c_int32, c_int32, c_int32, c_void_p]),
@@ -268,6 +268,7 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
         c_int64,
         [c_void_p, c_void_p, c_size_t, POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32],
     ),
+    "ath_plan_rigid": (None, [POINTER(CorePlan), c_void_p, c_int32]),
     "ath_without_stems": (None, [POINTER(CorePlan), c_void_p, c_void_p]),
     "ath_predicted_memory": (c_size_t, [c_int32]),
     "ath_encode_predicted": (

@@ -369,7 +369,8 @@ def pack_time(stream: bytes) -> bytes:
 @dataclass
 class StemsHead:
     """Head of STEMS: step, rotation factor (0, 1, 2, 4, 8), learned time basis (bits, rank, stream) if any, the
-    level of the stream whose basis it begins with, and whether pieces that carry others have no rotations."""
+    level of the stream whose basis it begins with, whether pieces that carry others have no rotations, and how many
+    half octaves below 1 the largest step of rigid pieces' rotations is (0: there is none)."""
 
     step: float
     rotation_step_factor: int
@@ -378,10 +379,12 @@ class StemsHead:
     basis: bytes = b""
     base: int = NO_LEVEL
     only_tips: bool = False
+    turn: int = 0
 
 
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
-    data = _STEMS.pack(head.step, head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips, head.bits)
+    rotation = head.rotation_step_factor.bit_length() | ONLY_TIPS * head.only_tips | head.turn << 4
+    data = _STEMS.pack(head.step, rotation, head.bits)
     if head.bits:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream

@@ -96,7 +96,8 @@ def encoded(
     with tempfile.TemporaryDirectory() as folder, athcodec.read_hdf5(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
-        summary = athcodec.encode(clip, file, rel_error=rel_error, segment_frames=segment_frames, **settings)
+        given = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
+        summary = athcodec.encode(clip, file, **given | settings)
         with athcodec.open(file, strict=True, host_mesh=clip) as decoder:
             yield Encoded(clip, summary, decoder)
 

@@ -922,6 +922,19 @@ valid(
     "a subnormal Rest_Step",
     lambda: with_rest(ADAPTIVE, adaptive_rest(ADAPTIVE, Chance(36, large=9), FLOAT_TINY)),
 )
+DETAILED = [  # finer and coarser than the step, the largest and the smallest, alike and unlike by lag
+    replace(stem, detail=detail) for stem, detail in zip(ADAPTIVE, (0, 121, 118, 0, 255, 110, 1))
+]
+valid(
+    "rest-detail",
+    "steps of branches of their own, in an adaptive rest pose and in beams",
+    lambda: with_rest(DETAILED, adaptive_rest(DETAILED, Chance(37, large=6))),
+)
+valid(
+    "rest-detail-steps",
+    "the same in a rest pose that is not adaptive",
+    lambda: with_rest(DETAILED, rest_chunk(write(rd.decode_rest, Chance(38, large=6), branches_of(DETAILED), 0.25))),
+)
 valid(
     "rest-exact",
     "binary32 bit for bit: -0.0, subnormal and largest numbers",
@@ -987,6 +1000,13 @@ BUSH = [
 ]
 
 
+DETAILED_BUSH = [replace(stem, detail=detail) for stem, detail in zip(BUSH, (0, 120, 119, 0, 121, 0, 118))]
+
+
+def detailed_rest() -> bytes:
+    return rest_chunk(write(rd.decode_rest, Chance(214, large=6), branches_of(DETAILED_BUSH), 0.25))
+
+
 def bent(stems: list[Stem], script: list | Chance, rest: bytes | None = None) -> bytes:
     """SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
     branches, reference = branches_of(stems), 0.25 * np.array(grown(stems), float)
@@ -1006,6 +1026,13 @@ valid(
     lambda: bent_bush(Chance(201, large=6), Chance(211, large=9)),
 )
 valid("source-rest-same", "the same pose once more: a stream of no bytes", lambda: bent_bush([], Chance(212, large=9)))
+valid(
+    "source-rest-detail",
+    "steps of branches of their own",
+    lambda: still(
+        DETAILED_BUSH, source_rest=bent(DETAILED_BUSH, Chance(204, large=6), detailed_rest()), rest=detailed_rest()
+    ),
+)
 valid(
     "source-rest-far",
     "steps as large as the plant: tangents are opposed and vanish",
@@ -1937,6 +1964,22 @@ valid(
         MIXED, 36, heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 8 | level % 5) for level in range(12)}
     ),
 )
+RIGID = [replace(stem, rigid=q % 4, detail=q % 3 * 120) for q, stem in enumerate(MIXED)]
+valid("rigid", "branches that move as they are: alone, with others on them, loose", refinements(RIGID, 38, layers=1))
+valid(
+    "rigid-turn",
+    "the same with a largest step of rotations",
+    refinements(RIGID, 39, layers=1, default_head=stems_head(0.5, 161)),
+)
+valid(
+    "layers-rigid",
+    "branches that move as they are in the first layers",
+    refinements(
+        RIGID,
+        40,
+        heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 16 * level | level % 5) for level in range(12)},
+    ),
+)
 valid(
     "layers-mixed",
     "rotations, loose stems, sheets, a stem of two pieces and a subtree that is whole",
@@ -2705,6 +2748,10 @@ hierarchy("too-few-vertices", "stems have fewer vertices than the file", [Stem(-
 hierarchy("no-vertex-left", "nothing is left for the last stem", [Stem(-1, 5), Stem(0, 1)])
 hierarchy("lag-negative", "Lag -1", [Stem(-1, 3), Stem(0, 2, 1, lag=-1)])
 hierarchy("lag-65536", "Lag 65536", [Stem(-1, 3, lag=65536), Stem(0, 2, 1)])
+hierarchy("rigid-negative", "Rigid -1", [Stem(-1, 3, rigid=1), Stem(0, 2, 1, rigid=-1)])
+hierarchy("rigid-9", "Rigid 9", [Stem(-1, 3), Stem(0, 2, 1, rigid=9)])
+hierarchy("detail-negative", "Detail -1", [Stem(-1, 3, detail=1), Stem(0, 2, 1, detail=-1)])
+hierarchy("detail-256", "Detail 256", [Stem(-1, 3), Stem(0, 2, 1, detail=256)])
 hierarchy("root-loose", "a root is LOOSE", [Stem(-1, 3, 0, LOOSE), Stem(0, 2, 1)])
 hierarchy("second-root-loose", "another root is LOOSE", [Stem(-1, 3), Stem(-1, 2, 0, LOOSE)])
 hierarchy(
@@ -3252,7 +3299,7 @@ for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite"
     motion(f"step-{what}", rd.STEMS, 1, f"Step is {value}", stems(value))
 motion("rotation-5", rd.STEMS, 1, "Rotation 5", stems(0.5, 5))
 motion("rotation-tips-5", rd.STEMS, 1, "Only_Tips and Rotation 5", stems(0.5, 13))
-motion("rotation-16", rd.STEMS, 1, "bit 4 of Rotation is set", stems(0.5, 17))
+motion("rotation-turn-5", rd.STEMS, 1, "Turn 1 and Rotation 5", stems(0.5, 21))
 motion("bits-7", rd.STEMS, 1, "Basis_Bits 7", basis(1, 7, basis_stream([[0, 0]], 8)))
 motion("bits-17", rd.STEMS, 1, "Basis_Bits 17", basis(1, 17, basis_stream([[0, 0]], 8)))
 motion("rank-0", rd.STEMS, 1, "Basis_Rank 0 though there is a basis", basis(0, 8, b""))

@@ -701,6 +701,8 @@ class Branch:
     attach: int = -1  # the vertex it hangs on
     subtree: int = 1  # branches in it
     last_place: int = 0  # where on this stem the last child so far hangs
+    rigid: int = 0  # layers in which it moves as it is
+    detail: int = 0
 
 
 PLACES = 256  # of a stem, whose numbers are expected from those of other stems
@@ -711,6 +713,10 @@ def decode_hierarchy(stream: bytes, branch_count: int, vertex_count: int):
     coder = RangeDecoder(stream)
     branches = decode_branches(coder, branch_count, vertex_count)
     decode_attaches(coder, branches)
+    for branch, rigid in zip(branches, decode_of_branches(coder, branches, MOST_LAYERS)):
+        branch.rigid = rigid
+    for branch, detail in zip(branches, decode_of_branches(coder, branches, 255)):
+        branch.detail = detail
     branch_source = decode_numbers(coder, [(0, branch_count)], branch_count)
     stem_start, start = [0] * branch_count, 0  # in a source that is sorted by branch
     for b in sorted(range(branch_count), key=lambda b: branch_source[b]):
@@ -764,6 +770,18 @@ def decode_attaches(coder: RangeDecoder, branches: list[Branch]) -> None:
         branch.attach = parent.first + place
         parent.last_place = place
         mean = mean - (mean + 3) // 4 + clipped(step) * 4
+
+
+def decode_of_branches(coder: RangeDecoder, branches: list[Branch], most: int) -> list[int]:
+    """A number of each, which most have none of: expected to be that of the last branch of a like lag."""
+    has_any, differences, last, numbers = coder.bit(Context(2048)), NumberModel(), [0] * 16, []
+    for branch in branches:
+        c = min(branch.lag, 15)
+        if has_any:
+            last[c] += code_signed(coder, differences, 0)
+        require(0 <= last[c] <= most, "Rigid or Detail is out of range")
+        numbers.append(last[c])
+    return numbers
 
 
 def decode_numbers(coder: RangeDecoder, runs: list, total: int) -> list[int]:
@@ -837,7 +855,7 @@ class RestLayer:
 def decode_rest(
     stream: bytes,
     branches: list[Branch],
-    step: float,
+    usual_step: float,
     before: RestLayer | None = None,
     is_adaptive: bool = False,
     mesh: Mesh | None = None,
@@ -849,16 +867,18 @@ def decode_rest(
     mean = [[64, 64, 64], [64, 64, 64]]
     rest: list[list[float]] = []
     all_steps: list[list[int]] = []
-    adaptive = AdaptiveRest()
+    adaptive = AdaptiveRest(), AdaptiveRest()  # of branches without detail, and with it
     if mesh is not None:
-        rest, all_steps = decode_connected_rest(coder, branches, 0.625 * step, before, mesh)
+        rest, all_steps = decode_connected_rest(coder, branches, usual_step, before, mesh, adaptive)
         coder.finish()
         return RestLayer(rest, all_steps)
     for branch in branches:
+        step = rest_step(branch, usual_step)
         single_vertices = branch.count if branch.lag > 0 else 1 if branch.attach < 0 else 0
         for i in range(single_vertices):
             if is_adaptive:
-                point, steps = decode_adaptive_vertex(coder, adaptive, branch, i, 0.625 * step, rest, before)
+                model = adaptive[branch.detail > 0]
+                point, steps = decode_adaptive_vertex(coder, model, branch, i, 0.625 * step, rest, before)
                 rest.append(point)
                 all_steps.append(steps)
                 continue
@@ -922,6 +942,11 @@ def decode_refined_run(
         coarse[k][:n] = numbers[k * n : k * n + n]
         predicted[k][:n] = [steps_in(total, step) if known != 0 else 0 for total, known in zip(sums, coarse[k])]
     return decode_refined_row(coder, model, n, 0, predicted, 1, magnitudes(coarse)).row
+
+
+def rest_step(branch: Branch, step: float) -> float:
+    most = half_octave(branch.detail - 128) if branch.detail > 0 else step
+    return most if most < step else step
 
 
 def predict_rest(branch: Branch, rest: list, i: int) -> list[float]:
@@ -1254,21 +1279,30 @@ def ring_of(mesh: Mesh, rest: list, v: int) -> Ring:  # what is known around a v
 
 
 def decode_connected_rest(
-    coder: RangeDecoder, branches: list[Branch], unit: float, before: RestLayer | None, mesh: Mesh
+    coder: RangeDecoder,
+    branches: list[Branch],
+    step: float,
+    before: RestLayer | None,
+    mesh: Mesh,
+    by_stems: tuple[AdaptiveRest, AdaptiveRest],
 ) -> tuple[list, list]:
-    by_stems, by_faces = AdaptiveRest(), AdaptiveRest()
-    by_faces.lattice = by_stems.lattice
-    for f in range(6):
-        by_faces.filters[f].weight = [1.0 if j == (0 if f > 0 else 2) else 0.0 for j in range(10)]
-    rest, steps, seen_from = ([None] * len(mesh.order) for _ in range(3))
+    """In the order of the mesh; by_stems: what is learned of vertices without neighbours, as `decode_rest` has it."""
+    by_faces = AdaptiveRest(), AdaptiveRest()
+    for own, of_stems in zip(by_faces, by_stems):
+        own.lattice = of_stems.lattice
+        for f in range(6):
+            own.filters[f].weight = [1.0 if j == (0 if f > 0 else 2) else 0.0 for j in range(10)]
+    rest: list = [None] * len(mesh.order)
+    steps, seen_from = list(rest), list(rest)
     for v in mesh.order:
-        ring = ring_of(mesh, rest, v)
+        ring, branch = ring_of(mesh, rest, v), branch_of(branches, v)
+        unit, kind = 0.625 * rest_step(branch, step), branch.detail > 0
         seen_from[v] = ring.base
         if ring.base is None:
-            branch = branch_of(branches, v)
-            rest[v], steps[v] = decode_adaptive_vertex(coder, by_stems, branch, v - branch.first, unit, rest, before)
+            model, i = by_stems[kind], v - branch.first
+            rest[v], steps[v] = decode_adaptive_vertex(coder, model, branch, i, unit, rest, before)
         else:
-            rest[v], steps[v] = decode_connected_vertex(coder, by_faces, ring, seen_from, v, unit, rest, before)
+            rest[v], steps[v] = decode_connected_vertex(coder, by_faces[kind], ring, seen_from, v, unit, rest, before)
     return rest, steps
 
 
@@ -1315,7 +1349,7 @@ class BentPose:
 
     def __init__(self, stream: bytes, branches: list[Branch], step: float, reference: np.ndarray):
         self.coder, self.rows, self.numbers = RangeDecoder(stream), CoefficientModel(), NumberModel()
-        self.mean, self.step = [64, 64, 64], step
+        self.mean, self.step = [64, 64, 64], step  # that of the branch at hand
         self.reference, self.rest = reference[:, :, None], np.zeros((*reference.shape, 1))
         turns: list[np.ndarray] = []  # of the branches
         for branch in branches:
@@ -1324,6 +1358,7 @@ class BentPose:
                 parent = branches[branch.parent]
                 last = parent.first + parent.count - 1
                 turn = self._turn_at(parent, branch.attach, last, turns[branch.parent])
+            self.step = rest_step(branch, step)
             turns.append(self._beam(branch, turn) if branch.lag == 0 else self._sheet(branch, turn))
         self.coder.finish()
 
@@ -2253,6 +2288,7 @@ class Piece:
     low_level: int = -1  # that holds its tracks and first modes instead
     low_modes: int = 0
     carries: bool = False  # whether another piece hangs on it
+    rigid: bool = False  # whether its branch is, in the layer
 
     @property
     def base_level(self) -> int:
@@ -2288,7 +2324,8 @@ class Node:
 class Plan:
     """Pieces and nodes of a hierarchy; once the rest pose is set, also their bases."""
 
-    def __init__(self, branches: list[Branch], is_predicted: bool = False):
+    def __init__(self, branches: list[Branch], is_predicted: bool = False, layer: int = 0):
+        self.layer = layer
         self.is_predicted = is_predicted  # then no piece has modes, and all nodes have maps
         self.pieces: list[Piece] = []
         self.nodes: list[Node] = []
@@ -2338,6 +2375,7 @@ class Plan:
                 parent=piece_of_vertex[attach] if attach >= 0 else -1,
                 flags=branch.flags if j == 0 else branch.flags & ~LOOSE,
                 level=self.height + 1,
+                rigid=branch.rigid > self.layer,
             )
             if node is not None and not branch.flags & WHOLE:
                 piece.level = branch.depth + 1
@@ -2356,9 +2394,9 @@ class Plan:
         """Whether playing `shown` needs the maps of `level`."""
         return any(node.coded and node.level == level and shown <= node.last for node in self.nodes)
 
-    def refined(self, branches: list[Branch], level: int) -> Plan:
+    def refined(self, branches: list[Branch], level: int, layer: int) -> Plan:
         """That of a refinement, all of whose pieces come with its level; its rest pose is this one's."""
-        plan = Plan(branches)
+        plan = Plan(branches, layer=layer)
         plan.rest = self.rest
         for piece in plan.pieces:
             piece.level, piece.low_level, piece.low_modes = level, -1, 0
@@ -2377,7 +2415,8 @@ class Plan:
         """(modes, count): functions over the piece's vertices."""
         if piece.number not in self._bases:
             modes = cantilever(piece_gaps(self, piece), 0.1, 0.001, tip_weight(self, piece))
-            self._bases[piece.number] = sheet(self, piece, modes) if piece.flags & SHEET else modes
+            own = sheet(self, piece, modes) if piece.flags & SHEET else modes
+            self._bases[piece.number] = own[:0] if piece.rigid else own
         return self._bases[piece.number]
 
     def shape_modes(self, piece: Piece) -> int:
@@ -2694,6 +2733,7 @@ class LevelStream:
     step: float
     rotation_step_factor: float
     only_tips: bool  # pieces that carry others have no rotations
+    turn_step: float  # largest of rotations of rigid pieces; 0.0: any
     waves: np.ndarray  # (rank, frames)
     root: int | None  # the first of the levels whose learned bases begin with the same rows; None: they are waves
 
@@ -2778,12 +2818,13 @@ def read_stems_head(chunk: bytes, motion: Motion, level: int) -> bytes:
     """Steps and waves of a level; returns its Stems_Stream."""
     require(len(chunk) >= 6, "STEMS is too short")
     step, rotation, bits = f32(chunk, 0), chunk[4], chunk[5]
-    require(finite(step) and step > 0.0 and rotation & ~8 <= 4, "Step or Rotation of STEMS is out of range")
+    require(finite(step) and step > 0.0 and rotation & 7 <= 4, "Step or Rotation of STEMS is out of range")
     require(bits == 0 or 8 <= bits <= 16, "Basis_Bits is out of range")
     waves, root, body = motion.waves, None, chunk[6:]
     if bits:
         waves, root, body = read_basis(body, motion, level, bits)
-    motion.streams[level] = LevelStream(step, float((1 << (rotation & 7)) >> 1), rotation & 8 != 0, waves, root)
+    factor, turn_step = float((1 << (rotation & 7)) >> 1), half_octave(-(rotation >> 4)) if rotation >> 4 > 0 else 0.0
+    motion.streams[level] = LevelStream(step, factor, rotation & 8 != 0, turn_step, waves, root)
     return body
 
 
@@ -3003,9 +3044,15 @@ def rotation_step(plan: Plan, piece: Piece, stream: LevelStream) -> float:
     """0.0: no rotation is coded."""
     d = plan.from_attach(piece).ravel()
     lever2 = in_order(d * d)
-    if not lever2 > 0.0 or not stream.rotation_step_factor > 0.0 or (stream.only_tips and piece.carries):
+    factor = stream.rotation_step_factor
+    if piece.rigid:
+        factor = factor if factor > 0.0 else 1.0
+    elif stream.only_tips and piece.carries:
+        factor = 0.0
+    if not lever2 > 0.0 or not factor > 0.0:
         return 0.0
-    return stream.rotation_step_factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
+    step = factor * stream.step / np.sqrt(lever2 * 2.0 / 3.0)
+    return stream.turn_step if piece.rigid and 0.0 < stream.turn_step < step else step
 
 
 @dataclass(frozen=True)
@@ -3045,7 +3092,7 @@ class Pose:
             return plan.attach_point(piece)[:, None] * still, np.eye(3)[:, :, None] * still
         parent, (base, R) = plan.pieces[piece.parent], self.kept[piece.parent]
         c = self.placed[piece.attach].copy()
-        if parent.flags & SHEET:
+        if parent.flags & SHEET or parent.rigid:
             return c, R
         before, after = piece.attach - 1, min(piece.attach + 1, parent.first + parent.count - 1)
         inside = before >= parent.first
@@ -3106,7 +3153,7 @@ class Pose:
         for moves, track in self.piece_terms(piece):
             x = x + moves[:, :, None] * track
         self.placed[piece.vertices] = c + mat_vec(R, x)
-        if piece.flags & SHEET:
+        if piece.flags & SHEET and not piece.rigid:
             R = self.sheet_rotation(piece, c, R)
         self.kept[piece.number] = c, R
 
@@ -3746,7 +3793,7 @@ class AthFile:
             return self.plan
         for layer in range(len(self._plans), q + 1):
             place = self.plan.height + 1 + layer if layer > 0 else 1
-            plan = self._plans[-1].refined(self.branches, place) if layer > 0 else self.plan
+            plan = self._plans[-1].refined(self.branches, place, layer) if layer > 0 else self.plan
             if self.find(REFINED_REST, place):
                 plan = plan if layer > 0 else Plan(self.branches)
                 plan.rest = self._refined_rest(self.content(REFINED_REST, place))

@@ -412,6 +412,8 @@ class Stem:
     place: int = 0
     flags: int = 0
     lag: int = 1
+    rigid: int = 0
+    detail: int = 0
 
 
 def hierarchy_script(stems: list[Stem], branch_source: list | None = None, vertex_source: list | None = None) -> list:
@@ -430,9 +432,23 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
             last_place[stem.parent] = stem.place
     return (
         script
+        + numbers_script([(stem.lag, stem.rigid) for stem in stems])
+        + numbers_script([(stem.lag, stem.detail) for stem in stems])
         + permutation_script(branch_source, stems, False)
         + permutation_script(vertex_source, stems, True, branch_source)
     )
+
+
+def numbers_script(lags_and_numbers: list[tuple[int, int]]) -> list:
+    """Script of a number of each branch."""
+    if not any(number for _, number in lags_and_numbers):
+        return [0]
+    script, last = [1], [0] * 16
+    for lag, number in lags_and_numbers:
+        c = max(min(lag, 15), 0)
+        script.append(number - last[c])
+        last[c] = number
+    return script
 
 
 def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
@@ -714,7 +730,7 @@ class Plant:
     def _layer(self, branches: list, q: int, rests: list[rd.RestLayer]) -> list[Entry]:
         """What all segments share of a refinement."""
         level, entries = self.plan.height + 1 + q, []
-        plan, shapes = self.plans[-1].refined(branches, level), _no_motion(1)
+        plan, shapes = self.plans[-1].refined(branches, level, q), _no_motion(1)
         if (rd.REFINED_REST, level, 0) in self.scripts:
             entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
             plan.rest = np.array(rests[-1].rest)

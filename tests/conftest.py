@@ -162,7 +162,7 @@ def full_ath(full_clip, tmp_path_factory):
     """The full clip in two segments."""
     path = tmp_path_factory.mktemp("full") / "full.ath"
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, tam=tam, ladder="none")
+    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
     return path
 
 

@@ -142,3 +142,40 @@ def survives_damage(path: Path, read: Callable[[], MotionClip], seed: int = 0, *
             refused += 1
     path.write_bytes(whole)
     return refused
+
+
+def leafed_tree(cards: int = 120, frames: int = 24, size: float = 0.115, seed: int = 1) -> MotionClip:
+    """A tree 16 m high, of curves, with cards of `size` that each flutter in their own way on swaying twigs."""
+    random, along = np.random.default_rng(seed), np.linspace(0.05, 1.0, 20)[:, None]
+    stems, parent, first = [along * [0, 16.0, 0]], [-1], [0]
+    for twig in range(12):
+        base = stems[0][8 + twig % 12]
+        stems.append(base + along * (random.normal(size=3) + [0, 1, 0]))
+        parent.append(0)
+    corner = size * np.array([[-0.3, 0, 0], [0.3, 0, 0], [0.3, 1, 0], [-0.3, 1, 0]])
+    for _ in range(cards):
+        twig, turn = random.integers(1, 13), np.linalg.qr(random.normal(size=(3, 3)))[0]
+        stems.append(stems[twig][random.integers(4, 20)] + corner @ turn.T)
+        parent.append(twig)
+    first = np.cumsum([0, *map(len, stems[:-1])])
+    rest = np.concatenate(stems)
+    positions, time = np.repeat(rest[None], frames, axis=0), np.arange(frames) / 24
+    sway = 0.02 * np.sin(time * 2.0)[:, None] * rest[:, 1] ** 2 / 16
+    for card in range(13, len(stems)):
+        own = slice(first[card], first[card] + 4)
+        axis, rate, phase = random.normal(size=3), random.uniform(2, 9), random.uniform(0, 6)
+        axis /= np.linalg.norm(axis)
+        cross = np.cross(np.eye(3), axis)
+        for t, angle in enumerate(0.3 * np.sin(rate * time + phase)):
+            turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+            positions[t, own] = rest[own][:2].mean(0) + (rest[own] - rest[own][:2].mean(0)) @ turn.T
+            sway[t, own] = sway[t, own].mean()
+    positions[:, :, 0] += sway
+    return MotionClip(
+        positions.astype(np.float32),
+        time,
+        rest=rest.astype(np.float32),
+        vertex_branch=np.repeat(np.arange(len(stems)), [len(stem) for stem in stems]).astype(np.int32),
+        branch_parent=np.array(parent, np.int32),
+        faces=np.array([np.arange(f, f + 4) for f in first[13:]], np.int32),
+    )

@@ -913,12 +913,12 @@ def shown_of(player: Player, segment: Memory) -> np.ndarray:
 GIVEN = {"rel_error": 1e-4, "segment_frames": 16, "attributes": "none", "tam": athcodec.Thresholds(0, 0, 0, 0)}
 REFINED = {
     "layers": ("bushy_clip", {"ladder": LADDER}),
-    "shapes": ("full_clip", {"ladder": LADDER}),
+    "shapes": ("full_clip", {"ladder": LADDER, "rest_error": "bound"}),
     "time bases": ("bushy_clip", {"ladder": (1e-1, 1e-2), "rel_error": 1e-3, "segment_frames": 32}),
     "clips": ("medley_clips", {"ladder": LADDER}),
-    "lossless": ("full_clip", {"ladder": LADDER, "lossless": True}),
+    "lossless": ("full_clip", {"ladder": LADDER, "lossless": True, "rest_error": "bound"}),
     "float64": ("distant_clip", {"ladder": LADDER, "lossless": True}),
-    "one layer": ("full_clip", {"lossless": True}),
+    "one layer": ("full_clip", {"lossless": True, "rest_error": "bound"}),
 }
 
 

@@ -67,7 +67,7 @@ def fine_parts(full_clip, tmp_path_factory) -> Parts:
     """Coded so finely that stems of level 2 happen to mean something without SHAPES, too."""
     path = tmp_path_factory.mktemp("fine") / "full.ath"
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(full_clip, path, rel_error=1e-5, segment_frames=16, tam=tam, ladder="none")
+    athcodec.encode(full_clip, path, rel_error=1e-5, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
     return Parts.of(path.read_bytes())
 
 
@@ -86,14 +86,14 @@ def medley_parts(medley_ath) -> Parts:
 def lossless_parts(full_clip, tmp_path_factory) -> Parts:
     path = tmp_path_factory.mktemp("lossless") / "full.ath"
     tam = athcodec.Thresholds(0, 0, 0, 0)  # with modes, whatever is smaller
-    athcodec.encode(full_clip, path, lossless=True, segment_frames=16, tam=tam, ladder="none")
+    athcodec.encode(full_clip, path, lossless=True, segment_frames=16, tam=tam, ladder="none", rest_error="bound")
     return Parts.of(path.read_bytes())
 
 
 @pytest.fixture(scope="module")
 def predicted_parts(full_clip, tmp_path_factory) -> Parts:
     path = tmp_path_factory.mktemp("predicted") / "full.ath"
-    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, ladder="none")
+    athcodec.encode(full_clip, path, rel_error=1e-4, segment_frames=16, ladder="none", rest_error="bound")
     return Parts.of(path.read_bytes())
 
 

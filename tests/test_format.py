@@ -461,7 +461,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
         rest = rest if made == "invalid" else made
     motion = spec.no_motion(plan, parts.header.frame_count, False)
-    refined = spec.refined_plan(branches, rest.rest, level)
+    refined = spec.refined_plan(branches, rest.rest, level, 1)
     if seed % 3:
         stream = random_stream(spec, random, "decode_refined_shapes", refined, motion, before.motion, shift)
         added.append((container.SHAPES, container.pack_refined_shapes(shift, stream)))

@@ -156,7 +156,7 @@ def test_layers_have_the_same_bits(make, options, tmp_path):
 
 
 def test_shapes_of_layers_and_several_clips_have_the_same_bits(full_clip, medley_clips, tmp_path):
-    given = {"rel_error": 1e-4, "ladder": (1e-2, 1e-3), "tam": WITH_MODES}
+    given = {"rel_error": 1e-4, "ladder": (1e-2, 1e-3), "tam": WITH_MODES, "rest_error": "bound"}
     data = encoded(full_clip, tmp_path, segment_frames=16, **given)
     assert chunk_kinds(data) >= {"SHAPES", "REFINED_REST"}
     assert_same_bits(data)

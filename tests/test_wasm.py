@@ -299,7 +299,8 @@ answer({
          info.branchCount, info.frameCount, info.segmentCount, info.clipCount, info.levelCount, info.fullLevelCount,
          info.nodeCount, info.chunkCount, info.isFloat64],
   branches: digest(...each(info.branchCount, (i) => Int32Array.of(
-    b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i]))),
+    b.parent[i], b.count[i], b.attach[i], b.flags[i], b.lag[i], b.first[i], b.subtree[i], b.depth[i],
+    b.rigid[i], b.detail[i]))),
   times: [...file.times()],
   rest: [digest(file.rest()), digest(file.rest("file", { out: new Float64Array(3 * info.vertexCount) }))],
   errors: levels.map((level) => [0, info.segmentCount - 1].map((first) => file.levelError(level, first))),
@@ -343,7 +344,7 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
             info.chunk_count,
             bool(info.is_float64),
         ],
-        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 32 * info.branch_count))),
+        "branches": digest(np.frombuffer(ctypes.string_at(lib.ath_branches(file), 40 * info.branch_count))),
         "times": list(ctypes.cast(lib.ath_times(file), POINTER(c_double))[: info.frame_count]),
         "rest": [digest(rest), digest(wide)],
         "errors": [

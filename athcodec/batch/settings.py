@@ -26,6 +26,7 @@ from athcodec.ath import Thresholds
 from athcodec.atomic_files import is_url
 from athcodec.encoding.layers import ladder_of
 from athcodec.encoding.search import EFFORTS
+from athcodec.encoding.shape import RestPrecision
 from athcodec.errors import ClipError
 from athcodec.host_mesh import HOST
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
@@ -166,6 +167,13 @@ def _positive_length(value: Any) -> float | str:
     return value
 
 
+def _rest_error(value: Any) -> float | str:
+    if isinstance(value, bool):
+        raise ValueError("expected a fraction, a length or 'bound'")
+    RestPrecision.of(value)
+    return value
+
+
 def _fraction(value: Any) -> float:
     if isinstance(value, bool) or not 0 < float(value) < 1:
         raise ValueError("expected a number between 0 and 1")
@@ -250,6 +258,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "segment_frames": _whole(MIN_SEGMENT, MAX_SEGMENT),
     "tam": _tam,
     "hierarchy": _path,
+    "rest_error": _rest_error,
     "exact_rest": _BOOL,
     "lossless": _BOOL,
     "weights": _TEXT,

@@ -13,6 +13,7 @@ from athcodec import discovery
 from athcodec.cli import verbs
 from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
 from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
+from athcodec.encoding.shape import RestPrecision
 from athcodec.host_mesh import HOST
 from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
 from athcodec.sources import SAMPLES
@@ -260,6 +261,13 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, "
         "else those of several candidates that make the smallest file)",
     )
+    verb.add_argument(
+        "--rest-error",
+        metavar="FRACTION|LENGTH",
+        type=_argument(_rest_error),
+        help="how far the rest pose may be off: a fraction of the diagonal, a length such as 2mm, or bound (default: "
+        "with faces, so little that these keep their shape; else as the bound has it)",
+    )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument(
         "--lossless",
@@ -500,6 +508,13 @@ def _positive_length(text: str) -> Length:
     if not length.value > 0:
         raise ValueError(f"got {text!r}, expected a length above 0")
     return length
+
+
+def _rest_error(text: str) -> float | str:
+    """A fraction, a length with its unit, or OF_BOUND."""
+    option = float(text) if re.fullmatch(r"[\d.]+([eE][+-]?\d+)?", text) else text
+    RestPrecision.of(option)
+    return option
 
 
 def _fraction(text: str) -> float:

@@ -69,6 +69,7 @@ def encode(args: argparse.Namespace) -> int:
             tam=thresholds(args.tam, unit),
             exact_rest=args.exact_rest,
             host_rest=args.rest == HOST,
+            rest_error=args.rest_error,
             lossless=args.lossless,
             weights=args.weights,
             attributes=args.attributes,
@@ -120,7 +121,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
     """The settings of a clip that options of the command line give."""
     from athcodec.batch.settings import BOUNDS, READING
 
-    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend")
+    names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
     given |= {

@@ -103,14 +103,24 @@ static void to_quaternion(const double R[9], double q[4])
     for (int32_t i = 0; i < 4; i++) q[i] = p[i] * scale;
 }
 
+static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
+{
+    centre[0] = centre[1] = centre[2] = 0.0;
+    for (int32_t i = 0; i < piece->count; i++)
+        for (int32_t k = 0; k < 3; k++) centre[k] += ath_rest_of(plan, piece->first + i)[k] / (double)piece->count;
+}
+
 /* The piece's own rotation against its predicted one, as rotation vectors over time, unwrapped. `local`: its
  * vertices relative to the attach point, in the predicted frame. What they say no more of than an error of `step` would,
- * such as the twist of a straight stem, stays as in the frame before. */
+ * such as the twist of a straight stem, stays as in the frame before. That of a rigid piece is about its centre: an error of
+ * what it hangs on does not turn it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
                          double *omega)
 {
-    const double *a = ath_rest_attach(plan, piece);
-    double q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    int rigid = (piece->flags & ATH_RIGID) != 0;
+    double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    memcpy(a, ath_rest_attach(plan, piece), sizeof a);
+    if (rigid) rest_centre(plan, piece, a);
     for (int32_t t = 0; t < T; t++) {
         double H[9] = {0}, size2 = 0.0;
         for (int32_t i = 0; i < piece->count; i++) {
@@ -121,7 +131,8 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
                 for (int32_t j = 0; j < 3; j++) H[3 * j + k] += x[j * T + t] * d;
             }
         }
-        for (int32_t k = 0; k < 9; k++) H[k] += (1e-6 * size2 + step * step * (double)piece->count) * R[k];
+        double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
+        for (int32_t k = 0; k < 9; k++) H[k] += prior * R[k];
         ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
         to_quaternion(R, q);
         if (q[0] < -0.9) /* beyond about 310 degrees: the same rotation the other way round */
@@ -153,26 +164,62 @@ static void to_local(int32_t T, const ath_piece *piece, const ath_frames *at, co
                             local + (size_t)i * 3 * (size_t)T);
 }
 
-/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. */
+static void code_shift(const ath_motion *motion, const ath_piece *piece, const ath_piece_before *before,
+                       ath_piece_rows *rows, const ath_scratch *scratch, double dead_zone)
+{
+    const ath_stream *base = ath_base_stream(motion, piece);
+    int32_t T = motion->frames;
+    double step = ath_shift_step(piece, base);
+    if (before)
+        ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->coarse_shift,
+                          rows->predicted_shift);
+    code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
+    ath_move_point(T, scratch->track, scratch->at.point);
+    if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
+}
+
+/* How far the first vertex is from where the piece hangs. */
+static void shift_of_first(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
+                           const double *source)
+{
+    const double *x = source + (size_t)piece->first * 3 * (size_t)T;
+    const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
+    for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
+}
+
+/* How far the vertices of a rigid piece are, on average, from where it would put them. */
+static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece, const ath_scratch *scratch,
+                         const double *source)
+{
+    const double *a = ath_rest_attach(plan, piece), *R = scratch->at.rotation;
+    double d[3], weight = 1.0 / (double)piece->count;
+    rest_centre(plan, piece, d);
+    for (int32_t k = 0; k < 3; k++) d[k] -= a[k];
+    for (int32_t k = 0; k < 3; k++)
+        for (int32_t t = 0; t < T; t++) {
+            double sum = 0.0;
+            for (int32_t i = 0; i < piece->count; i++)
+                sum += source[((size_t)(piece->first + i) * 3 + (size_t)k) * (size_t)T + (size_t)t];
+            scratch->track[k * T + t] =
+                sum * weight - scratch->at.point[k * T + t]
+                - (R[3 * k * T + t] * d[0] + R[(3 * k + 1) * T + t] * d[1] + R[(3 * k + 2) * T + t] * d[2]);
+        }
+}
+
+/* Codes the piece's own translation and rotation; leaves its vertices in the turned frame in `local`. A rigid piece
+ * is turned first, so that the one does not stand for the other. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
                            const double *source, double dead_zone, double *local)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
+    int rigid = (piece->flags & ATH_RIGID) != 0;
     double rotation_step = ath_rotation_step(plan, piece, base);
     ath_attach(plan, motion, piece, scratch->at);
-    if (ath_has_shift(piece)) {
-        const double *x = source + (size_t)piece->first * 3 * (size_t)T;
-        const double *a = ath_rest_attach(plan, piece), *x0 = ath_rest_of(plan, piece->first);
-        double step = ath_shift_step(piece, base);
-        for (int32_t i = 0; i < 3 * T; i++) scratch->track[i] = x[i] - (x0[i / T] - a[i / T]) - scratch->at.point[i];
-        if (before)
-            ath_predict_track(base, T, before->frequencies, step, motion->ratio, before->shift, rows->coarse_shift,
-                              rows->predicted_shift);
-        code_track(base, T, step, dead_zone, scratch->track, rows->predicted_shift, rows->shift);
-        ath_move_point(T, scratch->track, scratch->at.point);
-        if (motion->decoded) memcpy(scratch->shift, scratch->track, 3 * (size_t)T * sizeof(double));
+    if (ath_has_shift(piece) && !rigid) {
+        shift_of_first(plan, T, piece, scratch, source);
+        code_shift(motion, piece, before, rows, scratch, dead_zone);
     }
     to_local(T, piece, &scratch->at, source, local);
     if (rotation_step > 0.0) {
@@ -183,6 +230,10 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         code_track(base, T, rotation_step, dead_zone, scratch->track, rows->predicted_rotation, rows->rotation);
         ath_turn(T, scratch->track, scratch->at.rotation);
         if (motion->decoded) memcpy(scratch->rotation, scratch->track, 3 * (size_t)T * sizeof(double));
+    }
+    if (ath_has_shift(piece) && rigid) {
+        shift_of_all(plan, T, piece, scratch, source);
+        code_shift(motion, piece, before, rows, scratch, dead_zone);
     }
 }
 
@@ -199,7 +250,7 @@ static void note_piece(const ath_motion *motion, const ath_piece *piece, int32_t
     extents[0] = ath_max(ath_row_extent(rows->shift, motion->frames, motion->frames),
                          ath_row_extent(rows->rotation, motion->frames, motion->frames));
     extents[1] = 0;
-    for (int32_t r = 0; r < piece->rank; r++) {
+    for (int32_t r = 0; r < ath_rank(piece); r++) {
         int32_t count = ath_row_extent(ath_row(rows->modes, r, motion->frames), motion->frames, motion->frames);
         extents[0] = ath_max(extents[0], count);
         if (count > 0) extents[1] = rows->shape_count > 0 ? ath_max(ath_shape_modes(piece), r + 1) : r + 1;
@@ -233,10 +284,10 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
                    scratch->placed);
     if (motion->before) ath_predict_modes(plan, motion, piece, &before, scratch, &rows);
     ath_to_local(plan, T, piece, &scratch->at, source + (size_t)piece->first * 3 * (size_t)T, scratch->placed);
-    ath_project(plan, T, piece, piece->rank, scratch->placed, scratch->rows);
+    ath_project(plan, T, piece, ath_rank(piece), scratch->placed, scratch->rows);
     if (rows.shape_count > 0)
         to_shapes(T, piece, rows.shape_count, integers->duals + integers->shape_first[p] * ATH_SHAPE_NUMBERS, scratch);
-    for (int32_t r = 0; r < piece->rank; r++)
+    for (int32_t r = 0; r < ath_rank(piece); r++)
         code_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), dead_zone,
                    scratch->rows + (size_t)r * 3 * (size_t)T,
                    rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));

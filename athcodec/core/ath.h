@@ -289,6 +289,8 @@ typedef struct ath_branch {
     int32_t first;   /* its first vertex */
     int32_t subtree; /* branches in its subtree, itself included */
     int32_t depth;
+    int32_t rigid;  /* layers, from the first on, in which its pieces turn and move as they are */
+    int32_t detail; /* 0, or what its largest step of the rest pose is, 2 to the power of half of it less 64 */
 } ath_branch;
 
 ATH_API const ath_branch *ath_branches(const ath_file *file);

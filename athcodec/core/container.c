@@ -519,10 +519,11 @@ int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *hea
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body)
 {
     if (chunk.size < 6) return ATH_BAD_CHUNK;
-    int32_t rotation = chunk.bytes[4] & ~ONLY_TIPS;
+    int32_t rotation = chunk.bytes[4] & 7;
     head->step = (double)f32_at(chunk.bytes);
     head->rotation_step_factor = (double)(1 << rotation >> 1);
-    head->only_tips = rotation != chunk.bytes[4];
+    head->only_tips = (chunk.bytes[4] & ONLY_TIPS) != 0;
+    head->turn = chunk.bytes[4] >> 4;
     head->bits = chunk.bytes[5];
     *body = rest_of(chunk, 6);
     if (!is_step(head->step) || rotation > 4) return ATH_BAD_CHUNK;

@@ -254,14 +254,14 @@ static int correct_track(track *track, const ath_correction *above, int32_t wide
 }
 
 int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64, const void *positions,
-                             const double *source, const double origin[3], const double *limits, double step,
-                             int32_t *corrections, int64_t capacity)
+                             const double *source, const double origin[3], const double *limits, const uint8_t *narrow,
+                             double step, int32_t *corrections, int64_t capacity)
 {
     track track = {.frames = frames, .is_float64 = is_float64, .step = step};
     ath_correction above[ATH_SEGMENT_FRAMES] = {{{0}, 0}};
     int64_t count = 0;
     for (int32_t v = 0; v < vertex_count; v++) {
-        int32_t widest = ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
+        int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
         for (int corrected = 0; !corrected; widest--) {
             if (widest < 0) return -1;
             open_track(&track, v, positions, source, origin, limits[v]);

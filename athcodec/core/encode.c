@@ -7,6 +7,13 @@
 #include "predicted_model.h"
 #include "streams.h"
 
+/* Of a pose of all branches' vertices. */
+static void copy_pose(const ath_branch *branches, int32_t branch_count, const double *pose, double *copy)
+{
+    const ath_branch *last = branches + branch_count - 1;
+    memcpy(copy, pose, 3 * (size_t)(last->first + last->count) * sizeof *copy);
+}
+
 /* The size written; -1: no space, -2: the input is not something that the stream can hold. */
 static int64_t written(ath_coder *coder, int valid) { return valid ? coder_finish(coder) : -2; }
 
@@ -63,20 +70,22 @@ int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const
 
 int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches, int32_t branch_count,
                         double step, int adaptive, double slack, ath_mesh *mesh, const int32_t *coarse,
-                        const double *before, int32_t *steps, const double *source, double *rest)
+                        const double *before, int32_t *steps, const double *source, double *moved, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, adaptive, mesh, slack};
+    rest_layer layer = {coarse, before, steps, adaptive, mesh, slack, moved};
+    copy_pose(branches, branch_count, source, moved);
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
 }
 
 int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                int32_t branch_count, double step, const double *reference, const double *source,
-                               double *turns, double *rest)
+                               double *moved, double *turns, double *rest)
 {
     ath_coder coder;
-    bent_pose pose = {reference, source, rest, turns, step};
+    bent_pose pose = {reference, source, moved, rest, turns, step};
+    copy_pose(branches, branch_count, source, moved);
     coder_start(&coder, bytes, capacity);
     return written(&coder, code_source_rest(&coder, (rest_model *)model, &pose, branches, branch_count));
 }

@@ -114,10 +114,12 @@ ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_floa
 enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
 
 /* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
- * ath_correction. Returns how many there are; -1: the step cannot express them. */
+ * ath_correction. narrow: of each vertex whether its corrections are to be of one frame. Returns how many there are; -1:
+ * the step cannot express them. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
-                                             const double *limits, double step, int32_t *corrections, int64_t capacity);
+                                             const double *limits, const uint8_t *narrow, double step,
+                                             int32_t *corrections, int64_t capacity);
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);
 
@@ -128,15 +130,16 @@ ATH_ENCODER_API int64_t ath_encode_front(uint8_t *bytes, size_t capacity, const 
 ATH_ENCODER_API int64_t ath_encode_hierarchy(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                              int32_t branch_count, int32_t vertex_count, const int32_t *branch_source,
                                              const int32_t *vertex_source);
-/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits, where `adaptive`. */
+/* mesh: null, or of a connected pose; slack: how far from its place a vertex may be put to save bits, where `adaptive`;
+ * moved: scratch, as large as the source. */
 ATH_ENCODER_API int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                         int32_t branch_count, double step, int adaptive, double slack, ath_mesh *mesh,
                                         const int32_t *coarse, const double *before, int32_t *steps,
-                                        const double *source, double *rest);
+                                        const double *source, double *moved, double *rest);
 /* turns: scratch, branch_count x 9. */
 ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                                int32_t branch_count, double step, const double *reference,
-                                               const double *source, double *turns, double *rest);
+                                               const double *source, double *moved, double *turns, double *rest);
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                               int32_t branch_count, const ath_mesh *mesh, int is_float64,
                                               const double *rest);

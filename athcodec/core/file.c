@@ -245,6 +245,7 @@ static void build_plan(ath_file *file)
     plan->piece_count = ath_count_pieces(file->branches, plan->branch_count, plan->vertex_count);
     plan->node_count = ath_count_nodes(file->branches, plan->branch_count);
     ath_build_plan(plan, file->pieces, file->nodes, (int32_t *)file->scratch, 0);
+    ath_plan_rigid(plan, file->pieces, 0);
     if (file->header.is_predicted) ath_without_stems(plan, file->pieces, file->nodes);
 }
 
@@ -262,6 +263,7 @@ static void plan_layers(ath_file *file)
             layer->pieces[p].low_level = -1;
             layer->pieces[p].low_modes = 0;
         }
+        ath_plan_rigid(&layer->plan, layer->pieces, q);
     }
     if (file->first_layer > 0) return;
     memcpy(file->layers[0].nodes, file->nodes, (size_t)file->plan.node_count * sizeof *file->nodes);

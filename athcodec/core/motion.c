@@ -134,7 +134,7 @@ void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece 
     ath_frames base = cached_frames(motion, parent);
     const double *here = cached_vertex(motion, parent, piece->attach);
     copy_rows(at.point, here, 3 * (size_t)T);
-    if (!(parent->flags & ATH_SHEET)) {
+    if (!(parent->flags & (ATH_SHEET | ATH_RIGID))) {
         int32_t last = parent->first + parent->count - 1;
         int32_t before = piece->attach - 1, after = ath_min(piece->attach + 1, last);
         const double *from = before < parent->first ? base.point : cached_vertex(motion, parent, before);
@@ -251,7 +251,7 @@ static placing_terms terms_of(const ath_piece *piece, const ath_piece_rows *rows
         terms.shape[terms.count++] = s;
     }
     terms.shape_count = terms.count;
-    for (int32_t m = from; m < piece->rank; m++) {
+    for (int32_t m = from; m < ath_rank(piece); m++) {
         if (!used[m]) continue;
         for (int32_t axis = 0; axis < 3; axis++)
             terms.track[axis][terms.count] = tracks + ((size_t)m * 3 + (size_t)axis) * (size_t)T;
@@ -370,7 +370,7 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
     if (piece->attach_cache < 0) return;
     ath_frames at = cached_frames(motion, piece);
     copy_rows(at.point, scratch->at.point, 3 * (size_t)T);
-    if (piece->flags & ATH_SHEET)
+    if (piece->flags & ATH_SHEET && !(piece->flags & ATH_RIGID))
         turn_with_sheet(plan, T, piece, scratch, at.rotation);
     else
         copy_rows(at.rotation, scratch->at.rotation, 9 * (size_t)T);
@@ -380,14 +380,16 @@ static void carry(const ath_plan *plan, const ath_motion *motion, const ath_piec
 double ath_rotation_step(const ath_plan *plan, const ath_piece *piece, const ath_stream *stream)
 {
     const double *a = ath_rest_attach(plan, piece);
-    double lever2 = 0.0;
-    if (stream->only_tips && piece->last_attached >= 0) return 0.0;
+    int rigid = (piece->flags & ATH_RIGID) != 0;
+    double lever2 = 0.0, factor = rigid && !(stream->rotation_step_factor > 0.0) ? 1.0 : stream->rotation_step_factor;
+    if (stream->only_tips && piece->last_attached >= 0 && !rigid) return 0.0;
     for (int32_t i = 0; i < piece->count; i++) {
         const double *x0 = ath_rest_of(plan, piece->first + i);
         for (int32_t k = 0; k < 3; k++) lever2 = lever2 + (x0[k] - a[k]) * (x0[k] - a[k]);
     }
-    if (!(lever2 > 0.0) || !(stream->rotation_step_factor > 0.0)) return 0.0;
-    return stream->rotation_step_factor * stream->step / ath_sqrt(lever2 * 2.0 / 3.0);
+    if (!(lever2 > 0.0) || !(factor > 0.0)) return 0.0;
+    double step = factor * stream->step / ath_sqrt(lever2 * 2.0 / 3.0);
+    return rigid && stream->turn_step > 0.0 && stream->turn_step < step ? stream->turn_step : step;
 }
 
 double ath_shift_step(const ath_piece *piece, const ath_stream *stream)
@@ -455,7 +457,7 @@ const double *ath_pose_rows(const ath_plan *plan, const ath_motion *motion, int3
 {
     const ath_piece *piece = plan->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
-    for (int32_t m = 0; m < piece->rank; m++)
+    for (int32_t m = 0; m < ath_rank(piece); m++)
         used[m] = (uint8_t)any_nonzero(row_of(motion, scratch, m), 3 * motion->frames);
     return place_used(plan, motion, piece, rows, used, scratch);
 }
@@ -472,7 +474,7 @@ const double *ath_pose_turned(const ath_plan *plan, const ath_motion *motion, in
 {
     const ath_piece *piece = plan->pieces + p;
     uint8_t used[ATH_PIECE_VERTICES];
-    for (int32_t m = 0; m < piece->rank; m++) {
+    for (int32_t m = 0; m < ath_rank(piece); m++) {
         used[m] = 0;
         if (rows->counts && rows->counts[m] == 0) continue;
         inverse_row(motion, piece, rows, m, row_of(motion, scratch, m));
@@ -496,7 +498,7 @@ double ath_node_step(int32_t exponent) { return half_octave(exponent); }
 
 ath_stream ath_node_stream(const ath_motion *motion, double step)
 {
-    ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0, 0};
+    ath_stream stream = {step, 0.0, motion->waves, motion->frames, -1, 0.0, 0, 0};
     return stream;
 }
 
@@ -547,7 +549,7 @@ static void map_of_modes(const ath_plan *plan, const ath_motion *motion, const a
                          const ath_piece_rows *rows, const ath_scratch *scratch, double *E)
 {
     const ath_piece *piece = plan->pieces + node->piece;
-    for (int32_t m = 0; m < ath_min(piece->low_modes, piece->rank); m++) {
+    for (int32_t m = 0; m < ath_min(piece->low_modes, ath_rank(piece)); m++) {
         double g[3];
         affine_part(plan, node, plan->bases + piece->basis + (size_t)m * (size_t)piece->count, g);
         inverse_row(motion, piece, rows, m, scratch->track);
@@ -774,7 +776,7 @@ static void shape_tracks(int32_t T, const ath_piece *piece, const ath_piece_rows
 void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                        const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
 {
-    int32_t T = motion->frames, modes = before->frequencies > 0 ? ath_min(before->modes, piece->rank) : 0;
+    int32_t T = motion->frames, modes = before->frequencies > 0 ? ath_min(before->modes, ath_rank(piece)) : 0;
     if (modes > 0 && rows->shape_count > 0) modes = ath_max(modes, ath_shape_modes(piece));
     if (modes > 0) {
         ath_to_local(plan, T, piece, &scratch->at, before->placed, scratch->placed);
@@ -793,7 +795,7 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         ath_predict_track(stream, T, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
                           motion->ratio, track, coarse, ath_row(rows->predicted_modes, r, T));
     }
-    for (int32_t r = modes; r < piece->rank; r++)
+    for (int32_t r = modes; r < ath_rank(piece); r++)
         memset(ath_row(rows->predicted_modes, r, T), 0, 3 * (size_t)T * sizeof(int32_t));
 }
 

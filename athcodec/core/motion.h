@@ -11,6 +11,7 @@ typedef struct ath_stream {
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
     int32_t root; /* level of the first of the streams whose learned bases begin with the same rows; -1: ath_waves */
+    double turn_step;  /* largest step of the rotations of rigid pieces, 0: any */
     int32_t only_tips; /* 1: of pieces that carry others no rotations are coded */
     int32_t reserved;
 } ath_stream;
@@ -158,7 +159,7 @@ ATH_INLINE const ath_stream *ath_mode_stream(const ath_motion *motion, const ath
 }
 
 /* How many of a piece's modes its shapes are made of. */
-ATH_INLINE int32_t ath_shape_modes(const ath_piece *piece) { return ath_min(piece->rank, ATH_SHAPE_MODES); }
+ATH_INLINE int32_t ath_shape_modes(const ath_piece *piece) { return ath_min(ath_rank(piece), ATH_SHAPE_MODES); }
 
 /* Most shapes in the stream of the piece's base level. */
 ATH_INLINE int32_t ath_base_shapes(const ath_piece *piece)

@@ -96,10 +96,10 @@ static void code_piece(ath_coder *coder, coefficient_model *model, const ath_pla
         if (ath_rotation_step(plan, piece, stream) > 0.0)
             note_count(rows, ROTATION_SLOT, code_row(coder, model, frames, rank, ROTATION_SLOT, -1, rows->rotation));
     }
-    if (piece->low_level == level) to = ath_min(piece->low_modes, piece->rank);
+    if (piece->low_level == level) to = ath_min(piece->low_modes, ath_rank(piece));
     if (piece->level == level) {
         from = piece->low_modes;
-        to = piece->rank;
+        to = ath_rank(piece);
     }
     for (int32_t m = from; m < to; m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
@@ -136,12 +136,12 @@ static void code_refined_modes(ath_coder *coder, refinement_model *model, const 
 {
     int32_t T = motion->frames, above_count = -1;
     row_prediction prediction = {0, 0, 0, T, (uint32_t)motion->ratio};
-    for (int32_t m = 0; m < piece->rank; m++) {
+    for (int32_t m = 0; m < ath_rank(piece); m++) {
         if (ath_is_shape_row(piece, rows, m) && 3 * m >= rows->shape_count) continue;
         prediction.row = ath_row(rows->predicted_modes, m, T);
         const int32_t *coarse = rows->coarse_modes ? rows->coarse_modes + (size_t)m * 3 * (size_t)T : 0;
         prediction.coarse = coarse;
-        prediction.below = m + 1 < piece->rank ? (coarse ? coarse : prediction.row) + 3 * T : 0;
+        prediction.below = m + 1 < ath_rank(piece) ? (coarse ? coarse : prediction.row) + 3 * T : 0;
         above_count = code_refined_row(coder, model, stream->temporal_rank, m, above_count, &prediction,
                                        ath_row(rows->modes, m, T));
         note_count(rows, m, ath_row_extent(ath_row(rows->modes, m, T), T, T));

@@ -138,6 +138,14 @@ void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t 
     place_attach_caches(plan, pieces, memory, keep);
 }
 
+void ath_plan_rigid(const ath_plan *plan, ath_piece *pieces, int32_t layer)
+{
+    for (ath_piece *piece = pieces; piece < pieces + plan->piece_count; piece++) {
+        piece->flags &= ~ATH_RIGID;
+        if (plan->branches[piece->branch].rigid > layer) piece->flags |= ATH_RIGID;
+    }
+}
+
 /* Functionals w_0, w_1, w_2 with mean(w_i(d) w_j(d)) = (i == j) over the vertices of the subtree, d = x0 - a: the axes
  * with the most left first, orthonormalised under the second moments; directions of no extent are left out. */
 static void whiten(const ath_plan *plan, ath_node *node)

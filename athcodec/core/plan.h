@@ -4,6 +4,8 @@
 
 #include "internal.h"
 
+enum { ATH_RIGID = 8 }; /* of a piece: it turns and moves as it is */
+
 /* A run of at most ATH_PIECE_VERTICES vertices of one stem, with one spatial basis. The first piece of a branch hangs
  * on the parent's stem, the others on the last vertex of the piece before. */
 typedef struct ath_piece {
@@ -57,6 +59,9 @@ ATH_ENCODER_API int32_t ath_count_nodes(const ath_branch *branches, int32_t bran
  * been attached. `memory`: scratch, vertex_count. */
 ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t *memory, int keep);
 
+/* Marks the pieces of branches that are rigid in a layer. */
+ATH_ENCODER_API void ath_plan_rigid(const ath_plan *plan, ath_piece *pieces, int32_t layer);
+
 /* Of predicted motion, whose levels have maps of nodes alone, all of them coded: no piece begins at their levels. */
 ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes);
 
@@ -105,6 +110,9 @@ ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
 {
     return piece->low_level >= 0 ? piece->low_level : piece->level;
 }
+
+/* Modes that it moves by. */
+ATH_INLINE int32_t ath_rank(const ath_piece *piece) { return piece->flags & ATH_RIGID ? 0 : piece->rank; }
 
 ATH_INLINE int ath_has_shift(const ath_piece *piece) { return piece->parent < 0 || (piece->flags & ATH_LOOSE); }
 

@@ -271,7 +271,13 @@ static void keep_streams(ath_work *work)
 {
     for (int32_t d = 0; work->keeping.at && d <= work->level; d++) {
         const ath_stream *stream = work->streams + d;
-        kept_stream kept = {stream->step, stream->rotation_step_factor, stream->temporal_rank, stream->root};
+        kept_stream kept = {stream->step,
+                            stream->rotation_step_factor,
+                            stream->turn_step,
+                            stream->temporal_rank,
+                            stream->root,
+                            stream->only_tips,
+                            0};
         size_t learned = learned_numbers(work, stream);
         if (!has_stream(work->file, d)) continue;
         void *at = ath_kept_take(&work->keeping, sizeof kept);
@@ -307,6 +313,8 @@ static void restore_streams(ath_work *work)
         work->kept += sizeof kept;
         stream->step = kept.step;
         stream->rotation_step_factor = kept.rotation_step_factor;
+        stream->turn_step = kept.turn_step;
+        stream->only_tips = kept.only_tips;
         stream->temporal_rank = kept.temporal_rank;
         stream->root = kept.root;
         size_t learned = learned_numbers(work, stream);
@@ -639,6 +647,7 @@ static int open_stems(ath_work *work, int32_t d)
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
     stream->only_tips = head.only_tips;
+    stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
     if (head.bits) result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;
@@ -791,7 +800,7 @@ static void look_before(ath_work *work, int32_t q, int32_t p, const double *plac
     before->modes = 0;
     before->frequencies = ath_max(ath_row_extent(coarse->rows.shift, T, coarse->counts[SHIFT_SLOT]),
                                   ath_row_extent(coarse->rows.rotation, T, coarse->counts[ROTATION_SLOT]));
-    for (int32_t r = 0; r < piece->rank; r++) {
+    for (int32_t r = 0; r < ath_rank(piece); r++) {
         int32_t count = ath_row_extent(ath_row(coarse->rows.modes, r, T), T, coarse->counts[r]);
         before->frequencies = ath_max(before->frequencies, count);
         same = same && ath_mode_stream(&coarse->motion, piece, r)->root == root;

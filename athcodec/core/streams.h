@@ -11,7 +11,7 @@
 
 /* ---- hierarchy ---- */
 
-enum { PLACES = 256 };
+enum { PLACES = 256, MOST_LAYERS = 8, MOST_DETAIL = 255, WHOLE_DETAIL = 128 /* of step 1 */ };
 
 /* Of numbers in an order of their own: each is expected one step after the number before it, or else one step after that
  * at the same place of the last run that has one there, as in a source that holds all first vertices, then all second. */
@@ -24,7 +24,13 @@ typedef struct {
 } permutation_model;
 
 typedef struct {
+    ath_context any;
+    number_model difference;
+} branch_number_model;
+
+typedef struct {
     number_model up, count, attach, lag;
+    branch_number_model rigid, detail;
     permutation_model branch_source, vertex_source;
     ath_context flag[3][2];
 } hierarchy_model;
@@ -40,12 +46,20 @@ static void permutation_model_init(permutation_model *model)
     model->mean = 64;
 }
 
+static void branch_number_model_init(branch_number_model *model)
+{
+    context_init(&model->any, 2048);
+    number_model_init(&model->difference);
+}
+
 static void hierarchy_model_init(hierarchy_model *model)
 {
     number_model_init(&model->up);
     number_model_init(&model->count);
     number_model_init(&model->attach);
     number_model_init(&model->lag);
+    branch_number_model_init(&model->rigid);
+    branch_number_model_init(&model->detail);
     permutation_model_init(&model->branch_source);
     permutation_model_init(&model->vertex_source);
     for (int32_t i = 0; i < 3; i++)
@@ -78,7 +92,7 @@ static int32_t code_parent(ath_coder *coder, hierarchy_model *model, const ath_b
 static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *branches, int32_t b, int32_t vertices_left,
                        int32_t *last_up, int32_t *mean_count)
 {
-    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0};
+    static const ath_branch none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     ath_branch *branch = branches + b;
     const ath_branch *before = b == 0 ? &none : branch - 1;
     branch->parent = b == 0 ? -1 : code_parent(coder, model, branches, b, last_up);
@@ -192,6 +206,23 @@ static int code_vertex_numbers(ath_coder *coder, hierarchy_model *model, ath_bra
     return 1;
 }
 
+/* A number that most branches have none of, each expected to be that of the last branch of such a lag. */
+static int code_of_branches(ath_coder *coder, branch_number_model *model, int32_t branch_count, ath_branch *branches,
+                            int32_t *number, int32_t most)
+{
+    size_t stride = sizeof *branches / sizeof *number;
+    int32_t any = 0, last[16] = {0};
+    for (int32_t b = 0; ENCODING && b < branch_count; b++) any |= number[(size_t)b * stride] != 0;
+    any = coder_bit(coder, &model->any, any);
+    for (int32_t b = 0; b < branch_count; b++) {
+        int32_t *own = number + (size_t)b * stride, *expected = last + ath_min(branches[b].lag, 15);
+        if (any) *expected += code_signed(coder, &model->difference, 0, ENCODING ? *own - *expected : 0);
+        if (*expected < 0 || *expected > most) return 0;
+        *own = *expected;
+    }
+    return 1;
+}
+
 static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t branch_count, int32_t vertex_count,
                           ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
@@ -211,7 +242,9 @@ static int code_hierarchy(ath_coder *coder, hierarchy_model *model, int32_t bran
         else if (!code_attach(coder, model, branches, b, &mean_attach))
             return 0;
     }
-    return code_branch_numbers(coder, model, branch_count, branch_source)
+    return code_of_branches(coder, &model->rigid, branch_count, branches, &branches->rigid, MOST_LAYERS)
+           && code_of_branches(coder, &model->detail, branch_count, branches, &branches->detail, MOST_DETAIL)
+           && code_branch_numbers(coder, model, branch_count, branch_source)
            && code_vertex_numbers(coder, model, branches, branch_count, vertex_count, branch_source, vertex_source);
 }
 
@@ -227,8 +260,15 @@ typedef struct {
     int32_t *steps; /* filled for the next layer; may be null */
     int adaptive;
     ath_mesh *mesh; /* null: not connected; else it gives the order */
-    double slack;   /* an encoder's: how far from its place it may put a vertex to save bits */
+    /* An encoder's: how far from its place it may put a vertex to save bits; a copy of the source's pose, in which what
+     * has detail goes along with what it hangs on. */
+    double slack, *moved;
 } rest_layer;
+
+typedef struct {
+    lattice_model lattice;
+    rest_predictor predictor, connected;
+} adaptive_rest;
 
 typedef struct {
     number_model inner, start;
@@ -242,8 +282,7 @@ typedef struct {
     double bases[REST_BASES]; /* of runs of 1, 2, ... REST_RUN vertices, each made when it is first needed */
     double work[2 * REST_RUN * REST_RUN];
     uint8_t made[REST_RUN + 1];
-    lattice_model lattice;
-    rest_predictor predictor, connected;
+    adaptive_rest adaptive[2]; /* of branches without detail, and with it */
 } rest_model;
 
 static void rest_model_init(rest_model *model, int is_refinement)
@@ -257,9 +296,18 @@ static void rest_model_init(rest_model *model, int is_refinement)
     else
         coefficient_model_init(&model->modes, REST_RUN, model->history);
     memset(model->made, 0, sizeof model->made);
-    lattice_model_init(&model->lattice);
-    rest_predictor_init(&model->predictor);
-    rest_connected_init(&model->connected);
+    for (int32_t i = 0; i < 2; i++) {
+        lattice_model_init(&model->adaptive[i].lattice);
+        rest_predictor_init(&model->adaptive[i].predictor);
+        rest_connected_init(&model->adaptive[i].connected);
+    }
+}
+
+/* The step of a branch's rest pose, where `step` is that of others. */
+static double rest_step(const ath_branch *branch, double step)
+{
+    double most = branch->detail > 0 ? ath_node_step(branch->detail - WHOLE_DETAIL) : step;
+    return most < step ? most : step;
 }
 
 /* Where vertex i of a stem is expected: the last step, or the one `lag` vertices ago, is taken again. */
@@ -280,7 +328,7 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
 }
 
 /* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
-static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memory *all, const rest_memory *phase,
+static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest_memory *all, const rest_memory *phase,
                             int32_t integers[3])
 {
     const uint32_t *mean = all->mean, *own = phase->mean;
@@ -288,13 +336,13 @@ static void code_rest_point(ath_coder *coder, rest_model *model, const rest_memo
         int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
                         / 2;
-        integers[k] = code_integer(coder, &model->lattice, parity_of(integers, k), about, 0, integers[k]);
+        integers[k] = code_integer(coder, lattice, parity_of(integers, k), about, 0, integers[k]);
     }
 }
 
 /* A vertex as a point of a lattice about where it is expected. */
-static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer,
-                                 rest_predictor *predictor, rest_guess *at, int32_t v, double unit,
+static void code_expected_vertex(ath_coder *coder, lattice_model *lattice, const rest_layer *layer,
+                                 rest_predictor *predictor, rest_guess *at, int32_t v, double unit, double slack,
                                  const double *source, double *rest)
 {
     double per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)v;
@@ -303,10 +351,11 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
 #ifdef ATH_ENCODING
     double units[3];
     rest_term(units, expected, source + (out - rest), per_unit);
-    nearest_of_lattice(units, layer->slack * per_unit, at->phase->mean, integers);
+    nearest_of_lattice(units, slack * per_unit, at->phase->mean, integers);
 #endif
     (void)source;
-    code_rest_point(coder, model, &predictor->all, at->phase, integers);
+    (void)slack;
+    code_rest_point(coder, lattice, &predictor->all, at->phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
     rest_learn(predictor, at, per_unit, out, integers);
@@ -316,10 +365,12 @@ static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest
 static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                                  int32_t i, double step, const double *source, double *rest)
 {
-    double unit = LATTICE_UNIT * step;
+    adaptive_rest *own = model->adaptive + (branch->detail > 0);
+    double unit = LATTICE_UNIT * step, slack = branch->detail > 0 ? 0.0 : layer->slack;
     rest_guess at;
-    rest_look_around(&model->predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
-    code_expected_vertex(coder, model, layer, &model->predictor, &at, branch->first + i, unit, source, rest);
+    rest_look_around(&own->predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
+    code_expected_vertex(coder, &own->lattice, layer, &own->predictor, &at, branch->first + i, unit, slack, source,
+                         rest);
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
@@ -426,25 +477,54 @@ static void code_rest_beam(ath_coder *coder, rest_model *model, const rest_layer
     }
 }
 
+/* That of a vertex, of branches in the order of their vertices. */
+static const ath_branch *branch_of(const ath_branch *branches, int32_t branch_count, int32_t v)
+{
+    int32_t low = 0, high = branch_count;
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (branches[middle].first <= v)
+            low = middle;
+        else
+            high = middle;
+    }
+    return branches + low;
+}
+
 /* Vertices in the order of their mesh, by their neighbours; those without as elsewhere: all below them are known. */
 static void code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer,
-                                const ath_branch *branches, double step, const double *source, double *rest)
+                                const ath_branch *branches, int32_t branch_count, double step, const double *source,
+                                double *rest)
 {
-    double unit = LATTICE_UNIT * step;
-    const ath_branch *branch = branches;
     for (int32_t t = 0; t < layer->mesh->vertex_count; t++) {
         int32_t v = layer->mesh->order[t];
+        const ath_branch *branch = branch_of(branches, branch_count, v);
+        adaptive_rest *own = model->adaptive + (branch->detail > 0);
+        double step_here = rest_step(branch, step), unit = LATTICE_UNIT * step_here;
+        double slack = branch->detail > 0 ? 0.0 : layer->slack;
         rest_ring ring;
         rest_guess at;
         rest_ring_of(layer->mesh, rest, v, &ring);
         layer->mesh->from[v] = ring.base;
         if (ring.base < 0) {
-            while (v >= branch->first + branch->count) branch++;
-            code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step, source, rest);
+            code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step_here, source, rest);
             continue;
         }
-        rest_look_beside(&model->connected, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
-        code_expected_vertex(coder, model, layer, &model->connected, &at, v, unit, source, rest);
+        rest_look_beside(&own->connected, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
+        code_expected_vertex(coder, &own->lattice, layer, &own->connected, &at, v, unit, slack, source, rest);
+    }
+}
+
+/* What has detail keeps its shape: it goes where the stem is that it hangs on, of less detail, and with it what hangs
+ * on it in turn. */
+static void take_along(const ath_branch *branches, const ath_branch *branch, const double *source, double *moved,
+                       const double *rest)
+{
+    if (branch->detail == 0 || branch->attach < 0) return;
+    const double *there = branches[branch->parent].detail > 0 ? moved : rest;
+    for (int32_t k = 0; k < 3; k++) {
+        double way = there[3 * branch->attach + k] - source[3 * branch->attach + k];
+        for (int32_t v = branch->first; v < branch->first + branch->count; v++) moved[3 * v + k] += way;
     }
 }
 
@@ -453,15 +533,17 @@ static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *laye
 {
     rest_model_init(model, layer->coarse != 0);
     if (layer->mesh) {
-        code_connected_rest(coder, model, layer, branches, step, source, rest);
+        code_connected_rest(coder, model, layer, branches, branch_count, step, source, rest);
         return 1;
     }
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
+        double own = rest_step(branches + b, step);
+        if (ENCODING) take_along(branches, branches + b, source, layer->moved, rest);
         if (branches[b].lag == 0)
-            code_rest_beam(coder, model, layer, branches + b, step, source, rest);
+            code_rest_beam(coder, model, layer, branches + b, own, layer->moved, rest);
         else
             for (int32_t i = 0; i < branches[b].count; i++)
-                code_rest_vertex(coder, model, layer, branches + b, i, step, source, rest);
+                code_rest_vertex(coder, model, layer, branches + b, i, own, layer->moved, rest);
     }
     return !model->modes.invalid;
 }
@@ -471,6 +553,7 @@ static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *laye
 /* The poses less the origin; turns: of each branch the rotation that takes it from the one to the other. */
 typedef struct {
     const double *reference, *source;
+    double *moved; /* as rest_layer has it */
     double *rest, *turns;
     double step;
 } bent_pose;
@@ -507,8 +590,7 @@ static void code_bent_vertex(ath_coder *coder, rest_model *model, const bent_pos
         predicted[k] = before < 0 ? here[k] : pose->rest[3 * (size_t)before + (size_t)k] + moved;
     }
     for (int32_t k = 0; k < 3; k++) {
-        int32_t given =
-            ENCODING ? steps_in(pose->source[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
+        int32_t given = ENCODING ? steps_in(pose->moved[3 * (size_t)v + (size_t)k] - predicted[k], pose->step, 0.5) : 0;
         int32_t steps = code_signed(coder, &model->inner, (mean[k] + mean[0] + mean[1] + mean[2]) / 4, given);
         out[k] = predicted[k] + (double)steps * pose->step;
         mean[k] = mean[k] - (mean[k] + 7) / 8 + clipped(steps) * 2;
@@ -548,7 +630,7 @@ static void code_bent_run(ath_coder *coder, rest_model *model, const bent_pose *
     const double *basis = rest_basis(model, n), *base = pose->rest + 3 * (size_t)before;
     const double *from = pose->reference + 3 * (size_t)before, *run = pose->reference + 3 * (size_t)first;
     for (int32_t i = 0; ENCODING && i < n; i++) {
-        const double *x = pose->source + 3 * (size_t)(first + i);
+        const double *x = pose->moved + 3 * (size_t)(first + i);
         for (int32_t k = 0; k < 3; k++)
             local[3 * i + k] = R[k] * (x[0] - base[0]) + R[3 + k] * (x[1] - base[1]) + R[6 + k] * (x[2] - base[2])
                                - (run[3 * i + k] - from[k]);
@@ -593,14 +675,17 @@ static int code_source_rest(ath_coder *coder, rest_model *model, const bent_pose
     for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
         const ath_branch *stem = branches + b, *parent = branches + ath_max(stem->parent, 0);
         double *turn = pose->turns + 9 * (size_t)b;
+        bent_pose own = *pose;
+        own.step = rest_step(stem, pose->step);
+        if (ENCODING) take_along(branches, stem, pose->source, pose->moved, pose->rest);
         if (stem->parent < 0)
             memcpy(turn, identity, sizeof identity);
         else
             turn_at(pose, parent, stem->attach, parent->first + parent->count - 1, turn - 9 * (b - stem->parent), turn);
         if (stem->lag == 0)
-            code_bent_beam(coder, model, pose, stem, turn);
+            code_bent_beam(coder, model, &own, stem, turn);
         else
-            code_bent_sheet(coder, model, pose, stem, turn);
+            code_bent_sheet(coder, model, &own, stem, turn);
     }
     return !model->modes.invalid;
 }

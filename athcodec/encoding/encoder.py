@@ -26,6 +26,7 @@ from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
 from athcodec.segmentation import split_segments
+from athcodec.units import Length
 
 
 def encode(
@@ -39,6 +40,7 @@ def encode(
     tam: Thresholds | None = None,
     exact_rest: bool = False,
     host_rest: bool = False,
+    rest_error: float | str | Length | None = None,
     lossless: bool = False,
     weights: str | np.ndarray | None = None,
     attributes: str = "all",
@@ -76,6 +78,10 @@ def encode(
     host_rest : bool
         Leave the rest pose out: whoever plays the file has the mesh, and hands it over (`open`, host_mesh). It is the
         clip's rest pose, the first frame where it has none of its own, as float32; the file holds its checksum.
+    rest_error : float or str or Length, optional
+        How far the rest pose may be off: a fraction of the diagonal, a length with its unit ("2mm"), or "bound", which
+        leaves it to the bound. By default that of branches with faces is fine enough at every level that edges keep
+        their length within about 2 % and normals within about 1 degree, and that of others is of the bound.
     lossless : bool
         One more level holds the positions bit for bit, and the rest pose is kept likewise; the bound is that of the
         level before.
@@ -118,6 +124,7 @@ def encode(
         tam=tam,
         exact_rest=exact_rest,
         host_rest=host_rest,
+        rest_error=rest_error,
         lossless=lossless,
         weights=weights,
         attributes=attributes,

@@ -44,12 +44,14 @@ from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_
 from athcodec.encoding.progress import Progress, silent
 from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
+from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
+from athcodec.units import Length
 
 SPOOL_BYTES = 64 << 20
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # of the front for a chunk, and for the errors of a level and segment
@@ -66,6 +68,7 @@ class EncodingOptions:
     tam: Thresholds | None = None
     exact_rest: bool = False
     host_rest: bool = False
+    rest_precision: RestPrecision = RestPrecision()
     lossless: bool = False
     weights: str | np.ndarray | None = None
     attributes: str = "all"
@@ -76,12 +79,17 @@ class EncodingOptions:
 
     @classmethod
     def of(
-        cls, *, segment_frames: int | None = None, ladder: str | Sequence[float] = DEFAULT_LADDER, **options
+        cls,
+        *,
+        segment_frames: int | None = None,
+        ladder: str | Sequence[float] = DEFAULT_LADDER,
+        rest_error: float | str | Length | None = None,
+        **options,
     ) -> EncodingOptions:
-        """None for segment_frames is its default; ladder: as `ladder_of` takes it."""
+        """None for segment_frames is its default; ladder, rest_error: as `ladder_of`, `RestPrecision.of` take them."""
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
-        return cls(ladder=ladder_of(ladder), **options)
+        return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
 
     def __post_init__(self) -> None:
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
@@ -255,6 +263,7 @@ class EncodingJob:
             pool,
             options.host_rest,
             polygons=_polygons(clip, options),
+            rest_precision=options.rest_precision,
         )
 
     @property
@@ -282,14 +291,15 @@ class EncodingJob:
             self.source.smallest_bound(bound), self.seen.low, self.seen.high, self.clip.dtype, self.source.extent
         )
         ath = self.seen.ath(self.thresholds(bound))
-        ratio = self._layer_ratios(ath, bound)[0]
+        ratios = self._layer_ratios(ath, bound)
+        ratio = ratios[0]
         if self.source.still:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratio > 1)
+        search = Search.of(self.source, ath, bound, self.options.effort, self.report, self.options.jobs, ratios)
         unsearched = share * search.first_cost()
-        prediction = self._best_prediction(bound, unsearched)
+        prediction = None if search.start.rigid.any() else self._best_prediction(bound, unsearched)
         if prediction is not None and prediction.bytes < SEARCH_SAVES * unsearched:
             return self._predicted(prediction.choice)
         choices, prelude = search.decide(ratio)

@@ -38,6 +38,7 @@ from athcodec.encoding.segment import (
     stems_head,
     time_components,
 )
+from athcodec.encoding.shape import rest_steps
 
 LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
 DEFAULT_LADDER = "decades"
@@ -145,19 +146,20 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
     rest, level_0, rests = _rests(source, prelude, ratios)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
-        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, refined=i > 0)
+        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, i)
         own = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
+            layer=i,
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
     return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude), layers)
 
 
-def _plan_on(pose: np.ndarray, prelude: CodedPrelude, refined: bool = False) -> Plan:
-    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, refined)
+def _plan_on(pose: np.ndarray, prelude: CodedPrelude, layer: int = 0) -> Plan:
+    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, layer > 0, layer=layer)
     plan.set_rest(pose)
     return plan
 
@@ -168,7 +170,7 @@ def _modes(plan: Plan, choice: Choice, settings: Settings, ratio: int) -> Learne
         return choice.learned_modes
     if settings.learned_pieces is None:
         return None
-    return nested(plan, choice.learned_modes, settings.learned_pieces, _binary_digits(ratio))
+    return nested(plan, choice.learned_modes, settings.learned_pieces & ~plan.is_rigid, _binary_digits(ratio))
 
 
 def _binary_digits(ratio: int) -> int:
@@ -198,23 +200,28 @@ def _rests(
         return rest, None, [(prelude.plan.rest, None)] * len(ratios)
     first_step, *steps = (qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios)
     branches, mesh = prelude.plan.branches, source.mesh if rest.connected else None
-    coded = _first_rests(prelude.plan, first_step, source.rest, mesh)
+    coded = _first_rests(prelude.plan, first_step, source.rest, rest.adaptive, mesh)
     for step in steps:
-        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], rest.connected, mesh=mesh))
+        if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
+            coded.append(coded[-1])
+            continue
+        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], rest.adaptive, mesh=mesh))
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
     level_0 = None if of_layers[0] is stored else stored.decoded
-    return rest, level_0, [(own.decoded, None if own is stored else own) for own in of_layers]
+    before = [coded[-len(ratios) - 1] if level_0 is not None else stored, *of_layers[:-1]]
+    return rest, level_0, [(own.decoded, None if own is last else own) for own, last in zip(of_layers, before)]
 
 
-def _first_rests(plan: Plan, step: float, rest: np.ndarray, mesh: Mesh | None) -> list[streams.CodedRest]:
+def _first_rests(
+    plan: Plan, step: float, rest: np.ndarray, adaptive: bool, mesh: Mesh | None
+) -> list[streams.CodedRest]:
     """The rest pose at the step of the first layer; before it that of level 0, where that takes few bytes more."""
-    connected = mesh is not None
-    at_once = streams.encode_rest(plan.branches, step, rest, None, connected, mesh=mesh)
+    at_once = streams.encode_rest(plan.branches, step, rest, None, adaptive, mesh=mesh)
     if not plan.level_0_stands_alone:
         return [at_once]
-    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, connected, mesh=mesh)
-    refined = streams.encode_rest(plan.branches, step, rest, level_0, connected, mesh=mesh)
+    level_0 = streams.encode_rest(plan.branches, LEVEL_0_STEP * step, rest, None, adaptive, mesh=mesh)
+    refined = streams.encode_rest(plan.branches, step, rest, level_0, adaptive, mesh=mesh)
     both = len(level_0.stream) + len(refined.stream)
     return [level_0, refined] if both <= LEVEL_0_SHARE * len(at_once.stream) else [at_once]
 
@@ -319,8 +326,7 @@ class _SegmentCoder:
         for factor in TIGHTER_LIMITS:
             if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
                 break
-            tighter = replace(layer.settings, limit=layer.settings.limit * factor)
-            corrected, chunk = self._corrected(decoded, tighter)
+            corrected, chunk = self._corrected(decoded, layer, factor)
             if len(chunk) > most:
                 break
             self.errors[level] = self._set_last(layer, level, corrected, chunk)
@@ -351,8 +357,8 @@ class _SegmentCoder:
 
     def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
         if layer.ratio == 1:
-            return self._set_last(layer, level, *self._corrected(decoded, layer.settings))
-        return self._set_last(layer, level, *self._tightest(decoded, layer.settings, level))
+            return self._set_last(layer, level, *self._corrected(decoded, layer))
+        return self._set_last(layer, level, *self._tightest(decoded, layer, level))
 
     def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, chunk: bytes) -> tuple[float, ...]:
         """The positions and the corrections of the level that a layer ends with; returns its errors."""
@@ -409,17 +415,20 @@ class _SegmentCoder:
         exact_level = (len(self.errors), ct.EXACT)
         return self.chunks | {exact_level: chunk}, np.array([*self.errors, (0.0,) * 3]), np.array([*self.joins, 0])
 
-    def _corrected(self, decoded: np.ndarray, settings: Settings) -> tuple[np.ndarray, bytes]:
-        """Positions within the limit, and the corrections that bring them there."""
-        decoded = decoded.copy()
-        corrections, step = correct(decoded, self.positions, self._origin, settings, self._pool)
+    def _corrected(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> tuple[np.ndarray, bytes]:
+        """Positions within the limit times a factor, and the corrections that bring them there; but for rigid parts of
+        a layer before the last, which keep their shape."""
+        decoded, settings = decoded.copy(), replace(layer.settings, limit=layer.settings.limit * factor)
+        corrections, step = correct(
+            decoded, self.positions, self._origin, settings, layer.plan, keeps_all=layer.ratio == 1
+        )
         return decoded, correction_chunk(corrections, step, decoded.shape)
 
-    def _tightest(self, decoded: np.ndarray, settings: Settings, level: int) -> tuple[np.ndarray, bytes]:
+    def _tightest(self, decoded: np.ndarray, layer: Layer, level: int) -> tuple[np.ndarray, bytes]:
         """Positions within the tightest limit that corrections reach for their share of the bytes so far."""
 
         def within(factor: float, share: float) -> tuple[np.ndarray, bytes] | None:
-            corrected = self._corrected(decoded, replace(settings, limit=settings.limit * factor))
+            corrected = self._corrected(decoded, layer, factor)
             return corrected if len(corrected[1]) <= share * bytes_ else None
 
         bytes_ = self._shared_bytes + self._bytes_up_to(level)

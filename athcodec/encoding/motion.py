@@ -21,6 +21,7 @@ from athcodec._native import (
     NODE,
     PIECE,
     PIECE_VERTICES,
+    RIGID,
     SEGMENT_FRAMES,
     SHORT_FLOATS,
     Coarse,
@@ -64,6 +65,7 @@ class Plan:
         pool: ThreadPool = SERIAL,
         refined: bool = False,
         predicted: bool = False,
+        layer: int = 0,
     ):
         self.branches, self.pool, self.predicted = branches, pool, predicted
         self.vertex_count = vertex_count
@@ -84,6 +86,7 @@ class Plan:
         )
         memory = np.empty(vertex_count, np.int32)
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
+        lib.ath_plan_rigid(self.core, self.pieces.ctypes.data, layer)
         if refined:
             self.pieces["level"], self.pieces["low_level"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
         if predicted:
@@ -159,6 +162,16 @@ class Plan:
         return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
 
     @property
+    def ranks(self) -> np.ndarray:
+        """Per piece the modes that it moves by, (P,)."""
+        return np.where(self.is_rigid, 0, self.pieces["rank"])
+
+    @property
+    def is_rigid(self) -> np.ndarray:
+        """Per piece whether it turns and moves as it is, (P,)."""
+        return self.pieces["flags"] & RIGID > 0
+
+    @property
     def main_level(self) -> int:
         """The level whose stream holds the most rows."""
         pieces, low = self.pieces, self.pieces["low_modes"]
@@ -191,6 +204,7 @@ class LevelStream:
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves_over_time
     only_tips: bool = False  # pieces that carry others have no rotations
+    turn_step: float = 0.0  # largest step of rotations of rigid pieces; 0: any
     root: int = -1  # level of the first of the streams whose learned bases begin with the same rows
 
 
@@ -244,7 +258,7 @@ class SegmentMotion:
         """(P,) uint8: pieces whose integers in the layer before stand for the same functions of time as here."""
         same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
         pieces = before.plan.pieces
-        all_at_base = pieces["rank"] <= pieces["low_modes"]
+        all_at_base = before.plan.ranks <= pieces["low_modes"]
         return (same[before.plan.base_level] & (same[pieces["level"]] | all_at_base)).astype(np.uint8)
 
     def _bind(self) -> None:
@@ -255,7 +269,7 @@ class SegmentMotion:
             self._temporal.append(temporal)
             c_stream.step, c_stream.rotation_step_factor = stream.step, stream.rotation_step_factor
             c_stream.temporal, c_stream.temporal_rank = temporal.ctypes.data, len(temporal)
-            c_stream.root, c_stream.only_tips = stream.root, stream.only_tips
+            c_stream.root, c_stream.only_tips, c_stream.turn_step = stream.root, stream.only_tips, stream.turn_step
         self.motion = Motion(
             streams=addressof(self._c_streams),
             waves=self.waves.ctypes.data,

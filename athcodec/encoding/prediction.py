@@ -19,6 +19,7 @@ from athcodec.encoding.layers import Layer, Layers
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.search import Choice, SegmentSample, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Settings, Source, with_best_lags
+from athcodec.encoding.shape import finer_than
 from athcodec.errors import BoundError
 
 MEMORIES, LATTICE = (2, 9, 0, 13), 16  # of the second field of PREDICTED: to choose from, and beside them
@@ -56,7 +57,12 @@ def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Setti
         rest_step=qz.single(rest_step),
         sheet=none,
         loose=none,
+        rigid=np.zeros(branches, np.int32),
+        layer=0,
+        free_rigid=False,
+        turn_step=0.0,
         lags=np.zeros(branches, np.int32),
+        details=finer_than(source.details, bound),
         adaptive_rest=False,
         connected_rest=False,
         rotation_step_factors=(0,) * levels,

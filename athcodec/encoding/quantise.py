@@ -66,6 +66,12 @@ def single(value: float) -> float:
     return float(max(np.float32(value), np.finfo(np.float32).tiny))
 
 
+def half_octave(exponent: int) -> float:
+    """As decoders have it (FORMAT.md, Affines stream)."""
+    odd = exponent & 1
+    return (1.4142135623730951 if odd else 1.0) * 2.0 ** ((exponent - odd) // 2)
+
+
 def nearest_singles(values: np.ndarray) -> np.ndarray:
     """The same in numbers of float32, as float64."""
     most = float(np.finfo(np.float32).max)

@@ -31,7 +31,7 @@ def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
         coefficients = coefficients + of_sum * motion.coefficients[:, :, 0]
         tracks = tracks + of_sum * motion.tracks[:, :, :, 0]
         frames += motion.frames
-    fine = replace(settings, step=qz.single(settings.step / FINER))
+    fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     mean = SegmentMotion(plan, 1, level_streams(fine, plan.level_count, {}))
     mean.coefficients[:, :, 0], mean.tracks[:, :, :, 0] = np.rint(coefficients / frames), np.rint(tracks / frames)
     return mean.pose(plan.level_count - 1, np.zeros(3), np.float64)[:, :, 0]

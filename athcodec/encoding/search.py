@@ -22,6 +22,7 @@ from athcodec.encoding.learned_modes import Components, LearnedModes, components
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.progress import TRIALS, Progress, trials
 from athcodec.encoding.reference import mean_pose
+from athcodec.encoding.rigid import TURN_STEP, rigid_layers
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
 from athcodec.encoding.segment import (
     CodedPrelude,
@@ -40,6 +41,7 @@ from athcodec.encoding.segment import (
     with_best_lags,
     with_connected_rest,
 )
+from athcodec.encoding.shape import finer_than
 from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
 from athcodec.segmentation import DEFAULT_SEGMENT
@@ -127,8 +129,11 @@ class Choice:
     predicted: int | None = None
 
 
-def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSample, layered: bool = False) -> Settings:
-    """The start of a search."""
+def first_settings(
+    source: Source, ath: Ath, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int] = (1,)
+) -> Settings:
+    """The start of a search for the last of layers; ratios: of their steps to its own, descending to 1."""
+    layered, rigid = len(ratios) > 1, _rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), bound * qz.rest_step_ratio(relative)
     levels = ath.height + 2
@@ -140,8 +145,13 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         sheet=source.sheet_like,
-        loose=loose_branches(source, wildest.positions),
+        loose=loose_branches(source, samples[-1].positions),
+        rigid=rigid,
+        layer=len(ratios) - 1,
+        free_rigid=False,
+        turn_step=TURN_STEP if rigid.any() else 0.0,
         lags=np.zeros(source.hierarchy.branch_count, np.int32),
+        details=source.details if layered else finer_than(source.details, bound),
         adaptive_rest=False,
         connected_rest=False,
         rotation_step_factors=(0,) * levels,
@@ -150,15 +160,28 @@ def first_settings(source: Source, ath: Ath, bound: float, wildest: SegmentSampl
         learned_pieces=None,
         node_steps=np.full(levels, step),
     )
-    if layered:  # adaptive rest poses are worth less to those that refine them
-        return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step)))
+    if layered and not settings.details.any():  # adaptive rest poses are worth less to those that refine them
+        return with_connected_rest(source, ath, replace(settings, lags=lags(source, rest_step, settings.details)))
     return with_best_lags(source, ath, settings)
+
+
+def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]) -> np.ndarray:
+    """(B,) in how many of the layers branches that are to keep their shape move rigidly."""
+    hierarchy, least = source.hierarchy, source.smallest_bound(bound)
+    return rigid_layers(
+        hierarchy.first_vertex,
+        hierarchy.stem_count,
+        source.details > 0,
+        source.rest,
+        [sample.positions for sample in samples],
+        [ratio * least for ratio in ratios],
+    )
 
 
 def still_settings(source: Source, ath: Ath, bound: float) -> Settings:
     """Of a clip all of whose frames are the rest pose: no motion, a rest pose of the bound's precision."""
     step = STILL_STEP * source.smallest_bound(bound)
-    settings = first_settings(source, ath, bound, SegmentSample(source.positions(0), source.clip.frame_count))
+    settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.clip.frame_count)])
     slack = float(np.min(settings.limit)) - float(np.spacing(source.largest_number))
     settings = with_rest_slack(source, ath, settings, max(slack, 0.5 * source.smallest_bound(bound)))
     return replace(
@@ -189,6 +212,7 @@ def _coarser(settings: Settings, ratio: int) -> Settings:
         limit=ratio * settings.limit,
         step=qz.single(ratio * settings.step),
         rest_step=qz.single(ratio / 2 * settings.rest_step),
+        layer=0,
     )
 
 
@@ -196,7 +220,7 @@ class Search:
     """Finds settings by coding a sample of the segments with each candidate and counting the bytes.
 
     samples: from calm to wild; the one in the middle decides the steps of the nodes' maps. extrapolation: for a clip
-    that is a sample of a larger plant. layered: whether settings of layers are to be found, too.
+    that is a sample of a larger plant. ratios: as first_settings has them.
     """
 
     def __init__(
@@ -209,7 +233,7 @@ class Search:
         report: Progress,
         jobs: int | None = None,
         extrapolation: ExtrapolationFactors | None = None,
-        layered: bool = False,
+        ratios: Sequence[int] = (1,),
     ):
         self.jobs, self.source, self.ath, self.effort, self.report = jobs, source, ath, effort, report
         self.start, self.samples, self.levels = start, samples, ath.height + 2
@@ -220,8 +244,8 @@ class Search:
         self._components: dict[tuple, Components] = {}
         self._time_components: dict[tuple, tuple[float, list[dict[int, TimeComponents]]]] = {}
         self._preludes: dict[tuple, CodedPrelude] = {}
-        self._layered = layered
-        self._extra_trials, self._trials = 0, trials(effort, layered)
+        self._ratios, self._layered = ratios, len(ratios) > 1
+        self._extra_trials, self._trials = 0, trials(effort, self._layered)
 
     @classmethod
     def of(
@@ -232,12 +256,12 @@ class Search:
         effort: str,
         report: Progress,
         jobs: int | None = None,
-        layered: bool = False,
+        ratios: Sequence[int] = (1,),
     ) -> Search:
         """For a whole plant."""
         samples = samples_of(source)
-        start = first_settings(source, ath, bound, samples[-1], layered)
-        return cls(source, ath, start, samples, effort, report, jobs, layered=layered)
+        start = first_settings(source, ath, bound, samples, ratios)
+        return cls(source, ath, start, samples, effort, report, jobs, ratios=ratios)
 
     def _level_errors(self, bound: float) -> np.ndarray:
         """Per level, the error in all vertices of one node together that would double the level's own, (levels,).
@@ -292,6 +316,7 @@ class Search:
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         steps = [
+            self._with_free_rigid,
             self._with_basis,
             self._with_rotations,
             self._with_learned_bases,
@@ -354,8 +379,8 @@ class Search:
     def about_best_reference(self) -> Search:
         """The same about the rest pose or the mean pose of the motion, whichever makes the smaller file: the mean pose
         is tried with what was found about the rest pose, and goes on from there."""
-        if self.effort == "fast" or self.source.host_rest:
-            return self
+        if self.effort == "fast" or self.source.host_rest or self.source.details.any():
+            return self  # the mean of what turns is smaller than it
         other = self.about_mean_pose()
         tried, its = self.of_sample or self, other.of_sample or other
         tried._extra_trials += MEAN_POSE_WORTH
@@ -371,8 +396,8 @@ class Search:
         """The same about the mean pose of the motion, nothing found yet."""
         source = self.source.about(mean_pose(self.source, self.ath, self.start))
         ath = replace(self.ath, rest=source.rest + source.origin)
-        start = first_settings(source, ath, self.start.bound, self.samples[-1], self._layered)
-        return Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, layered=self._layered)
+        start = first_settings(source, ath, self.start.bound, self.samples, self._ratios)
+        return Search(source, ath, start, self.samples, self.effort, self.report, self.jobs, ratios=self._ratios)
 
     def like(self, other: Search, settings: Settings) -> Settings:
         """Settings that were found about another reference pose, about this one."""
@@ -398,7 +423,13 @@ class Search:
         start, kept = self.start, sample.branches
         limit = start.limit if np.isscalar(start.limit) else start.limit[sample.vertices]
         some = replace(
-            start, sheet=sample.source.sheet_like, loose=start.loose[kept], lags=start.lags[kept], limit=limit
+            start,
+            sheet=sample.source.sheet_like,
+            loose=start.loose[kept],
+            lags=start.lags[kept],
+            details=start.details[kept],
+            rigid=start.rigid[kept],
+            limit=limit,
         )
         extrapolation = ExtrapolationFactors.of(
             branch_records(self.source.hierarchy, self.ath, start),
@@ -406,7 +437,7 @@ class Search:
         )
         samples = [segment.of_plant(sample) for segment in self.samples]
         return Search(
-            sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, self._layered
+            sample.source, sample.ath, some, samples, self.effort, self.report, self.jobs, extrapolation, self._ratios
         )
 
     def best_of_sample(self, ratio: int) -> tuple[Settings, list[Settings]]:
@@ -430,6 +461,7 @@ class Search:
             rest_step=found.rest_step,
             rotation_step_factors=found.rotation_step_factors,
             only_tips=found.only_tips,
+            free_rigid=found.free_rigid,
             learned_bases=found.learned_bases,
             periodic=found.periodic,
             sheet=start.sheet if by_form else np.full_like(start.sheet, found.sheet[0]),
@@ -616,7 +648,15 @@ class Search:
             settings.connected_rest,
             settings.lags.tobytes(),
             settings.sheet.tobytes(),
+            settings.layer,
+            settings.free_rigid,
         )
+
+    def _with_free_rigid(self, settings: Settings) -> Settings:
+        """Rigid branches that move away from what they hang on, or not."""
+        if not (settings.rigid > settings.layer).any():
+            return settings
+        return self._cheapest([settings, replace(settings, free_rigid=True)])
 
     def _with_basis(self, settings: Settings) -> Settings:
         """The spatial basis of each branch: all alike, or by shape; judged without rotations and with some."""

@@ -21,6 +21,8 @@ from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import LearnedModes
 from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion, gather
 from athcodec.encoding.polygons import Mesh
+from athcodec.encoding.rigid import TURN, move_rigid_parts
+from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.time_bases import BASIS_BITS, TimeComponents, basis_rows
 from athcodec.errors import BoundError
 from athcodec.hierarchy import Hierarchy
@@ -57,11 +59,13 @@ class Source:
     weights: np.ndarray | None = None  # (N,) float64, factors on the bound; file order
     pool: ThreadPool = SERIAL
     host_rest: bool = False
+    rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None
     polygons: Polygons | None = None
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64, less the origin
     rest: np.ndarray = field(init=False)  # likewise: the reference pose
     origin: np.ndarray = field(init=False)  # (3,) float64
+    details: np.ndarray = field(init=False)  # (B,) int32: of the branches, FORMAT.md, Detail
     sheet_like: np.ndarray = field(init=False)  # (B,) bool: branches that do not look like beams
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # per clip of the file
     segments: list[tuple[int, int]] = field(init=False)  # of all of them
@@ -71,6 +75,9 @@ class Source:
         self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
         self.rest = self.source_rest if self.reference is None else self.reference
         self.sheet_like = ~_thin_branches(self)
+        self.details = np.zeros(self.hierarchy.branch_count, np.int32)
+        if not self.reference_is_exact:
+            self.details = self.rest_precision.details(self.clip, self.hierarchy, self.seen.diagonal)
         self.clip_range_segments = [
             [
                 (start + a, start + b)
@@ -205,7 +212,12 @@ class Settings:
     rest_step: float
     sheet: np.ndarray  # (B,) bool, file order
     loose: np.ndarray  # (B,) bool, file order
+    rigid: np.ndarray  # (B,) int32: in how many layers, from the first on, branches are rigid
+    layer: int  # that these settings are of
+    free_rigid: bool  # rigid branches are loose
+    turn_step: float  # largest of rotations of rigid pieces
     lags: np.ndarray  # (B,) int32, file order
+    details: np.ndarray  # likewise
     adaptive_rest: bool
     connected_rest: bool  # then it is adaptive, or exact
     rotation_step_factors: tuple[int, ...]  # per level: rotation factors
@@ -235,8 +247,10 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches = np.zeros(hierarchy.branch_count, BRANCH)
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
-    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * settings.loose
-    branches["lag"] = settings.lags
+    free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
+    branches["flags"] = SHEET * settings.sheet + WHOLE * ath.whole_branches() + LOOSE * (settings.loose | free)
+    branches["rigid"] = settings.rigid
+    branches["lag"], branches["detail"] = settings.lags, settings.details
     return branches
 
 
@@ -247,7 +261,7 @@ class CodedPrelude:
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         branches = branch_records(hierarchy, ath, settings)
-        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted)
+        self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest)
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
@@ -294,7 +308,7 @@ def _within(
 
 def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
     """The lags, and adaptive, connected or neither, that make hierarchy and rest pose smallest at these steps."""
-    own = lags(source, settings.rest_step)
+    own = lags(source, settings.rest_step, settings.details)
     candidates = [replace(settings, lags=own, adaptive_rest=False, connected_rest=False)]
     if not source.reference_is_exact:
         candidates += _lag_candidates(source, settings, own)
@@ -304,6 +318,8 @@ def with_best_lags(source: Source, ath: Ath, settings: Settings) -> Settings:
             replace(settings, lags=lag, adaptive_rest=is_adaptive, connected_rest=True)
             for lag in (own, np.ones_like(own))
         ]
+    if settings.details.any():
+        candidates = [own for own in candidates if own.adaptive_rest]
 
     return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda some: _poses_size(source, ath, some))
 
@@ -360,11 +376,11 @@ def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray
     return ct.pack_source_rest(coded.step, coded.stream)
 
 
-def lags(source: Source, step: float) -> np.ndarray:
+def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
     """Predictors of the rest pose, (B,): 0, a beam's modes, or the lag that does best elsewhere."""
     hierarchy = source.hierarchy
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    for b in np.flatnonzero(source.sheet_like & (not source.host_rest)):
+    for b in np.flatnonzero((source.sheet_like | (details > 0)) & (not source.host_rest)):
         first, count = hierarchy.first_vertex[b], hierarchy.stem_count[b]
         attach = hierarchy.attach[b]
         lags[b] = qz.rest_lag(source.rest[first : first + count], source.rest[attach] if attach >= 0 else None, step)
@@ -413,7 +429,9 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     found = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
-        stream = LevelStream(settings.step_of(level), factor, only_tips=settings.only_tips)
+        stream = LevelStream(
+            settings.step_of(level), factor, only_tips=settings.only_tips, turn_step=settings.turn_step
+        )
         if level in bases:
             stream.temporal, stream.root = basis_rows(bases[level].steps), bases[level].root
         found.append(stream)
@@ -444,7 +462,7 @@ def _level_moments(segment: SegmentMotion, level: int) -> tuple[np.ndarray, int]
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> SegmentMotion:
     """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
-    fine = replace(settings, step=qz.single(settings.step / FINER))
+    fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
@@ -520,7 +538,12 @@ def analyse(
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
     """Of the stems of a level, whose time basis is among `bases` where it is learned."""
-    head = ct.StemsHead(settings.step_of(level), settings.rotation_step_factors[level], only_tips=settings.only_tips)
+    head = ct.StemsHead(
+        settings.step_of(level),
+        settings.rotation_step_factors[level],
+        only_tips=settings.only_tips,
+        turn=TURN if settings.turn_step else 0,
+    )
     if level in bases:
         own = bases[level]
         head.bits, head.rank, head.base = BASIS_BITS, len(own.steps), own.base
@@ -543,15 +566,26 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
 
 
 def correct(
-    decoded: np.ndarray, positions: np.ndarray, origin: np.ndarray, settings: Settings, pool: ThreadPool
+    decoded: np.ndarray,
+    positions: np.ndarray,
+    origin: np.ndarray,
+    settings: Settings,
+    plan: Plan,
+    keeps_all: bool = True,
 ) -> tuple[np.ndarray, float]:
-    """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step. Raises BoundError."""
-    factor = 1.0
+    """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
+    of it where that serves, and else, unless each vertex is to keep the limit, there are none. Raises BoundError."""
+    factor, stored, is_rigid = 1.0, decoded.dtype.type, np.repeat(plan.is_rigid, plan.pieces["count"])
+    limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
         step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
-        corrections = streams.find_corrections(decoded, positions, origin, settings.limit, step, pool)
+        tried = decoded.copy() if is_rigid.any() else decoded
+        parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
+        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid)
         if corrections is not None:
-            return corrections, step
+            decoded[...] = tried
+            corrections = np.concatenate([parts, corrections])
+            return corrections[np.lexsort(corrections[:, 1::-1].T)], step
         factor *= 0.5
         if factor < 1e-3:
             raise BoundError(
@@ -572,5 +606,5 @@ def code_stems(
     segment = analyse(prelude.plan, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)
-    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan.pool)
+    corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan)
     return Coded(segment, stems, corrections, decoded, step, heads)

@@ -57,7 +57,7 @@ def encode_rest(
 
     slack: how far from its place a vertex may be put to save bits, where `adaptive`. mesh: that it goes by, then.
     """
-    decoded, steps = np.zeros_like(rest), np.zeros(rest.shape, np.int32)
+    decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
     with nullcontext() if mesh is None else mesh.lock:
         data = encode_stream(
             "ath_encode_rest",
@@ -72,6 +72,7 @@ def encode_rest(
             None if coarse is None else address(coarse.decoded, np.float64, rest.size),
             address(steps, np.int32, rest.size),
             address(rest, np.float64, rest.size),
+            address(moved, np.float64, rest.size),
             address(decoded, np.float64, rest.size),
         )
     return CodedRest(step, data, decoded, steps, adaptive, mesh is not None)
@@ -79,7 +80,7 @@ def encode_rest(
 
 def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
     """The source's rest pose about the reference pose as decoded, both (N, 3) float64 less the origin."""
-    decoded, turns = np.zeros_like(rest), np.empty((len(branches), 9))
+    decoded, turns, moved = np.zeros_like(rest), np.empty((len(branches), 9)), np.empty_like(rest)
     data = encode_stream(
         "ath_encode_source_rest",
         1024 + 8 * rest.size,
@@ -88,6 +89,7 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
         step,
         address(reference, np.float64, rest.size),
         address(rest, np.float64, rest.size),
+        address(moved, np.float64, rest.size),
         address(turns, np.float64, turns.size),
         address(decoded, np.float64, rest.size),
     )
@@ -261,16 +263,20 @@ def find_corrections(
     limit: float | np.ndarray,
     step: float,
     pool: ThreadPool = SERIAL,
+    narrow: np.ndarray | bool = False,
 ) -> np.ndarray | None:
     """Brings every vertex of (N, 3, T) positions within `limit` of the source, in place; limit: one, or one each (N,).
 
-    Returns the corrections applied, (K, 6) int32, or None where they cannot be expressed in this step.
+    narrow: of which vertices, (N,) bool, corrections are to be of one frame. Returns the corrections applied,
+    (K, 6) int32, or None where they cannot be expressed in this step.
     """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
+    of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
 
     def found(start: int, stop: int) -> np.ndarray | None:
-        rows = _corrections(positions[start:stop], source[start:stop], origin, limits[start:stop], step)
+        some = slice(start, stop)
+        rows = _corrections(positions[some], source[some], origin, limits[some], of_one_frame[some], step)
         if rows is not None:
             rows[:, 0] += start
         return rows
@@ -291,7 +297,7 @@ def find_corrections(
 
 
 def _corrections(
-    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray, step: float
+    positions: np.ndarray, source: np.ndarray, origin: np.ndarray, limits: np.ndarray, narrow: np.ndarray, step: float
 ) -> np.ndarray | None:
     vertices, _, frames = positions.shape
     capacity = 1024
@@ -305,6 +311,7 @@ def _corrections(
             address(source, np.float64, positions.size),
             address(origin, np.float64, 3),
             address(limits, np.float64, vertices),
+            address(narrow, np.uint8, vertices),
             step,
             rows.ctypes.data,
             capacity,

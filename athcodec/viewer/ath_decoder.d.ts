@@ -123,6 +123,10 @@ export interface Branches {
   /** Branches in its subtree, itself included. */
   readonly subtree: Int32Array;
   readonly depth: Int32Array;
+  /** Layers, from the first on, in which its pieces turn and move as they are. */
+  readonly rigid: Int32Array;
+  /** 0, or its largest step of the rest pose, in half octaves about 128. */
+  readonly detail: Int32Array;
   /** Vertex (file order) of the parent's stem that it hangs on; -1 for a root. */
   readonly attach: Int32Array;
   /** 1: flat or compact; 2: not attached; 4: its subtree moves as one. Added up. */

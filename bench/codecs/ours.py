@@ -44,6 +44,7 @@ class Athcodec:
                     file,
                     max_error=None if self.lossless else bound,
                     lossless=self.lossless,
+                    rest_error="bound",
                     attributes="none",
                     effort=self.effort,
                     segment_frames=self.segment_frames,

@@ -1,0 +1,121 @@
+"""Small faces keep their shape whatever the bound of the plant: in the rest pose and in motion, at every level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from moving_meshes import leafed_tree
+from plants import diagonal
+
+import athcodec
+from athcodec.cli import main
+from athcodec.errors import BoundError
+from spec import reference_decoder as rd
+
+
+@pytest.fixture(scope="module")
+def tree():
+    return leafed_tree()
+
+
+def edges(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Lengths, (..., F, 4)."""
+    return np.linalg.norm(np.roll(points[..., faces, :], 1, axis=-2) - points[..., faces, :], axis=-1)
+
+
+def normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals of quads, (..., F, 3)."""
+    a, b, c, d = (points[..., faces[:, k], :] for k in range(4))
+    normal = np.cross(c - a, d - b)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def shape_errors(points: np.ndarray, source: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stretch of all edges, angles between all normals in degrees."""
+    stretch = np.abs(edges(points, faces) / edges(source, faces) - 1)
+    between = np.linalg.norm(normals(points, faces) - normals(source, faces), axis=-1)
+    return stretch, np.degrees(2 * np.arcsin(np.clip(between / 2, 0, 1)))
+
+
+def source_of(clip: athcodec.MotionClip) -> np.ndarray:
+    return clip.block(0, clip.frame_count).astype(float)
+
+
+def turn(points: np.ndarray, faces: np.ndarray) -> float:
+    """RMS turn of the normals from frame to frame, degrees."""
+    change = np.diff(normals(points, faces), axis=0)
+    return float(np.degrees(np.sqrt((change**2).sum(axis=-1).mean())))
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("relative", [1e-2, 1e-3, 1e-4])
+def test_cards_smaller_than_the_bound_keep_shape_and_turn_as_in_the_source(tree, scratch, relative, ladder):
+    athcodec.encode(tree, scratch / "tree.ath", rel_error=relative, ladder=ladder)
+    source = source_of(tree)
+    with athcodec.open(scratch / "tree.ath") as decoder:
+        decoded = decoder.positions().astype(float)
+    stretch, angle = shape_errors(decoded, source, tree.faces)
+    assert np.quantile(stretch, 0.999) <= 0.06
+    assert np.quantile(angle, 0.999) <= 6.0 and np.sqrt((angle**2).mean()) <= 2.0
+    assert turn(decoded, tree.faces) <= 1.1 * turn(source, tree.faces)
+    assert np.linalg.norm(decoded - source, axis=2).max() <= relative * diagonal(tree)
+
+
+def test_every_level_and_its_reference_pose_keep_the_shape_of_cards(tree, scratch):
+    athcodec.encode(tree, scratch / "tree.ath", rel_error=1e-4)
+    with athcodec.open(scratch / "tree.ath") as decoder:
+        assert len(decoder.levels) > 4
+        for level in range(len(decoder.levels)):
+            decoded = decoder.positions(level=level).astype(float)
+            assert np.quantile(shape_errors(decoded, source_of(tree), tree.faces)[0], 0.99) <= 0.15
+            stretch, angle = shape_errors(decoder.level_rest(level), tree.rest.astype(float), tree.faces)
+            assert np.quantile(stretch, 0.99) <= 0.04 and np.quantile(angle, 0.99) <= 2.0
+
+
+@pytest.mark.parametrize("options", [{"rel_error": 1e-2, "ladder": "none"}, {"rel_error": 1e-4}])
+def test_the_reference_decoder_plays_the_same_cards(scratch, options):
+    athcodec.encode(leafed_tree(cards=30, frames=8), scratch / "tree.ath", attributes="none", **options)
+    reference = rd.AthFile((scratch / "tree.ath").read_bytes())
+    assert any(branch.rigid for branch in reference.branches) and any(branch.detail for branch in reference.branches)
+    with athcodec.open(scratch / "tree.ath") as decoder:
+        for level in range(len(decoder.levels)):
+            assert decoder.positions(level=level).tobytes() == reference.positions(level).tobytes()
+
+
+def test_a_rest_pose_of_the_bound_takes_fewer_bytes_and_loses_shape(tree, scratch):
+    sizes, stretches = {}, {}
+    for rest_error in (None, "bound"):
+        given = {"rel_error": 1e-2, "ladder": "none", "attributes": "none", "rest_error": rest_error}
+        sizes[rest_error] = athcodec.encode(tree, scratch / "tree.ath", **given).bytes
+        with athcodec.open(scratch / "tree.ath") as decoder:
+            rest = decoder.level_rest().astype(float)
+        stretches[rest_error] = np.abs(edges(rest, tree.faces) / edges(tree.rest.astype(float), tree.faces) - 1).mean()
+    assert sizes["bound"] < sizes[None]
+    assert stretches[None] < 0.02 < stretches["bound"]
+
+
+@pytest.mark.parametrize("rest_error, metres", [(1e-4, None), ("2mm", 0.002), ("0.5cm", 0.005)])
+def test_a_rest_pose_is_as_precise_as_it_is_asked_for_at_every_level(tree, scratch, rest_error, metres):
+    clip = tree.replace(metadata={"unit": "m"})
+    most = metres or rest_error * diagonal(tree)
+    athcodec.encode(clip, scratch / "tree.ath", rel_error=1e-3, rest_error=rest_error, effort="fast")
+    with athcodec.open(scratch / "tree.ath") as decoder:
+        for level in range(len(decoder.levels)):
+            assert np.linalg.norm(decoder.level_rest(level) - clip.rest, axis=1).max() <= most
+
+
+def test_the_command_line_takes_a_rest_error(tree, scratch):
+    athcodec.write_hdf5(tree, scratch / "tree.h5")
+    sizes = []
+    for error in ("bound", "1e-3", "2mm"):
+        given = ["--rel-error", "1e-2", "--ladder", "none", "--attributes", "none", "--rest-error", error]
+        code = main(["encode", str(scratch / "tree.h5"), str(scratch / "tree.ath"), *given])
+        assert code == (0 if error != "2mm" else 1)  # the clip says no unit
+        sizes.append((scratch / "tree.ath").stat().st_size)
+    assert sizes[0] < sizes[1]
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1mm", "3 parsecs", 0.0, float("nan"), float("inf")])
+def test_a_rest_error_that_is_none_is_refused(tree, scratch, wrong):
+    with pytest.raises(BoundError):
+        athcodec.encode(tree, scratch / "tree.ath", rest_error=wrong)
