@@ -21,7 +21,8 @@ def truncate(
 ) -> int:
     """Write the first levels of an .ath file as a complete file, whose error bound is that of the last of them.
 
-    Static data is kept. Nothing is decoded. One of `level`, `max_error` and `target_size` is given.
+    Static data is kept, and so is the rest pose of the source, unless the source is cut off before it. Nothing is
+    decoded. One of `level`, `max_error` and `target_size` is given.
 
     Parameters
     ----------
@@ -78,6 +79,8 @@ def truncate(
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
     """The front of the file that ends with a level, and what follows it."""
     chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
+    if file.rest_is_missing:
+        chunks = [chunk for chunk in chunks if chunk.kind != ct.SOURCE_REST]
     whole = level + 1 == file.full_level_count
     header = replace(
         file.header,

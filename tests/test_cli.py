@@ -270,7 +270,6 @@ def test_verify_measures_smoothness_and_shape_of_every_level(sample_ath, capsys)
         one, other = (np.linalg.norm(np.diff(x[:, edges], axis=2)[:, :, 0], axis=2) for x in (source, positions))
         assert level["shape"]["rms_stretch"] == pytest.approx(np.sqrt(((other / one - 1) ** 2).mean()), rel=1e-4)
         assert level["shape"]["tail_stretch"] == pytest.approx(np.quantile(np.abs(other / one - 1), 0.999), rel=0.01)
-    assert levels[0]["smoothness"]["tick_ratio"] > levels[-1]["smoothness"]["tick_ratio"]
 
     assert run("verify", sample_ath, "--against", SAMPLE) == 0
     out = capsys.readouterr().out

@@ -455,7 +455,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     before = spec.Record(plan=plan, motion=motion, placed=spec.pose(plan, motion, level - 1)[0])
     added, step = [], 2.0**-9
     if refines_rest:
-        arguments = branches, step, rest, spec.content(chunks, container.REST)[0] & 8 != 0
+        arguments = branches, step, rest, spec.content(chunks, container.REST)[0] & 8 != 0, None
         stream = random_stream(spec, random, "decode_rest", *arguments)
         added.append((container.REFINED_REST, container.pack_refined_rest(step, stream)))
         made = outcome(spec, lambda stream: spec.decode_rest(stream, *arguments), stream)
@@ -469,7 +469,7 @@ def test_random_decisions_about_refinements_mean_the_same_to_the_document_and_th
     spec.read_stems_head(container.pack_stems(head, b""), motion, level)
     stream = random_stream(spec, random, "decode_refined_stems", refined, motion, before, level, ratio)
     added.append((container.STEMS, container.pack_refined_stems(ratio, head, stream)))
-    header = replace(parts.header, level_count=level + 1, full_level_count=level + 1, layer_count=2)
+    header = replace(parts.header, level_count=level + 1, full_level_count=level + 1, layer_count=2, joins=None)
     new = [(container.Chunk(kind, level, 0, 0, 0, 0), payload) for kind, payload in sorted(added)]
     data = Parts(header, np.zeros((level + 1, 1, 3)), parts.chunks + new).file()
     assert_same_on_levels(spec, data, [level - 1, level])

@@ -16,6 +16,7 @@ from athcodec import MotionClip, Thresholds
 from athcodec import container as ct
 from athcodec.encoding import streams
 from athcodec.encoding.job import time_chunk
+from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.hierarchy import derived_edges, hierarchy_of
 
 
@@ -254,9 +255,11 @@ def test_an_exact_rest_pose_comes_back_bit_for_bit(dtype, scratch):
     assert largest_error(decoder.positions(), clip) <= decoder.max_error_bound
 
 
-def test_a_coded_rest_pose_stays_within_the_bound_of_the_motion(bushy_ath, bushy_clip):
+def test_a_coded_rest_pose_stays_within_the_bound_of_the_motion_or_its_tolerance(bushy_ath, bushy_clip):
+    diagonal = np.linalg.norm(np.ptp(bushy_clip.positions.reshape(-1, 3), axis=0))
     with athcodec.open(bushy_ath) as decoder:
-        assert np.linalg.norm(decoder.rest - bushy_clip.rest, axis=1).max() <= decoder.max_error_bound
+        tolerance = max(decoder.max_error_bound, SOURCE_REST_TOLERANCE * diagonal)
+        assert np.linalg.norm(decoder.rest - bushy_clip.rest, axis=1).max() <= tolerance
 
 
 # ---- static data ----

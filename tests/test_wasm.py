@@ -319,6 +319,7 @@ def test_the_module_describes_a_file_as_the_c_library_does(any_ath, tmp_path):
     native = Native(any_ath.read_bytes())
     lib, file, info = native.lib, native.file, native.info
     rest, wide = np.zeros((info.vertex_count, 3), np.float32), np.zeros((info.vertex_count, 3))
+    assert lib.ath_read_rest(file, None) == 0
     lib.ath_rest(file, 1, c_void_p(rest.ctypes.data), c_size_t(12))
     lib.ath_rest_float64(file, 0, c_void_p(wide.ctypes.data), c_size_t(24))
     seconds = [-1, 0, 0.05, 0.4, 1, 7.77, 1e9, float("nan")]
@@ -621,6 +622,7 @@ const of = (value) => [value, Object.getPrototypeOf(value)].flatMap((one) => Obj
 answer({ AthFile: [...of(file), "front", "open"].sort(), Segment: of(segment), Preparation: of(preparation),
          AthInfo: Object.keys(file.info).sort(), Branches: Object.keys(file.branches()).sort(),
          Parts: Object.keys(file.parts(0)).sort(), Chunk: Object.keys(file.chunks()[0]).sort(),
+         Polygons: Object.keys(file.polygons("edges")).sort(),
          Clip: Object.keys(file.clips[0]).sort(), ByteRange: Object.keys(file.ranges(0, 0, 0, true)[0]).sort() });
 """
 

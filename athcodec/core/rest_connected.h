@@ -66,10 +66,10 @@ static void rest_look_beside(rest_predictor *predictor, const ath_mesh *mesh, co
 {
     const double *base = rest + 3 * (size_t)ring->base, *none = 0;
     int32_t complete = ring->parallelograms, from = mesh->from[ring->base], own = CONNECTED_TERMS;
-    int32_t class = CONNECTED_CLASS * ath_min(ring->neighbours - 1, 7) + ath_min(complete, CONNECTED_CLASS - 1);
+    int32_t kind = CONNECTED_CLASS * ath_min(ring->neighbours - 1, 7) + ath_min(complete, CONNECTED_CLASS - 1);
     at->filter = predictor->filters + ath_min(complete, REST_FILTERS - 1);
-    at->phase = predictor->phases + class;
-    at->increment = predictor->increments[class];
+    at->phase = predictor->phases + kind;
+    at->increment = predictor->increments[kind];
     rest_term(at->terms[0], base, complete ? ring->mean : none, per_unit);
     rest_term(at->terms[1], base, complete ? ring->last : none, per_unit);
     rest_term(at->terms[2], base, ring->middle, per_unit);

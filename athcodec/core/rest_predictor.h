@@ -131,7 +131,7 @@ static void rest_look_around(rest_predictor *predictor, const ath_branch *branch
 /* A mean of the guesses in which those that were good hereabouts count by far the most; on each axis of its own. */
 static double rest_expected(const rest_memory *all, const rest_guess *at, int32_t k)
 {
-    double sum = 0.0, weights = 0.0, error[REST_GUESSES], least;
+    double sum = 0.0, weights = 0.0, error[REST_GUESSES], least = 0.0;
     for (int32_t g = 0; g < at->guess_count; g++) {
         error[g] = (all->error[g][k] + 0.05) * (at->phase->error[g][k] + 0.05);
         if (g == 0 || error[g] < least) least = error[g];

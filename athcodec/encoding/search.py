@@ -724,7 +724,11 @@ class Search:
         return self._cheapest([replace(settings, periodic=True), settings])
 
     def _with_steps(self, settings: Settings) -> Settings:
-        return self._walk_steps(settings, 1.15, 1.4)
+        """On short stems those of each basis: affine functions are best at finer steps than modes are."""
+        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
+        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
+        starts = {self._key(own): own for own in (settings, *bases)}.values()
+        return self._cheapest([self._walk_steps(start, 1.15, 1.4) for start in starts])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)
