@@ -129,6 +129,18 @@ class Blend(ctypes.Structure):
     _fields_ = [("frame", c_int32 * 2), ("segment", c_int32 * 2), ("weight", c_double)]
 
 
+class Fade(ctypes.Structure):
+    _fields_ = [("count", c_int32), ("level", c_int32 * 4), ("weight", c_double * 4), ("passed", c_double * 4)]
+
+    @property
+    def weights(self) -> dict[int, float]:
+        """Of the levels; one may be there twice."""
+        found: dict[int, float] = {}
+        for level, weight in zip(self.level[: self.count], self.weight):
+            found[level] = found.get(level, 0.0) + weight
+        return found
+
+
 _SHOW = [c_void_p, POINTER(c_void_p), c_int32, c_double]
 _SIGNATURES = {
     "ath_result_name": (c_char_p, [c_int]),
@@ -183,6 +195,11 @@ _SIGNATURES = {
     "ath_positions_float64": (c_int, [*_SHOW, c_int, c_void_p, c_size_t]),
     "ath_matrices": (c_int, [*_SHOW, c_void_p, c_size_t]),
     "ath_exact": (c_int, [*_SHOW, c_void_p, c_size_t]),
+    "ath_fade_to": (None, [POINTER(Fade), c_int32, c_double]),
+    "ath_fade_cut": (c_int32, [POINTER(Fade)]),
+    "ath_faded_positions": (c_int, [*_SHOW, POINTER(Fade), c_int, c_void_p, c_size_t]),
+    "ath_faded_matrices": (c_int, [*_SHOW, POINTER(Fade), c_void_p, c_size_t]),
+    "ath_faded_exact": (c_int, [*_SHOW, POINTER(Fade), c_void_p, c_size_t]),
     "ath_level_for": (c_int32, [c_void_p, c_int32, c_int32, c_int, c_double, c_double, c_double, c_double]),
 }
 
@@ -1163,6 +1180,131 @@ def test_between_segments_the_nearer_frame_that_is_there_is_held(player):
             assert result == HELD and np.array_equal(xyz, shown)
         result, xyz = player.show([other, before, after], last + weight)
         assert result == OK and np.array_equal(xyz, blended), "two of one level are there"
+
+
+# ---- from level to level ----
+
+
+def fade_of(*steps: tuple[int, float]) -> Fade:
+    fade = Fade()
+    for level, share in steps:
+        core.ath_fade_to(byref(fade), level, share)
+    return fade
+
+
+def test_a_fade_shows_the_first_level_and_one_after_a_pause_at_once():
+    assert fade_of((2, 0.1)).weights == {2: 1}
+    assert fade_of((2, 0), (5, 1)).weights == fade_of((2, 0), (1, 0), (5, float("inf"))).weights == {5: 1}
+    assert fade_of((2, 0), (5, 0), *[(5, 0.26)] * 4).weights == {5: 1}
+    assert fade_of((2, 0), (5, 0), (5, 1)).weights == {5: 1}
+    assert core.ath_fade_cut(byref(fade_of((1, 0), (4, 0), (2, 0.5)))) == 4 and core.ath_fade_cut(byref(Fade())) == -1
+
+
+def test_a_fade_goes_smoothly_from_level_to_level_also_where_it_is_overtaken():
+    """The weights change by at most 1.5 times what is linear, and their change by what a smoothstep's does."""
+    step, fade, rows = 1 / 64, Fade(), []
+    wanted = [0] * 4 + [3] * 20 + [1] * 30 + [3] * 5 + [0] * 5 + [2] * 5 + [1] * 5 + [3] * 200
+    for level in wanted:
+        core.ath_fade_to(byref(fade), level, step)
+        rows.append([fade.weights.get(level, 0.0) for level in range(4)])
+    weights = np.array(rows)
+    assert np.allclose(weights.sum(axis=1), 1, rtol=0, atol=1e-12) and weights.min() >= -1e-12
+    assert np.abs(np.diff(weights, axis=0)).max() <= 2 * 1.5 * step  # one level may fade out twice at once
+    assert np.abs(np.diff(weights, 2, axis=0)).max() <= 4 * 6 * step**2
+    assert {row.tolist().index(1) for row in weights if row.max() == 1} == {0, 3}
+    assert (weights.max(axis=0) > 0.03).all(), "a level that was asked for was left out"
+    assert weights[-1].tolist() == [0, 0, 0, 1]
+
+
+def test_what_fades_is_the_blend_of_its_levels_as_positions_and_as_matrices(player):
+    """Also where the deepest one has no weight yet. Level 0 moves the rest pose of level 1, which may be finer."""
+    count, deepest = player.info.vertex_count, player.levels[-1]
+    middle = max(1, player.info.depth_levels - 2)
+    for levels in {(0, middle), (middle, 0), (1, middle, deepest), (deepest, 0, 1), (middle, deepest, middle)}:
+        fade = fade_of((levels[0], 0), *[(level, 0.4) for level in levels[1:]])
+        for _ in range(2):
+            prepared = [segment for level in levels for segment in player.prepare_all(level)]
+            by_level = {level: player.prepare_all(level) for level in levels}
+            cut_level, place = core.ath_fade_cut(byref(fade)), 1.5
+            assert cut_level == max(levels)
+            wanted = sum(
+                weight * player.show(by_level[level], place, FILE_ORDER)[1].astype(float)
+                for level, weight in fade.weights.items()
+            )
+            parts, nodes, exact = cut(player, cut_level)
+            xyz, matrices, points = Memory(12 * count), Memory(48 * nodes), Memory(12 * exact)
+            show = player.at(prepared, place)
+            assert core.ath_faded_positions(*show, byref(fade), FILE_ORDER, xyz.address, 12) == OK
+            assert core.ath_faded_matrices(*show, byref(fade), matrices.address, 48) == OK
+            assert core.ath_faded_exact(*show, byref(fade), points.address, 12) == OK
+            for memory in (xyz, matrices, points):
+                memory.check()
+            size = np.abs(wanted).max()
+            faded = xyz.bytes.view(np.float32).reshape(-1, 3)
+            assert np.allclose(faded, wanted, rtol=0, atol=2e-6 * size)
+            rest = rest_of(player, min(1, cut_level))
+            drawn = sum(
+                weight * on_rest(player, by_level[level], level, place, rest) for level, weight in fade.weights.items()
+            )
+            for p in parts:
+                own = slice(p.first, p.first + p.count)
+                if p.branch < 0:
+                    shaded = points.bytes.view(np.float32).reshape(-1, 3)[p.index : p.index + p.count]
+                else:
+                    m = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index]
+                    shaded = rest[own] @ m[:, :3].T + m[:, 3]
+                assert np.allclose(shaded, drawn[own], rtol=0, atol=4e-6 * size)
+            core.ath_fade_to(byref(fade), levels[-1], 0.2)
+
+
+def on_rest(player: Player, prepared: list[Memory], level: int, place: float, rest: np.ndarray) -> np.ndarray:
+    """What a level shows where its matrices move this rest pose, in file order."""
+    parts, nodes, _ = cut(player, level)
+    matrices, out = Memory(48 * nodes), player.show(prepared, place, FILE_ORDER)[1].astype(float)
+    assert core.ath_matrices(*player.at(prepared, place), matrices.address, 48) == OK
+    for p in parts:
+        if p.branch >= 0:
+            m, own = matrices.bytes.view(np.float32).reshape(-1, 3, 4)[p.index], slice(p.first, p.first + p.count)
+            out[own] = rest[own] @ m[:, :3].T + m[:, 3]
+    return out
+
+
+def test_a_fade_that_lacks_a_level_writes_nothing(player):
+    fade, deepest = fade_of((0, 0), (1, 0), (1, 0.5)), player.prepare_all(1)
+    xyz = np.full((player.info.vertex_count, 3), np.nan, np.float32)
+    for prepared in ([], deepest, player.prepare_all(0), [*deepest, player.prepare(player.segments[-1], 0)]):
+        show = player.at(prepared, 0.5)
+        for call, before in (
+            (core.ath_faded_positions, (byref(fade), FILE_ORDER)),
+            (core.ath_faded_matrices, (byref(fade),)),
+            (core.ath_faded_exact, (byref(fade),)),
+        ):
+            assert call(*show, *before, xyz.ctypes.data, 12) == NOT_PREPARED and np.isnan(xyz).all()
+
+
+@pytest.mark.parametrize("per_frame", [0, 1 / 8])
+def test_no_vertex_jumps_where_the_level_changes(player, per_frame):
+    """In no drawn frame does one go further than a level takes it and its share of the way between levels; going over
+    at once does, as is seen where time stands still."""
+    duration = 24  # of a fade, in drawn frames, for each of which `per_frame` frames of the file pass
+    wanted = [0] * 6 + [player.levels[-1]] * 10 + [1] * 40
+    prepared = {level: player.prepare_all(level) for level in set(wanted)}
+    together = list(itertools.chain.from_iterable(prepared.values()))
+    places = np.arange(len(wanted)) * per_frame
+    shown = {level: np.array([player.frame(prepared[level], place) for place in places]) for level in prepared}
+    own = max(np.abs(np.diff(xyz, axis=0)).max() for xyz in shown.values())
+    apart = max(np.abs(a - b).max() for a, b in itertools.combinations(shown.values(), 2))
+    fade, faded = Fade(), []
+    for level, place in zip(wanted, places):
+        core.ath_fade_to(byref(fade), level, 1 / duration)
+        faded.append(xyz := np.zeros((player.info.vertex_count, 3), np.float32))
+        show = player.at(together, place)
+        assert core.ath_faded_positions(*show, byref(fade), SOURCE_ORDER, xyz.ctypes.data, 12) == OK
+    at_once = np.array([shown[level][i] for i, level in enumerate(wanted)])
+    most = own + 2 * 1.5 / duration * apart  # two changes are under way
+    assert np.abs(np.diff(faded, axis=0)).max() <= 1.001 * most
+    assert np.array_equal(faded[-1], at_once[-1]) and np.array_equal(faded[5], at_once[5])
+    assert per_frame or np.abs(np.diff(at_once, axis=0)).max() > 2 * most
 
 
 def test_without_a_segment_that_has_the_frame_nothing_is_written(player):

@@ -22,7 +22,7 @@ from athcodec._library import load_library
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
-MOST_BYTES = 135_000
+MOST_BYTES = 140_000
 OK, HELD, NOT_PREPARED = 0, 65, 67
 
 
@@ -32,7 +32,7 @@ OK, HELD, NOT_PREPARED = 0, 65, 67
 SCRIPT = """
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
-const { AthError, AthFile, ready, supported } = await import(%s);
+const { AthError, AthFade, AthFile, ready, supported } = await import(%s);
 await ready;
 const read = (path) => new Uint8Array(readFileSync(path));
 const digest = (...arrays) => {
@@ -572,6 +572,44 @@ def test_a_deeper_level_goes_on_from_the_one_before_without_its_bytes(layered_at
     ] * 2
 
 
+FADES = """
+const file = AthFile.open(read(path)), deepest = file.info.levelCount - 1, fade = new AthFade();
+const levels = [1, deepest, 0];
+const prepared = levels.map((level) => prepareAll(file, level)), all = prepared.flat(), place = 1.5;
+const shown = prepared.map((segments) => file.positions(segments, place, { order: "file" }));
+const before = { levels: [...fade.levels], cut: fade.cut };
+for (const level of levels) fade.to(level, 0.3);
+const { weights, cut } = fade, faded = file.positions(all, place, { order: "file", fade });
+const off = faded.map((value, i) => Math.abs(value - shown.reduce((sum, xyz, k) => sum + weights[k] * xyz[i], 0)));
+const { nodeCount, exactCount } = file.parts(cut), exact = file.exact(all, place, { fade });
+const result = { before, levels: fade.levels, weights, cut, off: Math.max(...off),
+  exact: same([...exact], [...faded].slice(0, exact.length)), // all vertices are
+  sizes: [file.matrices(all, place, { fade }).length === 12 * nodeCount, exact.length === 3 * exactCount],
+  lacking: file.positions(prepared[0], place, { fade }),
+  alone: same(file.positions(all, place, { fade: new AthFade().to(1, 0) }), file.positions(prepared[0], place)),
+  errors: [() => file.positions(all, 0, { fade: { levels: [], weights: [] } }),
+    () => file.positions(all, 0, { fade: { levels: [0, 0, 0, 0, 0], weights: [1, 0, 0, 0, 0] } }),
+    () => file.matrices(all, 0, { fade: { levels: [deepest + 1], weights: [1] } }),
+    () => file.positions(all, 0, { fade, out: new Float64Array(3 * file.info.vertexCount) }),
+    () => fade.to(-1, 0), () => fade.to(0)].map((call) => thrown(call)?.type) };
+fade.to(0, 1);
+answer({ ...result, end: [fade.levels, fade.weights] });
+"""
+
+
+def test_levels_fade_into_each_other(sample_ath, tmp_path):
+    result = run_node(tmp_path, FADES, sample_ath)
+    with athcodec.open(sample_ath) as decoder:
+        deepest, size = decoder.level_count - 1, np.abs(decoder.positions(1)).max()
+    assert result["before"] == {"levels": [], "cut": -1}
+    assert result["levels"] == [1, deepest, 0] and result["cut"] == deepest
+    assert sum(result["weights"]) == pytest.approx(1) and result["weights"][2] == 0 < result["weights"][1]
+    assert result["off"] < 2e-6 * size and result["exact"] and result["sizes"] == [True, True]
+    assert result["lacking"] is None and result["alone"]
+    assert result["errors"] == ["RangeError"] * 3 + ["TypeError"] + ["RangeError", "TypeError"]
+    assert result["end"] == [[0], [1]]
+
+
 MISUSE = """
 const file = AthFile.open(read(path)), { levelCount, segmentCount } = file.info;
 const foreign = AthFile.open(read(path)).prepare(0, 0);
@@ -619,7 +657,8 @@ MEMBERS = """
 const file = AthFile.open(read(path)), segment = file.prepare(0, 0), preparation = file.preparation(0, 0);
 const of = (value) => [value, Object.getPrototypeOf(value)].flatMap((one) => Object.getOwnPropertyNames(one))
   .filter((name) => name !== "constructor").sort();
-answer({ AthFile: [...of(file), "front", "open"].sort(), Segment: of(segment), Preparation: of(preparation),
+answer({ AthFile: [...of(file), "front", "open"].sort(), AthFade: of(new AthFade()),
+         Fading: ["levels", "weights"], Segment: of(segment), Preparation: of(preparation),
          AthInfo: Object.keys(file.info).sort(), Branches: Object.keys(file.branches()).sort(),
          Parts: Object.keys(file.parts(0)).sort(), Chunk: Object.keys(file.chunks()[0]).sort(),
          Polygons: Object.keys(file.polygons("edges")).sort(),

@@ -9,6 +9,7 @@
  *     ath_keep, ath_prepare_onward              a deeper level of a segment, from the one that is prepared
  *     ath_positions, ath_matrices, ath_exact    what to draw at a time, as often as wanted
  *     ath_level_for                             which level to draw at a distance
+ *     ath_fade_to, ath_faded_positions          from one level to the next without a jump
  *
  * Memory. Nothing here allocates, and there are no globals: the caller asks for a size, provides that many bytes,
  * aligned to 16, and keeps them while they are in use. Objects are freed by freeing their memory. An ath_file holds
@@ -519,6 +520,39 @@ ATH_API int ath_exact_float64(const ath_file *file, const ath_segment *const *se
 /* The level that these show, which tells how many matrices and exact vertices there are; -1: none has the frame. */
 ATH_API int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
                                 double frame);
+
+/* ---- from level to level ----------------------------------------------------------------------------------------- */
+
+/* A plant whose level changes would jump by the distance of the two. A fade goes from level to level over a moment, 0.2
+ * seconds say, without a jump and without a jerk: levels that are faded out and in are blended, with weights that change
+ * smoothly, also where a change overtakes the one before. It is begun with zeros, by ath_fade fade = {0}. */
+enum { ATH_FADE_LEVELS = 4 };
+typedef struct ath_fade {
+    int32_t count;                  /* of levels that are shown; 0: none yet; 1: nothing fades */
+    int32_t level[ATH_FADE_LEVELS]; /* the one that is gone to last; one may be there twice */
+    double weight[ATH_FADE_LEVELS]; /* they add up to 1 */
+    double passed[ATH_FADE_LEVELS]; /* how far the change to each but the first has come, 0 to 1 */
+} ath_fade;
+
+/* Once per drawn frame: the level to show, prepared by now, and the time since the last call as a share of what a fade
+ * takes: seconds / 0.2. A share of 1 or more, and the first level of all, show the level at once. Where ATH_FADE_LEVELS
+ * are shown already a further one waits for its turn. */
+ATH_API void ath_fade_to(ath_fade *fade, int32_t level, double share);
+/* The deepest of its levels, whose cut the matrices and exact vertices below are of; -1: it has none. */
+ATH_API int32_t ath_fade_cut(const ath_fade *fade);
+
+/* As ath_positions, ath_matrices and ath_exact, but of all levels of a fade, blended: the segments of each are handed over,
+ * so that those that fade out stay prepared as long as the fade names them. Matrices are of the nodes of ath_fade_cut's
+ * level, and exact vertices those of that level: bind vertices by ath_cut of it. Where it is above 0, both are about the
+ * ath_level_rest of level 1, also what level 0 gives to them: a renderer that shows level 0, too, on that has no jump there.
+ * ATH_NOT_PREPARED: a level that has a weight lacks the frame, or no segment is of the deepest level; nothing was written.
+ * With one level the numbers have the bits of the functions above. */
+ATH_API int ath_faded_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                                double frame, const ath_fade *fade, ath_order order, float *xyz, size_t stride);
+ATH_API int ath_faded_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                               double frame, const ath_fade *fade, float *matrices, size_t stride);
+ATH_API int ath_faded_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count,
+                            double frame, const ath_fade *fade, float *xyz, size_t stride);
 
 /* ---- level of detail --------------------------------------------------------------------------------------------- */
 

@@ -91,13 +91,14 @@ static int show_one(const ath_segment *segment, int32_t frame, shown_frames *sho
     return ATH_HELD;
 }
 
+/* At this level; -1: at any. */
 static int find_frames(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame,
-                       shown_frames *shown)
+                       int32_t level, shown_frames *shown)
 {
     ath_blend blend = ath_blend_at(file, frame);
     shown->weight = blend.weight;
     for (int32_t i = 0; i < count; i++) {
-        const ath_segment *first = find_segment(segments + i, 1, blend.segment[0], -1);
+        const ath_segment *first = find_segment(segments + i, 1, blend.segment[0], level);
         const ath_segment *second = first ? find_segment(segments, count, blend.segment[1], first->level) : 0;
         if (!second) continue;
         shown->segment[0] = first;
@@ -109,7 +110,7 @@ static int find_frames(const ath_file *file, const ath_segment *const *segments,
     int32_t nearer = blend.weight < 0.5 ? 0 : 1;
     for (int32_t i = 0; i < 2; i++) {
         int32_t side = i == 0 ? nearer : 1 - nearer;
-        const ath_segment *segment = find_segment(segments, count, blend.segment[side], -1);
+        const ath_segment *segment = find_segment(segments, count, blend.segment[side], level);
         if (segment) return show_one(segment, blend.frame[side], shown);
     }
     return ATH_NOT_PREPARED;
@@ -157,7 +158,13 @@ typedef struct {
     size_t stride;
     const int32_t *place; /* null: file order */
     int is_float64;
+    float share; /* that it takes of what is there; 1: it is written over */
 } target;
+
+ATH_INLINE float mixed(float before, float value, float share)
+{
+    return share < 1.0f ? before + (value - before) * share : value;
+}
 
 ATH_INLINE void put(const target *to, size_t vertex, double x, double y, double z)
 {
@@ -169,9 +176,9 @@ ATH_INLINE void put(const target *to, size_t vertex, double x, double y, double 
         out[2] = z;
     } else {
         float *out = (float *)(void *)at;
-        out[0] = (float)x;
-        out[1] = (float)y;
-        out[2] = (float)z;
+        out[0] = mixed(out[0], (float)x, to->share);
+        out[1] = mixed(out[1], (float)y, to->share);
+        out[2] = mixed(out[2], (float)z, to->share);
     }
 }
 
@@ -200,23 +207,26 @@ ATH_HOT static void narrow_block(const double *ATH_RESTRICT block, size_t count,
     for (size_t i = 0; i < count; i++) out[i] = (float)block[i];
 }
 
-static int is_packed(const target *to) { return !to->is_float64 && !to->place && to->stride == 3 * sizeof(float); }
+static int is_packed(const target *to)
+{
+    return !to->is_float64 && !to->place && to->stride == 3 * sizeof(float) && to->share == 1.0f;
+}
 
+/* Vertices first to first + count - 1 of a node, from where `rest` has them, go to `vertex` on. */
 static void put_node(const ath_file *file, const ath_plan *plan, const ath_part *part, const double m[ATH_MAP],
-                     const target *to)
+                     const double *rest, size_t first, size_t count, size_t vertex, const target *to)
 {
     const double *a = rest_attach_of(plan, part);
     double block[3 * BLOCK];
-    for (size_t start = 0; start < (size_t)part->count; start += BLOCK) {
-        size_t count = (size_t)part->count - start, first = (size_t)part->first + start;
-        if (count > (size_t)BLOCK) count = BLOCK;
-        move_block(plan->rest + 3 * first, count, m, a, file->info.origin, block);
+    for (size_t start = 0; start < count; start += BLOCK) {
+        size_t size = count - start < (size_t)BLOCK ? count - start : (size_t)BLOCK, at = vertex + start;
+        move_block(rest + 3 * (first + start), size, m, a, file->info.origin, block);
         if (is_packed(to)) {
-            narrow_block(block, 3 * count, (float *)(void *)to->out + 3 * first);
+            narrow_block(block, 3 * size, (float *)(void *)to->out + 3 * at);
             continue;
         }
-        if (!file->info.is_float64 && to->is_float64) round_block(block, 3 * count);
-        for (size_t i = 0; i < count; i++) put(to, first + i, block[3 * i], block[3 * i + 1], block[3 * i + 2]);
+        if (!file->info.is_float64 && to->is_float64) round_block(block, 3 * size);
+        for (size_t i = 0; i < size; i++) put(to, at + i, block[3 * i], block[3 * i + 1], block[3 * i + 2]);
     }
 }
 
@@ -272,22 +282,32 @@ static void put_exact(const shown_frames *shown, size_t index, size_t count, siz
         put_floats(shown, index, count, vertex, to);
 }
 
+/* Vertices first to first + count - 1, all of one part, go to `vertex` on; nodes move the rest pose of `posed`. */
+static void put_part(const ath_file *file, const shown_frames *shown, const ath_part *part, const ath_plan *posed,
+                     size_t first, size_t count, size_t vertex, const target *to)
+{
+    double map[ATH_MAP];
+    if (part->branch < 0) {
+        put_exact(shown, (size_t)part->index + (first - (size_t)part->first), count, vertex, to);
+        return;
+    }
+    blend_map(shown, part->index, map);
+    put_node(file, ath_level_plan(file, shown->segment[0]->level), part, map, posed->rest, first, count, vertex, to);
+}
+
+static void put_all(const ath_file *file, const shown_frames *shown, const target *to)
+{
+    const ath_segment *segment = shown->segment[0];
+    for (const ath_part *part = segment->parts; part < segment->parts + segment->part_count; part++)
+        put_part(file, shown, part, ath_level_plan(file, segment->level), (size_t)part->first, (size_t)part->count,
+                 (size_t)part->first, to);
+}
+
 static int positions(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, target to)
 {
     shown_frames shown;
-    int result = find_frames(file, segments, count, frame, &shown);
-    if (result == ATH_NOT_PREPARED) return result;
-    const ath_plan *plan = ath_level_plan(file, shown.segment[0]->level);
-    for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
-        const ath_part *part = shown.segment[0]->parts + i;
-        double map[ATH_MAP];
-        if (part->branch < 0) {
-            put_exact(&shown, (size_t)part->index, (size_t)part->count, (size_t)part->first, &to);
-            continue;
-        }
-        blend_map(&shown, part->index, map);
-        put_node(file, plan, part, map, &to);
-    }
+    int result = find_frames(file, segments, count, frame, -1, &shown);
+    if (result != ATH_NOT_PREPARED) put_all(file, &shown, &to);
     return result;
 }
 
@@ -298,6 +318,7 @@ static target target_of(const ath_file *file, ath_order order, void *out, size_t
     to.stride = stride;
     to.place = order == ATH_SOURCE_ORDER ? file->vertex_source : 0;
     to.is_float64 = is_float64;
+    to.share = 1.0f;
     return to;
 }
 
@@ -316,7 +337,7 @@ int ath_positions_float64(const ath_file *file, const ath_segment *const *segmen
 static int exact(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, target to)
 {
     shown_frames shown;
-    int result = find_frames(file, segments, count, frame, &shown);
+    int result = find_frames(file, segments, count, frame, -1, &shown);
     if (result != ATH_NOT_PREPARED) put_exact(&shown, 0, (size_t)shown.segment[0]->exact_vertices, 0, &to);
     return result;
 }
@@ -336,14 +357,15 @@ int ath_exact_float64(const ath_file *file, const ath_segment *const *segments, 
 int32_t ath_shown_level(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame)
 {
     shown_frames shown;
-    return find_frames(file, segments, segment_count, frame, &shown) == ATH_NOT_PREPARED ? -1 : shown.segment[0]->level;
+    return find_frames(file, segments, segment_count, frame, -1, &shown) == ATH_NOT_PREPARED ? -1
+                                                                                             : shown.segment[0]->level;
 }
 
 static int matrices(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame, void *out,
                     size_t stride, int is_float64)
 {
     shown_frames shown;
-    int result = find_frames(file, segments, count, frame, &shown);
+    int result = find_frames(file, segments, count, frame, -1, &shown);
     if (result == ATH_NOT_PREPARED) return result;
     const ath_plan *plan = ath_level_plan(file, shown.segment[0]->level);
     for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
@@ -371,6 +393,150 @@ int ath_matrices_float64(const ath_file *file, const ath_segment *const *segment
                          double *out, size_t stride)
 {
     return matrices(file, segments, segment_count, frame, out, stride, 1);
+}
+
+/* ---- from level to level ---- */
+
+/* How far a fade has come: it begins and ends at rest. */
+static double eased(double passed) { return passed * passed * (3.0 - 2.0 * passed); }
+
+void ath_fade_to(ath_fade *fade, int32_t level, double share)
+{
+    int32_t gone = 0, at_once = !(share < 1.0);
+    for (int32_t i = 1; i < fade->count; i++) {
+        fade->passed[i] = fade->passed[i] + share;
+        if (!(fade->passed[i] < 1.0)) gone = i;
+    }
+    if (at_once && fade->count > 0) gone = fade->level[fade->count - 1] == level ? fade->count - 1 : fade->count;
+    for (int32_t i = gone; i < fade->count; i++) {
+        fade->level[i - gone] = fade->level[i];
+        fade->passed[i - gone] = fade->passed[i];
+    }
+    fade->count -= gone;
+    if (fade->count < ATH_FADE_LEVELS && (fade->count == 0 || fade->level[fade->count - 1] != level)) {
+        fade->level[fade->count] = level;
+        fade->passed[fade->count++] = 0.0;
+    }
+    for (int32_t i = 0; i < fade->count; i++)
+        fade->weight[i] =
+            (i > 0 ? eased(fade->passed[i]) : 1.0) - (i + 1 < fade->count ? eased(fade->passed[i + 1]) : 0.0);
+}
+
+int32_t ath_fade_cut(const ath_fade *fade)
+{
+    int32_t deepest = -1;
+    for (int32_t i = 0; i < fade->count; i++)
+        if (fade->level[i] > deepest) deepest = fade->level[i];
+    return deepest;
+}
+
+/* What is shown of the levels of a fade that have a weight. */
+typedef struct {
+    const ath_segment *cut; /* one of the deepest level */
+    shown_frames shown[ATH_FADE_LEVELS];
+    float share[ATH_FADE_LEVELS]; /* of each in the blend of those up to it */
+    int32_t count;
+    int result;
+} faded_frames;
+
+static faded_frames find_faded(const ath_file *file, const ath_segment *const *segments, int32_t count, double frame,
+                               const ath_fade *fade)
+{
+    faded_frames found;
+    double sum = 0.0;
+    int32_t deepest = ath_fade_cut(fade);
+    found.count = 0;
+    found.result = ATH_NOT_PREPARED;
+    found.cut = 0;
+    for (int32_t i = 0; i < count; i++)
+        if (segments[i] && segments[i]->level >= 0 && segments[i]->level == deepest) found.cut = segments[i];
+    if (!found.cut) return found;
+    int held = ATH_OK;
+    for (int32_t i = 0; i < fade->count; i++) {
+        if (!(fade->weight[i] > 0.0)) continue;
+        int result = find_frames(file, segments, count, frame, fade->level[i], found.shown + found.count);
+        if (result == ATH_NOT_PREPARED) return found;
+        if (result == ATH_HELD) held = ATH_HELD;
+        sum = sum + fade->weight[i];
+        found.share[found.count++] = (float)(fade->weight[i] / sum);
+    }
+    if (found.count > 0) found.result = held;
+    return found;
+}
+
+int ath_faded_positions(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                        const ath_fade *fade, ath_order order, float *xyz, size_t stride)
+{
+    faded_frames found = find_faded(file, segments, segment_count, frame, fade);
+    if (found.result == ATH_NOT_PREPARED) return found.result;
+    target to = target_of(file, order, xyz, stride, 0);
+    for (int32_t i = 0; i < found.count; i++) {
+        to.share = found.share[i];
+        put_all(file, found.shown + i, &to);
+    }
+    return found.result;
+}
+
+/* The part of a segment's level that has a vertex, from `part` on. */
+static const ath_part *part_with(const ath_part *part, int32_t vertex)
+{
+    while (part->first + part->count <= vertex) part++;
+    return part;
+}
+
+static void fade_matrices(const ath_file *file, const faded_frames *found, int32_t index, float *out, size_t stride)
+{
+    const shown_frames *shown = found->shown + index;
+    const ath_segment *cut = found->cut;
+    const ath_plan *plan = ath_level_plan(file, shown->segment[0]->level);
+    const ath_part *moves = shown->segment[0]->parts;
+    double map[ATH_MAP], matrix[12];
+    for (const ath_part *part = cut->parts; part < cut->parts + cut->part_count; part++) {
+        if (part->branch < 0) continue;
+        float *at = (float *)(void *)((char *)out + (size_t)part->index * stride);
+        moves = part_with(moves, part->first);
+        blend_map(shown, moves->index, map);
+        matrix_of(file, plan, moves, map, matrix);
+        for (int32_t k = 0; k < 12; k++) at[k] = mixed(at[k], (float)matrix[k], found->share[index]);
+    }
+}
+
+int ath_faded_matrices(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                       const ath_fade *fade, float *out, size_t stride)
+{
+    faded_frames found = find_faded(file, segments, segment_count, frame, fade);
+    for (int32_t i = 0; i < found.count && found.result != ATH_NOT_PREPARED; i++)
+        fade_matrices(file, &found, i, out, stride);
+    return found.result;
+}
+
+/* What a level shows of the exact vertices of a deeper one: some are moved by its nodes, of whatever level from the rest
+ * pose of those above level 0. */
+static void fade_exact(const ath_file *file, const shown_frames *shown, const ath_segment *cut, const target *to)
+{
+    const ath_part *moves = shown->segment[0]->parts;
+    const ath_plan *posed = ath_level_plan(file, cut->level > 0 ? 1 : 0);
+    for (const ath_part *part = cut->parts; part < cut->parts + cut->part_count; part++) {
+        int32_t end = part->first + part->count, next;
+        for (int32_t first = part->first; part->branch < 0 && first < end; first = next) {
+            moves = part_with(moves, first);
+            next = moves->first + moves->count < end ? moves->first + moves->count : end;
+            put_part(file, shown, moves, posed, (size_t)first, (size_t)(next - first),
+                     (size_t)(part->index + first - part->first), to);
+        }
+    }
+}
+
+int ath_faded_exact(const ath_file *file, const ath_segment *const *segments, int32_t segment_count, double frame,
+                    const ath_fade *fade, float *xyz, size_t stride)
+{
+    faded_frames found = find_faded(file, segments, segment_count, frame, fade);
+    target to = target_of(file, ATH_FILE_ORDER, xyz, stride, 0);
+    for (int32_t i = 0; i < found.count && found.result != ATH_NOT_PREPARED; i++) {
+        to.share = found.share[i];
+        fade_exact(file, found.shown + i, found.cut, &to);
+    }
+    return found.result;
 }
 
 /* ---- level of detail ---- */

@@ -180,6 +180,29 @@ export interface ByteRange {
   readonly size: number;
 }
 
+/** Levels that are shown together, at most four, and the share of each; they add up to 1. */
+export interface Fading {
+  readonly levels: readonly number[];
+  readonly weights: readonly number[];
+}
+
+/** Goes from level to level over a moment, without the jump by the distance of the two. Once per drawn frame:
+ *
+ *     fade.to(segment.level, seconds / 0.2);
+ *     file.positions([segment, before], frame, { fade }); // or matrices() and exact()
+ *
+ * Levels are blended, with weights that change smoothly, also where a change overtakes the one before. */
+export class AthFade implements Fading {
+  /** The one that is gone to last; one may be there twice. Of one nothing fades. */
+  readonly levels: readonly number[];
+  readonly weights: readonly number[];
+  /** The deepest of them; -1: there is none yet. */
+  readonly cut: number;
+  /** The level to show, prepared by now, and the time since the last call as a share of what a fade takes. A share of 1 or
+   * more, and the first level of all, show the level at once. */
+  to(level: number, share: number): this;
+}
+
 /** How a preparation goes on from others, and others from it: see prepare(). */
 export type GoingOn = { from?: Segment | null; keep?: boolean; following?: Segment | null };
 
@@ -315,20 +338,24 @@ export class AthFile {
    * be handed over; null and freed ones are passed over. Results go to `out`, which is returned, or to a new
    * array. Null: none of the segments has this frame, and `out` is as it was. Hand over segments of one level
    * where matrices or exact vertices are wanted: of several levels, nothing tells which one is shown.
+   *
+   * With `fade`, the blend of its levels, segments of each of which are handed over; matrices and exact vertices are those
+   * of the cut of the deepest, of which one segment has to be there. Null: a level that has a weight lacks the frame.
    */
 
   /** All vertices, 3 numbers each; order "source" by default. */
-  positions(segments: Segments, frame: number, options?: { order?: Order }): Float32Array | null;
+  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null }): Float32Array | null;
+  positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array | null;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
                                                    options: { out: T; order?: Order }): T | null;
   /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
    * positions.
    * Vertices of exact runs have none, exact() has them. */
-  matrices(segments: Segments, frame: number): Float32Array | null;
+  matrices(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
   matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
                                                   options: { out: T }): T | null;
   /** parts().exactCount positions of 3 numbers, in file order. */
-  exact(segments: Segments, frame: number, options?: { out?: Float32Array }): Float32Array | null;
+  exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
 
   /** Lets go of the memory at once instead of with the object; nothing but free() and cancel() may be
    * called then. */

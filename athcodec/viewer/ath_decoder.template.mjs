@@ -38,6 +38,7 @@ const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed
 const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 0x8005, edges: 0x8006 };
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
+const FADE = { levels: 4, weights: 24, passed: 56 }, FADE_SIZE = 88, FADE_LEVELS = 4; // offsets of arrays
 const TYPES = {
   u8: [1, (view, at) => view.getUint8(at)],
   u16: [2, (view, at) => view.getUint16(at, true)],
@@ -180,6 +181,19 @@ class Core {
     return result;
   }
 
+  // The ath_fade of an AthFade, at `at`; what it says.
+  putFade(at, { levels, weights, passed = [] }) {
+    this.view(Int32Array, at, 1 + FADE_LEVELS).set([levels.length, ...levels]);
+    this.view(Float64Array, at + FADE.weights, FADE_LEVELS).set(weights);
+    this.view(Float64Array, at + FADE.passed, FADE_LEVELS).set(passed);
+  }
+
+  fadeAt(at) {
+    const [count] = this.view(Int32Array, at, 1), doubles = (from) => [...this.view(Float64Array, at + from, count)];
+    return { levels: [...this.view(Int32Array, at + FADE.levels, count)], weights: doubles(FADE.weights),
+      passed: doubles(FADE.passed) };
+  }
+
   // An array of structs of int32 as an object of arrays.
   columns(names, at, count) {
     const rows = this.view(Int32Array, at >>> 0, count * names.length);
@@ -253,6 +267,36 @@ function asOut(out, length, types) {
   const names = types.map((Type) => Type.name).join(" or ");
   const got = `${given?.constructor?.name} of ${given?.length}`;
   throw new RangeError(`out: got ${got}, expected ${names} of ${length}`);
+}
+
+// ---- from level to level ----
+
+export class AthFade {
+  #state = { levels: [], weights: [], passed: [] };
+
+  get levels() {
+    return this.#state.levels;
+  }
+
+  get weights() {
+    return this.#state.weights;
+  }
+
+  get cut() {
+    return Math.max(-1, ...this.levels);
+  }
+
+  to(level, share) {
+    whole(level, 0, NO_LEVEL - 1, "level");
+    number(share, "share");
+    shared ??= new Core();
+    this.#state = shared.with(FADE_SIZE, (at) => {
+      shared.putFade(at, this.#state);
+      shared.c.ath_fade_to(at, level, share);
+      return shared.fadeAt(at);
+    });
+    return this;
+  }
 }
 
 // ---- segments ----
@@ -769,31 +813,48 @@ export class AthFile {
     throw new TypeError("segments: got something else, expected what prepare() of this file returned");
   }
 
-  // The largest of column `k` of #cutSize over the segments' levels.
-  #most(segments, k) {
-    const levels = new Set(Array.from(segments, (segment) => segment?.level ?? 0));
+  // What `call` shows, given the address of an ath_fade, too: levels and their weights.
+  #showFaded(fade, segments, frame, out, length, call) {
+    whole(fade.levels.length, 1, FADE_LEVELS, "levels of fade");
+    if (!(out instanceof Float32Array)) throw new TypeError("out: got something else, expected a Float32Array of a fade");
+    return this.#core.with(FADE_SIZE, (at) => {
+      this.#core.putFade(at, fade);
+      return this.#show(segments, frame, out, length, (array, count, to) => call(array, count, at, to));
+    });
+  }
+
+  // The largest of column `k` of #cutSize over the levels: of a fade, of segments where there is none.
+  #most(segments, fade, k) {
+    if (fade) return this.#cutSize(this.#level(Math.max(...fade.levels)))[k];
+    const levels = new Set(Array.from(segments).filter(Boolean).map((segment) => segment.level));
     return Math.max(0, ...Array.from(levels, (level) => this.#cutSize(this.#level(level))[k]));
   }
 
-  positions(segments, frame, { out, order = "source" } = {}) {
+  positions(segments, frame, { out, order = "source", fade = null } = {}) {
     const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
+      c.ath_faded_positions(this.#at, array, count, frame, faded, which, at, 12));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_positions_float64(this.#at, array, count, frame, which, at, 24)
       : c.ath_positions(this.#at, array, count, frame, which, at, 12));
   }
 
-  matrices(segments, frame, { out } = {}) {
-    const c = this.#c, length = 12 * this.#most(segments, 1);
+  matrices(segments, frame, { out, fade = null } = {}) {
+    const c = this.#c, length = 12 * this.#most(segments, fade, 1);
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
+      c.ath_faded_matrices(this.#at, array, count, frame, faded, at, 48));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_matrices_float64(this.#at, array, count, frame, at, 96)
       : c.ath_matrices(this.#at, array, count, frame, at, 48));
   }
 
-  exact(segments, frame, { out } = {}) {
-    const c = this.#c, length = 3 * this.#most(segments, 2);
+  exact(segments, frame, { out, fade = null } = {}) {
+    const c = this.#c, length = 3 * this.#most(segments, fade, 2);
     const result = asOut(out, length, [Float32Array]);
+    if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
+      c.ath_faded_exact(this.#at, array, count, frame, faded, at, 12));
     return this.#show(segments, frame, result, length, (array, count, at) =>
       c.ath_exact(this.#at, array, count, frame, at, 12));
   }

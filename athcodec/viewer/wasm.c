@@ -14,6 +14,9 @@ _Static_assert(offsetof(ath_branch, detail) == 36 && sizeof(ath_branch) == 40, "
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_polygons, is_derived) == 13 && sizeof(ath_polygons) == 16, "POLYGONS");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
+_Static_assert(offsetof(ath_fade, level) == 4 && offsetof(ath_fade, weight) == 24 && offsetof(ath_fade, passed) == 56
+                   && sizeof(ath_fade) == 88 && ATH_FADE_LEVELS == 4,
+               "FADE");
 _Static_assert(offsetof(ath_fault_info, chunk) == 8 && sizeof(ath_fault_info) == 56 && ATH_FAULT_TEXT == 256, "FAULT");
 _Static_assert(ATH_MORE == 64 && ATH_HELD == 65 && ATH_MISSING == 66 && ATH_NOT_PREPARED == 67 && ATH_NO_MEMORY == 68
                    && ATH_BAD_ARGUMENT == 69,

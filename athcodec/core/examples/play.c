@@ -1,11 +1,11 @@
 /* Plays an .ath file as an engine would, without the screen: the file arrives slice by slice, a camera walks up
  * to the plant and back, and every drawn frame gets what a GPU needs, at the level of detail that the distance
- * asks for.
+ * asks for; where that changes it fades over.
  *
  *     play FILE [--clip NAME] [--slices N] [--seconds S] [--fps F]
  *
  * It prints the same on every machine, but for the microseconds. What it leaves out: threads (each has an
- * ath_work of its own), more than two segments in memory, and range requests (ath_ranges) instead of a download
+ * ath_work of its own), more than a few segments in memory, and range requests (ath_ranges) instead of a download
  * from the front. */
 #include <ath.h>
 
@@ -18,6 +18,7 @@
 static const double FOV = 1.0, SCREEN = 1080.0; /* vertical, in radians and in pixels */
 static const double PIXELS = 1.0;               /* an error above this on the screen asks for a finer level */
 static const double COMFORTABLE = 0.7;          /* a coarser level stays below this, or it would flicker */
+static const double FADE = 0.2;                 /* seconds from a level to the next */
 
 typedef struct {
     FILE *download;
@@ -32,7 +33,10 @@ typedef struct {
     ath_work *work;
     size_t file_size, build_size, layers_size, work_size, segments_size;
     ath_segment *playing, *next; /* null: none. `next` is prepared while `playing` plays */
-    void *kept, *next_kept;      /* what deeper levels of these go on from */
+    ath_segment *before;         /* the same as `playing` at the level that fades out; null: none does */
+    ath_fade fade;
+    double fade_frames;     /* that it takes, drawn ones */
+    void *kept, *next_kept; /* what deeper levels of these go on from */
     int preparing;
     int32_t steps, spread;      /* of the preparation in all, and over how many drawn frames it is spread */
     int32_t level, bound_level; /* that the camera asks for; that `binding` is for */
@@ -125,7 +129,7 @@ static void choose_clip(player *p, const char *name)
 
 static void close_file(player *p)
 {
-    void *const memories[] = {p->playing, p->kept, p->next,    p->next_kept, p->work,      p->bases,
+    void *const memories[] = {p->playing, p->kept, p->next,    p->next_kept, p->before,    p->work, p->bases,
                               p->layers,  p->file, p->binding, p->matrices,  p->positions, p->bytes};
     for (int32_t i = 0; i < p->layer_count; i++) free(p->layers[i]);
     for (size_t i = 0; i < sizeof memories / sizeof *memories; i++) free(memories[i]);
@@ -192,12 +196,17 @@ static int begin(player *p, int32_t segment, int32_t level, size_t size)
     return ath_prepare_start(p->work, p->work_size, p->file, segment, level, p->next, size);
 }
 
+static size_t room_of(const player *p, const ath_segment *segment)
+{
+    return segment ? ath_segment_size(p->file, level_of(segment)) : 0;
+}
+
 /* Memory is for the level, so that a plant far away takes little. */
 static int start(player *p, int32_t segment, int32_t level)
 {
     size_t size = ath_segment_size(p->file, level);
-    size_t both = size + (p->playing ? ath_segment_size(p->file, level_of(p->playing)) : 0);
-    if (p->segments_size < both) p->segments_size = both;
+    size_t all = size + room_of(p, p->playing) + room_of(p, p->before);
+    if (p->segments_size < all) p->segments_size = all;
     free(p->next);
     p->next = allocate(size);
     refine(p, level);
@@ -208,26 +217,31 @@ static int start(player *p, int32_t segment, int32_t level)
     return p->preparing = 1;
 }
 
-/* First a segment to show now, then a new level for it, then what comes after it. A new level waits for the
- * next segment where this one is nearly over. `left`: drawn frames until then. */
+/* First a segment to show now, then a new level for it, then what comes after it, at the level of this one: where they
+ * meet no level changes. A new level waits for the next segment where this one is over before it has faded in, and goes
+ * ahead of a segment of which less has arrived. `left`: drawn frames until then. */
 static int start_next(player *p, int32_t now, double left)
 {
     int32_t count = p->clip->segment_count, after = now < p->last_segment ? now + 1 : p->first_segment;
     int32_t level = level_for(p, now), level_after = level_for(p, after);
+    double change = p->spread + p->fade_frames;
     if (level < 0) return 0;
     if (index_of(p->playing) != now) return start(p, now, level);
-    if (level_of(p->playing) != level && (count == 1 || left > 2 * p->spread)) return start(p, now, level);
+    if (level_after >= 0 && level_after < level && left < 2.0 * change) level = level_after;
+    if (level_of(p->playing) != level && !p->before && (count == 1 || left > change)) return start(p, now, level);
+    if (level_after > level_of(p->playing)) level_after = level_of(p->playing);
     if (count == 1 || level_after < 0) return 0;
     if (index_of(p->next) != after) return start(p, after, level_after);
     if (level_of(p->next) != level_after && left > p->spread) return start(p, after, level_after);
     return 0;
 }
 
-/* Plays what is prepared for this segment: its time has come, or it is a new level. */
+/* Plays what is prepared for this segment: its time has come, or it is a new level, which fades in. */
 static void take_over(player *p, int32_t now)
 {
     if (p->preparing || index_of(p->next) != now) return;
-    free(p->playing);
+    free(p->before);
+    p->before = p->playing;
     free(p->kept);
     p->playing = p->next;
     p->kept = p->next_kept;
@@ -264,6 +278,7 @@ static void set_pace(player *p, double fps)
     p->drawn_per_frame = frame_time * fps;
     double drawn = p->drawn_per_frame * p->clip->frame_count / p->clip->segment_count;
     p->spread = (int32_t)fmin(30.0, 1.0 + drawn / 4.0);
+    p->fade_frames = fmin(FADE * fps, 1.0 + drawn / 4.0);
 }
 
 /* ---- drawing ---- */
@@ -283,18 +298,28 @@ static void bind_vertices(player *p, int32_t level)
     p->bound_level = level;
 }
 
-/* Frames of two levels are not blended: the last one of this segment is held until the next begins. */
+/* What is faded out is let go of once it is; at once where it is another segment's. */
+static void fade(player *p)
+{
+    ath_fade_to(&p->fade, level_of(p->playing), 1.0 / p->fade_frames);
+    if (p->fade.count > 1 && index_of(p->before) == index_of(p->playing)) return;
+    free(p->before);
+    p->before = NULL;
+    if (p->fade.count > 1) ath_fade_to(&p->fade, level_of(p->playing), 1.0);
+}
+
 static int draw(player *p, double place)
 {
-    const ath_segment *segments[2] = {p->playing, p->next};
-    int32_t level = level_of(p->playing), count = level_of(p->next) == level ? 2 : 1;
-    if (level < 0) return ATH_NOT_PREPARED; /* the rest pose is shown until there is motion */
-    if (level != p->bound_level) bind_vertices(p, level);
+    if (!p->playing) return ATH_NOT_PREPARED; /* the rest pose is shown until there is motion */
+    fade(p);
+    const ath_segment *segments[3] = {p->playing, p->next, p->before};
     size_t matrix = 12 * sizeof(float), vertex = 3 * sizeof(float);
+    int32_t level = ath_fade_cut(&p->fade);
+    if (level != p->bound_level) bind_vertices(p, level);
     if (p->nodes == 0) /* without a GPU this is the call for all levels */
-        return ath_positions(p->file, segments, count, place, ATH_FILE_ORDER, p->positions, vertex);
-    ath_matrices(p->file, segments, count, place, p->matrices, matrix);
-    return ath_exact(p->file, segments, count, place, p->positions, vertex);
+        return ath_faded_positions(p->file, segments, 3, place, &p->fade, ATH_FILE_ORDER, p->positions, vertex);
+    ath_faded_matrices(p->file, segments, 3, place, &p->fade, p->matrices, matrix);
+    return ath_faded_exact(p->file, segments, 3, place, &p->fade, p->positions, vertex);
 }
 
 /* ---- the walk ---- */

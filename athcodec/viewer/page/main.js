@@ -518,6 +518,7 @@ function tick(now) {
   }
   if (state.forest) {
     state.forest.bakeReady();
+    state.dirty ||= state.forest.fading;
     if (state.playing || state.dirty) state.forest.update(stage.camera, stage.pixels, state.turns + state.time);
   }
   if (state.dirty || (state.playing && state.forest)) draw();

@@ -5,7 +5,7 @@
 import { DynamicDrawUsage, Frustum, Group, InstancedBufferAttribute, InstancedBufferGeometry, LineBasicMaterial, LineSegments,
   Matrix4, Mesh, MeshStandardMaterial, Sphere, Vector3, BufferAttribute, DoubleSide } from "three";
 
-import { dataTexture, roundOf } from "./ATHMotion.js";
+import { dataTexture, eased, roundOf } from "./ATHMotion.js";
 import { clustered, gather } from "./geometry.js";
 import { injectMotion, motionUniforms } from "./shader.js";
 
@@ -24,21 +24,25 @@ export class ATHForest extends Group {
   levelOfDetail = true;
   pixels = 1;
   measure = "p99"; // of the errors of levels that `pixels` is about; before the first bake()
+  fade = 0.2;      // seconds that an instance takes to another level; 0: none
+  fading = false;  // whether one does
   counts = [];     // instances drawn, by level
   vertices = 0;    // drawn, all instances
   culled = 0;
 
   #ath;
   #bins = new Map();    // of every clip, the finest first: {level, tolerance, drawn, place, turn, size, uniforms, filled,
-                        // rows, perRow}
+                        // rows, perRow, texel, fades}; fades: of levels that instances fade in from, the same and `from`
   #shown = [];          // those that the motion's clip was drawn with last
   #baking = new Set();
   #baked = new Map();   // of every clip: levels
   #motions = new Map(); // of clips that only instances play: what has them fetched
   #places = new Float32Array(0);
   #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
+  #states = [];         // of every instance that is in view: {clip, level, from, since}; from: -1, or what it fades in from
   #material;
   #geometry;
+  #now = 0;             // of the last update(), milliseconds
 
   /** geometry: what is drawn (default: the file's faces, else lines). material(isLines, level): makes the material of a
    * level (default: like ath.object's). */
@@ -68,11 +72,12 @@ export class ATHForest extends Group {
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
     this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) =>
       [Math.cos(angle), Math.sin(angle), seconds, numberOf(clip)]));
+    this.#states = [];
     for (const bin of this.#allBins()) this.#makeRoom(bin);
   }
 
   #allBins() {
-    return [...this.#bins.values()].flat();
+    return [...this.#bins.values()].flat().flatMap((bin) => [bin, ...bin.fades.values()]);
   }
 
   /** Gets all levels ready to be drawn that are here, of all clips that instances play: once per frame. */
@@ -114,7 +119,7 @@ export class ATHForest extends Group {
     const node = channel.nodeNumbers(known), texel = channel.partOfVertices(known);
     node.forEach((_, vertex) => { if (texel[vertex] < 0) node[vertex] = -1; }); // exact runs: one space
     const material = injectMotion(this.#material(!this.#geometry.hasAttribute("normal"), level), played.uniforms, true);
-    const place = (geometry, tolerance) => this.#addBin(clip, geometry, texel, material, { ...played, level, tolerance });
+    const place = (geometry, tolerance) => this.#addBin(clip, geometry, material, { ...played, texel, level, tolerance });
     let before = deepest ? this.#geometry : clustered(this.#geometry, rest, CELL * least, node);
     place(before, least);
     for (let tolerance = Math.max(COARSER * least, sphere.radius / 2000); tolerance < most; tolerance *= COARSER) {
@@ -127,19 +132,37 @@ export class ATHForest extends Group {
     }
   }
 
-  #addBin(clip, base, texel, material, played) {
+  #addBin(clip, base, material, played) {
+    const bin = this.#newBin(clip.index, base, material, { ...played, base, fades: new Map() });
+    this.#bins.set(clip.index, [...this.#bins.get(clip.index) ?? [], bin].sort((a, b) => a.tolerance - b.tolerance));
+  }
+
+  #newBin(clip, base, material, played) {
     const geometry = new InstancedBufferGeometry(), { source } = base.userData, lines = !base.hasAttribute("normal");
+    const parts = ({ texel }) => new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1);
     geometry.setIndex(base.index);
     for (const [name, attribute] of Object.entries(base.attributes))
       if (name !== "athPart") geometry.setAttribute(name, attribute);
-    geometry.setAttribute("athPart", new BufferAttribute(gather(new Float32Array(source.length), texel, source, 1), 1));
+    geometry.setAttribute("athPart", parts(played));
+    if (played.from) geometry.setAttribute("athPartBefore", parts(played.from));
     const drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    Object.assign(drawn.userData, { level: played.level, clip: clip.index });
+    Object.assign(drawn.userData, { level: played.level, clip });
     drawn.frustumCulled = false; // instances are, one by one
     const bin = { ...played, drawn, size: source.length, filled: 0 };
     this.#makeRoom(bin);
     this.add(drawn);
-    this.#bins.set(clip.index, [...this.#bins.get(clip.index) ?? [], bin].sort((a, b) => a.tolerance - b.tolerance));
+    return bin;
+  }
+
+  // What draws instances of a bin that fade in from the level of another.
+  #fadingBin(clip, bin, from) {
+    if (!bin.fades.has(from.level)) {
+      const { athData, athForest, athStride } = from.uniforms, lines = !bin.base.hasAttribute("normal");
+      const uniforms = { ...bin.uniforms, athDataBefore: athData, athBefore: { value: athForest.value.clone().setY(athStride.value) } };
+      const material = injectMotion(this.#material(lines, bin.level), uniforms, true);
+      bin.fades.set(from.level, this.#newBin(clip, bin.base, material, { ...bin, uniforms, from, fades: new Map() }));
+    }
+    return bin.fades.get(from.level);
   }
 
   // A geometry keeps the number of instances that it was first drawn with: another number takes another one.
@@ -147,7 +170,7 @@ export class ATHForest extends Group {
     const old = bin.drawn.geometry, geometry = new InstancedBufferGeometry();
     geometry.setIndex(old.index);
     for (const [name, attribute] of Object.entries(old.attributes)) geometry.setAttribute(name, attribute);
-    for (const [key, name] of [["place", "athPlace"], ["turn", "athTurn"]]) {
+    for (const [key, name] of [["place", "athPlace"], ["turn", "athTurn"], ...(bin.from ? [["share", "athFading"]] : [])]) {
       bin[key] = new InstancedBufferAttribute(new Float32Array(Math.max(4, this.#places.length)), 4);
       geometry.setAttribute(name, bin[key].setUsage(DynamicDrawUsage));
     }
@@ -164,7 +187,9 @@ export class ATHForest extends Group {
     view.setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(this.matrixWorld));
     const pixel = 2 * Math.tan(camera.fov * Math.PI / 360) / height; // at distance 1
+    this.#now = performance.now();
     this.culled = 0;
+    this.fading = false;
     for (const bin of bins) bin.filled = 0;
     this.#shown = this.#bins.get(this.#ath.motion.clip.index) ?? this.#shown;
     for (let i = 0; i < this.#places.length && bins.length > 0; i += 4) {
@@ -173,26 +198,68 @@ export class ATHForest extends Group {
       sphere.radius = reach * size;
       if (!view.intersectsSphere(sphere)) {
         this.culled++;
+        this.#states[i / 4] = null;
         continue;
       }
       const distance = Math.max(eye.distanceTo(place) - 0.5 * reach * size, 1e-6);
       const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
-      if (own.length > 0) this.#put(i, own[this.levelOfDetail ? this.#choose(own, tolerance) : 0], seconds);
+      if (own.length > 0) this.#putInstance(i, own, this.levelOfDetail ? tolerance : 0, seconds);
     }
     this.counts = new Array(this.#ath.motion.levelCount).fill(0);
     this.vertices = 0;
-    for (const bin of bins) this.#show(bin);
+    for (const bin of this.#allBins()) this.#show(bin);
   }
 
-  // An instance, whose numbers begin at `i`, into the next place of a bin.
-  #put(i, bin, seconds) {
-    const { place, turn, rows, perRow } = bin, at = 4 * bin.filled++;
-    const row = Math.fround(((seconds + this.#turns[i + 2]) / perRow) % rows), shown = row < 0 ? row + rows : row;
+  // An instance, whose numbers begin at `i`, by the bins of its clip.
+  #putInstance(i, own, tolerance, seconds) {
+    const wanted = own[this.#choose(own, tolerance)], { clip } = wanted.drawn.userData, state = this.#stateOf(i / 4, clip, wanted.level);
+    const bin = state.level === wanted.level ? wanted : this.#likeIt(own, state.level, tolerance);
+    const from = state.from < 0 ? null : own.find(({ level }) => level === state.from);
+    if (!from) {
+      this.#put(i, bin, seconds);
+      return;
+    }
+    this.fading = true;
+    this.#put(i, this.#fadingBin(clip, bin, from), seconds, 1 - eased(this.#passed(state)));
+  }
+
+  // The coarsest geometry of a level that is good enough; its finest where none is.
+  #likeIt(own, level, tolerance) {
+    const bins = own.filter((bin) => bin.level === level);
+    return bins[this.#choose(bins, tolerance)];
+  }
+
+  // The level of an instance, and that which it fades in from: a change waits until the one before is over.
+  #stateOf(instance, clip, level) {
+    let state = this.#states[instance];
+    if (!state || state.clip !== clip) state = this.#states[instance] = { clip, level, from: -1, since: 0 };
+    if (state.from >= 0 && this.#passed(state) >= 1) state.from = -1;
+    if (state.from < 0 && state.level !== level)
+      Object.assign(state, { level, from: this.fade > 0 ? state.level : -1, since: this.#now });
+    return state;
+  }
+
+  #passed({ since }) {
+    return (this.#now - since) / 1000 / this.fade;
+  }
+
+  // Into the next place of a bin; share: that of the level before.
+  #put(i, bin, seconds, share = 0) {
+    const { place, turn } = bin, at = 4 * bin.filled++;
     for (let k = 0; k < 4; k++) place.array[at + k] = this.#places[i + k];
     turn.array[at] = this.#turns[i];
     turn.array[at + 1] = this.#turns[i + 1];
-    turn.array[at + 2] = shown < rows ? shown : 0; // a fraction may have been rounded up
-    turn.array[at + 3] = (Math.floor(turn.array[at + 2]) + 1) % rows;
+    this.#putRow(turn.array, at + 2, bin, seconds + this.#turns[i + 2]);
+    if (!bin.from) return;
+    this.#putRow(bin.share.array, at, bin.from, seconds + this.#turns[i + 2]);
+    bin.share.array[at + 2] = share;
+  }
+
+  // The row of a texture that a time is at, and the one behind it.
+  #putRow(out, at, { rows, perRow }, seconds) {
+    const row = Math.fround((seconds / perRow) % rows), shown = row < 0 ? row + rows : row;
+    out[at] = shown < rows ? shown : 0; // a fraction may have been rounded up
+    out[at + 1] = (Math.floor(out[at]) + 1) % rows;
   }
 
   // How far from its place an instance of size 1 can be seen: the rest pose's sphere, whatever the turn, and room to move.
@@ -214,7 +281,7 @@ export class ATHForest extends Group {
     drawn.visible = filled > 0;
     this.counts[bin.level] += filled;
     this.vertices += filled * bin.size;
-    for (const attribute of [bin.place, bin.turn]) {
+    for (const attribute of [bin.place, bin.turn, bin.share].filter(Boolean)) {
       attribute.clearUpdateRanges();
       attribute.addUpdateRange(0, 4 * filled);
       attribute.needsUpdate = filled > 0;

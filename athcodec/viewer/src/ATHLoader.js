@@ -4,8 +4,10 @@
 import { Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandardMaterial, EventDispatcher, DoubleSide,
   LoaderUtils } from "three";
 
-import { ATHMotion, restBounds } from "./ATHMotion.js";
+import { ATHMotion, eased, restBounds } from "./ATHMotion.js";
 import { addAttributes, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
+
+const EASING_MS = 16; // between two steps of the rest pose
 
 let files = 0;
 
@@ -25,6 +27,7 @@ class Channel {
   #asked = new Map(); // what is under way: key: resolve
   #nextView = 1;
   #nextBake = 1;
+  #toRest = null;     // {to, timer}: the finer rest pose, as long as the one that is shown goes to it
 
   constructor(worker, release) {
     this.id = ++files;
@@ -47,11 +50,7 @@ class Channel {
       this.state.ready = new Int8Array(message.info.segmentCount).fill(-1);
       this.settle.resolve(this);
     } else if (type === "rest") {
-      this.rest.set(message.rest);
-      const { box, sphere } = restBounds(this.rest);
-      this.box.copy(box);
-      this.sphere.copy(sphere);
-      for (const view of this.views.values()) view.setRest();
+      this.#easeRest(message.rest);
     } else if (type === "failed") {
       this.settle.reject(Object.assign(new Error(message.message), { codeName: message.codeName }));
     } else if (type === "attributes") {
@@ -79,6 +78,41 @@ class Channel {
     if (!ready) return;
     this.#tell({ type: "ready" });
     for (const view of this.views.values()) view.refresh();
+  }
+
+  /** Whether the rest pose is on its way to the finer one; level 0 moves both, levels above only that. */
+  get easing() {
+    return this.#toRest !== null;
+  }
+
+  // Over the time of a fade, as plants that are shown at level 0 go with it; at once where there are none.
+  #easeRest(to) {
+    const from = this.rest.slice(), start = performance.now();
+    const seconds = Math.max(0, ...[...this.views.values()].map(({ level, fade }) => (level === 0 ? fade : 0)));
+    const step = () => {
+      const weight = eased((performance.now() - start) / 1000 / seconds);
+      if (weight === 1) this.endEasing();
+      else this.#setRest(to.map((value, i) => from[i] + weight * (value - from[i])));
+    };
+    this.#toRest = { to, timer: setInterval(step, EASING_MS) };
+    step();
+  }
+
+  endEasing() {
+    if (!this.easing) return;
+    const { to, timer } = this.#toRest;
+    clearInterval(timer);
+    this.#toRest = null;
+    this.#setRest(to);
+    for (const view of this.views.values()) view.refresh();
+  }
+
+  #setRest(rest) {
+    this.rest.set(rest);
+    const { box, sphere } = restBounds(rest);
+    this.box.copy(box);
+    this.sphere.copy(sphere);
+    for (const view of this.views.values()) view.setRest();
   }
 
   #tell(event) {
@@ -141,6 +175,7 @@ class Channel {
   }
 
   close() {
+    clearInterval(this.#toRest?.timer);
     this.send({ type: "close" });
     this.worker.channels.delete(this.id);
     this.release();

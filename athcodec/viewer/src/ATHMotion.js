@@ -23,6 +23,13 @@ export function roundOf({ duration, frameCount }) {
   return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
 }
 
+const FRAME_MS = 33; // between pictures of a fade that nobody asks for
+
+/** What is shown of the next where `passed` of a fade's time has: it begins and ends at rest. */
+export function eased(passed) {
+  return passed < 1 ? passed * passed * (3 - 2 * passed) : 1;
+}
+
 const SHAPES = 0x13, REFINED_REST = 0x15; // chunks that serve all segments
 
 /** Events: "frame" (a new picture is shown), "level" (another level is), "clip" (another clip is), "progress" (bytes
@@ -39,6 +46,8 @@ export class ATHMotion extends EventDispatcher {
   target = 0;         // the level that is asked for
   pixels = 1;         // error on the screen that automatic level allows
   measure = "p99";    // which error
+  fade = 0.2;         // seconds that a change of the level takes; 0: none
+  fading = false;     // whether one is under way
   heat = false;       // whether pictures come with `distances`
   distances = null;   // per vertex, from the deepest position that is here
   mode = "matrices";
@@ -55,6 +64,7 @@ export class ATHMotion extends EventDispatcher {
   #asked = null;          // what the worker was asked last, "" while it is at work
   #pending = false;
   #stale = false;
+  #timer = 0;
   #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, at, fade, passed, begun}
   #answers = new Map();
   #next = 1;
@@ -285,7 +295,7 @@ export class ATHMotion extends EventDispatcher {
       this.#stale = wish !== this.#asked;
       return;
     }
-    if (wish === this.#asked && !this.#stale) return;
+    if (wish === this.#asked && !this.#stale && !this.fading) return;
     this.#asked = wish;
     this.#stale = false;
     this.#pending = true;
@@ -293,7 +303,8 @@ export class ATHMotion extends EventDispatcher {
     this.#spare = null;
     this.#channel.send({
       type: "picture", view: this.#id, id: 0, clip, seconds, wrap, old: fading, level: this.target, heat: this.heat,
-      positions: this.mode === "positions", buffer,
+      positions: this.mode === "positions", buffer, now: performance.now(), fade: this.fade,
+      coarsely: this.#channel.easing,
     }, buffer ? [buffer] : []);
   }
 
@@ -324,9 +335,12 @@ export class ATHMotion extends EventDispatcher {
     if (!this.#parts.has(level)) this.#parts.set(level, await this.#channel.parts(level));
   }
 
-  #take({ shown, frame, data, heat, ms, held, clip, exactly }) {
+  #take({ shown, frame, data, heat, ms, held, clip, exactly, fading }) {
     const changed = shown !== this.level;
-    Object.assign(this, { frame, held, milliseconds: ms, distances: heat ?? null, level: shown });
+    Object.assign(this, { frame, held, fading, milliseconds: ms, distances: heat ?? null, level: shown });
+    if (shown > 0) this.#channel.endEasing();
+    clearTimeout(this.#timer);
+    if (fading) this.#timer = setTimeout(() => this.refresh(), FRAME_MS); // time may stand still
     if (this.mode === "positions") this.#write(data);
     else this.#upload(shown, data);
     if (changed) {
@@ -443,6 +457,7 @@ export class ATHMotion extends EventDispatcher {
   }
 
   dispose() {
+    clearTimeout(this.#timer);
     for (const texture of this.#textures.values()) texture.dispose();
     this.#textures.clear();
     this.#channel.dropView(this.#id);

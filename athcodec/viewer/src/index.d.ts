@@ -168,6 +168,11 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
   /** Of the errors of all vertices the largest, the 99th percentile (default: single vertices that stray do not keep
    * finer levels on the screen), or the root mean square. */
   measure: "max" | "p99" | "rms";
+  /** Seconds that going from a level to another takes (default 0.2; 0: at once), by the clock: the two are blended, so that the
+   * plant does not jump, whether the camera came near or bytes have come. Pictures that are asked for by show() are exact. */
+  fade: number;
+  /** Whether it is under way: `level` is the deepest that is shown then. Else what is shown is exactly that level. */
+  readonly fading: boolean;
   /** Chooses the automatic level: once per frame, before setTime(). height: of the picture in pixels. */
   update(camera: Camera, height: number, object?: Object3D): this;
   levelFor(camera: Camera, height: number, matrixWorld?: Matrix4 | null, pixels?: number): number;
@@ -257,6 +262,10 @@ export class ATHForest extends Group {
   /** As of ATHMotion, before the first bake(). */
   measure: "max" | "p99" | "rms";
   readonly count: number;
+  /** Seconds that an instance takes from its level to another (default 0.2; 0: none); whether one is on its way, so that
+   * update() is to be called again though time stands still. */
+  fade: number;
+  readonly fading: boolean;
   /** Levels of the motion's clip that can be drawn. */
   readonly baked: number[];
   /** Instances drawn, by level; those out of view; vertices drawn. */

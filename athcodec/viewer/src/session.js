@@ -3,6 +3,7 @@
 // by `post`.
 
 import { AthFile } from "../ath_decoder.mjs";
+import { Fading } from "./fading.js";
 import { normals, turns } from "./normals.js";
 import { attributeRanges, readAttributes, readPrelude } from "./statics.js";
 
@@ -25,7 +26,7 @@ export class Session {
   #file = null;
   #front = new Uint8Array(0);
   #came = 0;              // bytes from the file's beginning on
-  #views = new Map();     // id: {level, frames}, the frame of a clip that fades out behind the other
+  #views = new Map();     // id: {level, frames, fading}, the frame of a clip that fades out behind the other
   #prepared = new Map();  // "segment/level": Segment, those used last at the end
   #underway = [];         // ranges that are being fetched
   #parts = new Map();
@@ -320,13 +321,17 @@ export class Session {
 
   /** A view shows `frames` at `level` from now on: one, or two that fade over. */
   view(id, level, frames) {
-    this.#views.set(id, { level, frames });
+    this.#views.set(id, { level, frames, fading: this.#fading(id) });
     this.#wakeUp();
     if (this.#opened) this.#decode();
   }
 
   drop(id) {
     this.#views.delete(id);
+  }
+
+  #fading(id) {
+    return this.#views.get(id)?.fading ?? new Fading();
   }
 
   async #decode() {
@@ -424,12 +429,22 @@ export class Session {
   // What shows `frame`, {frame, level, segments}: at the deepest level that is decoded or, where nothing is, at the
   // coarsest.
   #show(frame, level) {
-    const indices = this.#around(frame);
     for (let shown = level; shown >= 0; shown--) {
-      const segments = indices.map((index) => this.#segment(index, shown));
-      if (segments[0]) return { frame, level: shown, segments };
+      const found = this.#decoded(frame, shown);
+      if (found) return found;
     }
     return this.#coarser(frame, 0);
+  }
+
+  // The same but that of two levels that are decoded a coarser one waits for the one that is asked for.
+  #showNext(frame, level, now) {
+    return (now > level && !this.#isDecoded(frame, level) && this.#decoded(frame, now)) || this.#show(frame, level);
+  }
+
+  // At this level and no other, if that is decoded; else null.
+  #decoded(frame, level) {
+    const segments = this.#around(frame).map((index) => this.#segment(index, level));
+    return segments[0] ? { frame, level, segments } : null;
   }
 
   // At this level and no other, decoded now. Throws where that cannot be.
@@ -459,9 +474,9 @@ export class Session {
 
   // From one clip to another: the old one until the new one is decoded as deep as it is here; then both at one level,
   // `old` in what is returned, of which `share` is shown.
-  #change(frame, old, level) {
-    if (!old.begun && !this.#isDecoded(frame, level)) return this.#show(old.frame, level) ?? this.#show(frame, level);
-    const shown = this.#show(frame, level), before = old.share > 0 ? this.#show(old.frame, level) : null;
+  #change(frame, old, level, now) {
+    if (!old.begun && !this.#isDecoded(frame, level)) return this.#showNext(old.frame, level, now) ?? this.#show(frame, level);
+    const shown = this.#showNext(frame, level, now), before = old.share > 0 ? this.#show(old.frame, level) : null;
     if (!shown || !before) return shown ?? before;
     const both = Math.min(shown.level, before.level);
     const [a, b] = [shown, before].map((picture) => (picture.level === both ? picture : this.#coarser(picture.frame, both)));
@@ -481,41 +496,86 @@ export class Session {
   }
 
   /** The picture of a view: see ATHMotion's #picture. */
-  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, heat = false, positions = false,
-    buffer = null }) {
+  picture({ view, id, clip, seconds, wrap, level, old = null, exactly = false, aside = false, heat = false,
+    positions = false, buffer = null, now = 0, fade = 0, coarsely = false }) {
     if (!this.#opened) return;
     const start = performance.now(), frame = this.#file.frameAt(seconds, wrap, clip);
-    let shown = null;
+    const fading = aside ? new Fading() : this.#fading(view);
+    const answer = { type: "picture", view, id, shown: -1, frame, exactly };
     try {
-      shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old });
+      const shown = exactly ? this.#exactly(frame, level) : this.#viewed({ view, frame, level, old, fading, coarsely });
+      if (shown) {
+        fading.to(shown.level, now, exactly ? 0 : fade);
+        Object.assign(answer, this.#picture(shown, fading, positions, buffer), heat ? { heat: this.#distances(shown) } : {});
+      }
     } catch (error) {
-      this.post({ type: "picture", view, id, shown: -1, frame, ...describe(error) });
-      return;
+      Object.assign(answer, { shown: -1, ...describe(error) });
     }
-    if (!shown) {
-      this.post({ type: "picture", view, id, shown: -1, frame, buffer }, buffer ? [buffer] : []);
-      return;
-    }
-    const answer = { type: "picture", view, id, shown: shown.level, frame: shown.frame, exactly };
-    answer.clip = this.#file.clips.indexOf(this.#clipAt(shown.frame));
-    answer.data = this.#faded(shown, positions ? ({ segments, frame }) => this.#file.positions(segments, frame)
-      : (part) => this.#pack(part, part === shown ? buffer : null));
-    answer.held = this.#file.held;
-    if (heat) answer.heat = this.#distances(shown);
     answer.ms = performance.now() - start;
-    this.post(answer, [answer.data.buffer, ...(answer.heat ? [answer.heat.buffer] : [])]);
+    this.post(answer, [answer.data, answer.heat].filter(Boolean).map((array) => array.buffer));
   }
 
-  #viewed({ view, frame, level, old }) {
+  // What the answer says of it.
+  #picture(shown, fading, positions, buffer) {
+    const { terms, cut } = this.#faded(shown, fading);
+    const data = this.#blended(terms, positions
+      ? ({ segments, frame, fade }) => this.#file.positions(segments, frame, { fade })
+      : (term, i) => this.#pack(term, cut, i === 0 ? buffer : null));
+    return { shown: cut, frame: shown.frame, fading: fading.underWay, clip: this.#file.clips.indexOf(this.#clipAt(shown.frame)),
+      held: this.#file.held, data };
+  }
+
+  // coarsely: level 0 for now, whatever is wanted.
+  #viewed({ view, frame, level: wanted, old, fading, coarsely }) {
+    const level = coarsely ? 0 : wanted;
     if (old) old.frame = this.#file.frameAt(old.seconds, old.wrap, old.clip);
-    this.view(view, level, old ? [frame, old.frame] : [frame]);
-    return old ? this.#change(frame, old, level) : this.#show(frame, level);
+    this.view(view, wanted, old ? [frame, old.frame] : [frame]);
+    return old ? this.#change(frame, old, level, fading.level) : this.#showNext(frame, level, fading.level);
   }
 
-  // The numbers of a picture, and of the one that fades out added by its share.
-  #faded(shown, numbersOf) {
-    const before = shown.old ? numbersOf(shown.old) : null, numbers = numbersOf(shown);
-    for (let i = 0; before && i < numbers.length; i++) numbers[i] += shown.share * (before[i] - numbers[i]);
+  // What a picture is the sum of, and the level whose nodes and exact vertices its numbers are of: `terms`, [{frame,
+  // segments, fade, share}], of the level that is shown and of those that fade out; the same of the clip that fades out.
+  #faded(shown, fading) { // `like` is looked at, so that it is not let go of
+    const tracks = shown.old ? [{ ...shown, share: 1 - shown.share }, { ...shown.old, share: shown.share }] : [{ ...shown, share: 1 }];
+    const { cut } = fading, like = [...this.#prepared.values()].find(({ level }) => level === cut);
+    if (like && this.#segment(like.index, cut) && fading.underWay && tracks.every(({ frame }) => this.#decoded(frame, fading.level)))
+      return { terms: tracks.flatMap((track, i) => this.#terms(track, fading, i, like)), cut };
+    fading.to(shown.level);
+    fading.tracks = tracks.map(({ frame }) => ({ frame, held: false }));
+    return { terms: tracks, cut: shown.level };
+  }
+
+  // Where a level that fades out is not decoded at the frame, as where a segment begins of which less has come, the picture
+  // is as far from the level that is gone to as it was at the last frame where all of them were. like: a segment at the cut.
+  #terms({ frame, share }, { cut, level, levels, weights, tracks }, index, like) {
+    const track = tracks[index] ??= { frame, held: false };
+    const at = (place, pictures, fade, times = 1) =>
+      ({ frame: place, segments: [...pictures.flatMap(({ segments }) => segments), like], fade, share: times * share });
+    const alone = { levels: [cut, level], weights: [0, 1] }, all = { levels, weights };
+    const here = track.held ? [null] : levels.map((each) => this.#decoded(frame, each));
+    if (here.every(Boolean)) {
+      track.frame = frame;
+      return [at(frame, here, all)];
+    }
+    track.held = true;
+    const now = at(frame, [this.#decoded(frame, level)], alone);
+    const there = this.#follows(track.frame, frame) ? levels.map((each) => this.#coarser(track.frame, each)) : [null];
+    return there.every(Boolean) ? [now, at(track.frame, there, all), at(track.frame, there, alone, -1)] : [now];
+  }
+
+  // Whether a frame is in the same segment of a clip as one before, or in the next.
+  #follows(before, frame) {
+    const clip = this.#clipAt(frame), by = this.#segmentAt(frame) - this.#segmentAt(before);
+    return this.#clipAt(before) === clip && (by + clip.segmentCount) % clip.segmentCount <= 1;
+  }
+
+  #blended(terms, numbersOf) {
+    const [first, ...others] = terms, numbers = numbersOf(first, 0);
+    if (first.share !== 1) for (let i = 0; i < numbers.length; i++) numbers[i] *= first.share;
+    others.forEach((term, k) => {
+      const more = numbersOf(term, k + 1);
+      for (let i = 0; i < numbers.length; i++) numbers[i] += term.share * more[i];
+    });
     return numbers;
   }
 
@@ -526,33 +586,33 @@ export class Session {
     return 3 * nodeCount + (this.#faces ? 2 : 1) * exactCount;
   }
 
-  #pack(shown, buffer = null) {
-    const size = 4 * WIDTH * Math.ceil(this.texels(shown.level) / WIDTH);
+  #pack(shown, level, buffer) {
+    const size = 4 * WIDTH * Math.ceil(this.texels(level) / WIDTH);
     const data = buffer?.byteLength === 4 * size ? new Float32Array(buffer) : new Float32Array(size);
-    this.#fill(data, 0, shown);
+    this.#fill(data, 0, shown, level);
     return data;
   }
 
-  #fill(data, at, { frame, level, segments }) {
+  // The numbers of a picture at the nodes and exact vertices of a level.
+  #fill(data, at, { frame, segments, fade = null }, level) {
     const { nodeCount, exactCount } = this.parts(level), exactAt = at + 12 * nodeCount;
-    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt) });
+    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt), fade });
     if (exactCount === 0) return;
-    const exact = this.#file.exact(segments, frame);
+    const exact = this.#file.exact(segments, frame, { fade });
     const stride = this.#faces ? 8 : 4;
     for (let i = 0, from = 0, to = exactAt; i < exactCount; i++, to += stride) {
       data[to] = exact[from++];
       data[to + 1] = exact[from++];
       data[to + 2] = exact[from++];
     }
-    if (this.#faces) this.#fillTurns(data, exactAt, level, segments, frame);
+    if (this.#faces) this.#fillTurns(data, exactAt, level, this.#file.positions(segments, frame, { fade }));
   }
 
   // How the normal of every exact vertex has turned since the rest pose.
-  #fillTurns(data, at, level, segments, frame) {
-    const file = this.#file;
+  #fillTurns(data, at, level, positions) {
     this.#restNormals ??= normals(this.#rest, this.#faces);
     const { branch, first, count, index } = this.parts(level), source = this.#order;
-    const now = normals(file.positions(segments, frame), this.#faces);
+    const now = normals(positions, this.#faces);
     for (let part = 0; part < branch.length; part++) {
       if (branch[part] >= 0) continue;
       for (let i = 0; i < count[part]; i++)
@@ -575,7 +635,7 @@ export class Session {
     const rows = Math.ceil(frameCount / step), data = new Float32Array(4 * WIDTH * Math.ceil((rows * texels) / WIDTH));
     try {
       for (let row = 0; row < rows; row++) {
-        this.#fill(data, 4 * row * texels, this.#exactly(firstFrame + row * step, level));
+        this.#fill(data, 4 * row * texels, this.#exactly(firstFrame + row * step, level), level);
         if (row % 4 === 3) await turn();
         if (this.#closed) return;
       }
