@@ -103,13 +103,12 @@ def layered_ath(bushy_clip, tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="session")
-def full_clip():
+def full_clip_of(seed: int):
     """A small clip that needs every kind of chunk: 20 frames of five branches with all sorts of static data.
 
     It sways along one line, so its stems have shapes that are worth learning.
     """
-    clip = plant(seed=28, branches=5, longest=4, frames=20, rough=0.02)
+    clip = plant(seed=seed, branches=5, longest=4, frames=20, rough=0.02)
     line = np.array([0.6, 0.48, 0.64])
     along = (clip.positions - clip.rest) @ line
     clip.positions = (clip.rest + along[..., None] * line).astype(np.float32)
@@ -121,6 +120,16 @@ def full_clip():
     clip.time = clip.time + np.linspace(0, 1, 20) ** 3 * 0.01
     clip.check()
     return clip
+
+
+@pytest.fixture(scope="session")
+def full_clip():
+    return full_clip_of(11)
+
+
+@pytest.fixture(scope="session")
+def other_full_clip():
+    return full_clip_of(28)
 
 
 @pytest.fixture(scope="session")

@@ -168,8 +168,6 @@ def first_settings(
 def _rigid(source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]) -> np.ndarray:
     """(B,) in how many of the layers branches that are to keep their shape move rigidly."""
     hierarchy, least = source.hierarchy, source.smallest_bound(bound)
-    if len(ratios) > 1:  # a refinement of rotations costs more than one of modes
-        return np.zeros(hierarchy.branch_count, np.int32)
     return rigid_layers(
         hierarchy.first_vertex,
         hierarchy.stem_count,

@@ -100,7 +100,8 @@ class SmoothnessMeter:
         ):
             series[rows] = np.sqrt(_squares(values).mean(axis=1))
         lengths = np.sqrt(_squares(error))
-        in_bounds = lengths / self._bound if self._bound else np.where(lengths > 0, np.inf, 0.0)
+        bound = np.broadcast_to(self._bound, lengths.shape)
+        in_bounds = np.divide(lengths, bound, out=np.where(lengths > 0, np.inf, 0.0), where=bound > 0)
         self.share[rows] = (in_bounds > 1).mean(axis=1)
         frame, vertex = np.unravel_index(in_bounds.argmax(), in_bounds.shape)
         if in_bounds[frame, vertex] > self.max_error_acceleration:
