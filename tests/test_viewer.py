@@ -449,7 +449,8 @@ def test_only_the_clips_that_play_are_fetched(opened, windy_ath):
     data = windy_ath.read_bytes()
     with ThrottledServer({"tree.ath": data}) as line, athcodec.open(windy_ath) as decoder:
         clips = {clip.name: clip for clip in decoder.clips}
-        common = {chunk.offset for chunk in decoder.file.chunks if not chunk.is_motion or chunk.kind == ct.SHAPES}
+        shared = ct.SHAPES, ct.REFINED_REST  # by all segments
+        common = {chunk.offset for chunk in decoder.file.chunks if not chunk.is_motion or chunk.kind in shared}
 
         def outside(*names: str) -> int:
             """Bytes sent behind the first request that belong to none of these clips."""
