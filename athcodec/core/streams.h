@@ -327,6 +327,11 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
     }
 }
 
+static adaptive_rest *adaptive_of(rest_model *model, const ath_branch *branch)
+{
+    return model->adaptive + (branch->detail > 0);
+}
+
 /* A point of the lattice, of about the size of the last ones, of all and of those of the phase. */
 static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest_memory *all, const rest_memory *phase,
                             int32_t integers[3])
@@ -340,9 +345,9 @@ static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest
     }
 }
 
-/* A vertex as a point of a lattice about where it is expected. */
-static void code_expected_vertex(ath_coder *coder, lattice_model *lattice, const rest_layer *layer,
-                                 rest_predictor *predictor, rest_guess *at, int32_t v, double unit, double slack,
+/* A vertex of a branch as a point of a lattice about where it is expected; what has detail has no slack. */
+static void code_expected_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
+                                 rest_predictor *predictor, rest_guess *at, int32_t v, double unit,
                                  const double *source, double *rest)
 {
     double per_unit = 1.0 / unit, expected[3], *out = rest + 3 * (size_t)v;
@@ -351,11 +356,10 @@ static void code_expected_vertex(ath_coder *coder, lattice_model *lattice, const
 #ifdef ATH_ENCODING
     double units[3];
     rest_term(units, expected, source + (out - rest), per_unit);
-    nearest_of_lattice(units, slack * per_unit, at->phase->mean, integers);
+    nearest_of_lattice(units, branch->detail > 0 ? 0.0 : layer->slack * per_unit, at->phase->mean, integers);
 #endif
     (void)source;
-    (void)slack;
-    code_rest_point(coder, lattice, &predictor->all, at->phase, integers);
+    code_rest_point(coder, &adaptive_of(model, branch)->lattice, &predictor->all, at->phase, integers);
     for (int32_t k = 0; k < 3; k++) out[k] = expected[k] + (double)integers[k] * unit;
     if (layer->steps) memcpy(layer->steps + (out - rest), integers, sizeof integers);
     rest_learn(predictor, at, per_unit, out, integers);
@@ -365,12 +369,11 @@ static void code_expected_vertex(ath_coder *coder, lattice_model *lattice, const
 static void code_adaptive_vertex(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branch,
                                  int32_t i, double step, const double *source, double *rest)
 {
-    adaptive_rest *own = model->adaptive + (branch->detail > 0);
-    double unit = LATTICE_UNIT * step, slack = branch->detail > 0 ? 0.0 : layer->slack;
+    rest_predictor *predictor = &adaptive_of(model, branch)->predictor;
+    double unit = LATTICE_UNIT * step;
     rest_guess at;
-    rest_look_around(&own->predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
-    code_expected_vertex(coder, &own->lattice, layer, &own->predictor, &at, branch->first + i, unit, slack, source,
-                         rest);
+    rest_look_around(predictor, branch, rest, layer->before, i, 1.0 / unit, &at);
+    code_expected_vertex(coder, model, layer, branch, predictor, &at, branch->first + i, unit, source, rest);
 }
 
 /* Vertex i of a stem as steps from where it is expected. */
@@ -499,9 +502,8 @@ static void code_connected_rest(ath_coder *coder, rest_model *model, const rest_
     for (int32_t t = 0; t < layer->mesh->vertex_count; t++) {
         int32_t v = layer->mesh->order[t];
         const ath_branch *branch = branch_of(branches, branch_count, v);
-        adaptive_rest *own = model->adaptive + (branch->detail > 0);
+        rest_predictor *predictor = &adaptive_of(model, branch)->connected;
         double step_here = rest_step(branch, step), unit = LATTICE_UNIT * step_here;
-        double slack = branch->detail > 0 ? 0.0 : layer->slack;
         rest_ring ring;
         rest_guess at;
         rest_ring_of(layer->mesh, rest, v, &ring);
@@ -510,8 +512,8 @@ static void code_connected_rest(ath_coder *coder, rest_model *model, const rest_
             code_adaptive_vertex(coder, model, layer, branch, v - branch->first, step_here, source, rest);
             continue;
         }
-        rest_look_beside(&own->connected, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
-        code_expected_vertex(coder, &own->lattice, layer, &own->connected, &at, v, unit, slack, source, rest);
+        rest_look_beside(predictor, layer->mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
+        code_expected_vertex(coder, model, layer, branch, predictor, &at, v, unit, source, rest);
     }
 }
 

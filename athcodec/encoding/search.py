@@ -582,14 +582,18 @@ class Search:
     def _with_learned_modes_for_all(self, settings: Settings) -> Settings:
         """Learned modes beside what was found without them, or in its place: on stems of few vertices they serve the
         motion that rotations and affine functions serve, which were chosen before learned modes were known."""
-        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
-        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
         found = []
-        for start in {self._key(own): own for own in (settings, *bases)}.values():
+        for start in self._in_each_basis(settings):
             chosen = self._with_learned_modes(start)
             found.append((self.cost(chosen)[0], len(found), self.required_saving, chosen))
         _, _, self.required_saving, settings = min(found)
         return settings
+
+    def _in_each_basis(self, settings: Settings) -> list[Settings]:
+        """The settings and, on short stems, the same without rotations in each basis."""
+        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
+        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
+        return list({self._key(own): own for own in (settings, *bases)}.values())
 
     def _short_stems(self) -> bool:
         """Whether learned modes can stand for whole stems."""
@@ -725,10 +729,7 @@ class Search:
 
     def _with_steps(self, settings: Settings) -> Settings:
         """On short stems those of each basis: affine functions are best at finer steps than modes are."""
-        unturned = replace(settings, rotation_step_factors=(0,) * self.levels, only_tips=False)
-        bases = [replace(unturned, sheet=sheet) for sheet in self._sheets()] if self._short_stems() else []
-        starts = {self._key(own): own for own in (settings, *bases)}.values()
-        return self._cheapest([self._walk_steps(start, 1.15, 1.4) for start in starts])
+        return self._cheapest([self._walk_steps(start, 1.15, 1.4) for start in self._in_each_basis(settings)])
 
     def _with_finer_steps(self, settings: Settings) -> Settings:
         return self._walk_steps(settings, 1.04, 1.12)
