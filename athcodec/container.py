@@ -26,7 +26,7 @@ from athcodec.clip import ClipRange
 from athcodec.errors import BadChunk, ClipError, FormatError, LimitExceeded
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR = 0, 8
+MAJOR, MINOR = 0, 9
 NO_LEVEL = 255
 ONLY_TIPS = 8  # of Rotation
 IS_HOST = 4  # Method of REST
