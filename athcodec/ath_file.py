@@ -793,11 +793,9 @@ class AthFile:
                 continue
             if len(result) >= self.limits.attributes:
                 raise LimitExceeded(f"{chunk}: got more than {self.limits.attributes} attributes")
-            data = self.payload(chunk)
-            name = ct.array_name(data, str(chunk), self.limits)
-            _, array = ct.parse_array(data, str(chunk), self.limits)
-            if array is None or name in result:
-                raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice or without data")
+            name, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
+            if name in result:
+                raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice")
             result[name] = array
             total = sum(array.nbytes for array in result.values())
             if total > self.limits.memory_bytes:

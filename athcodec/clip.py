@@ -92,7 +92,8 @@ class MotionClip:
         Vertices of each polygon. Polygons of different sizes are the attributes face_vertex_counts (F,) and
         face_vertex_indices (C,) instead; `polygons` gives either.
     attributes : dict of str to array, optional
-        Further named static arrays (radius, colours ...) of any shape: numbers, booleans, bytes or records of them.
+        Further named static arrays (radius, colours ...) of any shape: numbers, booleans or bytes. An array of records
+        is taken apart: its field "u" becomes an array whose name ends in ".u".
         They have a row per vertex, branch, face or corner of a face, or none of that: ``metadata["domains"]`` says
         which, as in ``{"uv": "corner"}``, where the number of rows does not.
     metadata : dict, optional
@@ -567,16 +568,26 @@ def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
 
 
 def check_attributes(attributes: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
-    """Named arrays; ClipError unless the names are free, and the values numbers, booleans, bytes or records."""
-    checked = {}
+    """Named arrays, without records; ClipError unless the names are free, and the values numbers, booleans or bytes."""
+    checked: dict[str, np.ndarray] = {}
     for name, values in (attributes or {}).items():
-        if not isinstance(name, str) or not name.strip("/") or name in RESERVED_NAMES:
-            raise ClipError(f"attributes: got the name {name!r}, expected one that is free and not empty")
-        checked[name] = np.asarray(values)
-        dtype = checked[name].dtype
-        if dtype.hasobject or dtype.kind not in "biufcSV":
-            raise ClipError(f"attributes: {name} has dtype {dtype}, expected numbers, booleans or bytes")
+        if not isinstance(name, str) or not name.strip("/"):
+            raise ClipError(f"attributes: got the name {name!r}, expected one that is not empty")
+        for column, array in _columns(name, np.asarray(values)):
+            if column in RESERVED_NAMES or column in checked:
+                raise ClipError(f"attributes: got the name {column!r}, expected one that is free")
+            if array.dtype.hasobject or array.dtype.kind not in "biufcSV":
+                raise ClipError(f"attributes: {column} has dtype {array.dtype}, expected numbers, booleans or bytes")
+            checked[column] = array
     return checked
+
+
+def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """An array of records as one array for each field, at any depth; any other as it is."""
+    if array.dtype.names is None:
+        yield name, array
+    for field_name in array.dtype.names or ():
+        yield from _columns(f"{name}.{field_name}", array[field_name])
 
 
 def _check_parents(branch_parent: np.ndarray) -> np.ndarray:

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import struct
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Container, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO
 
@@ -256,7 +255,7 @@ _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
 _REFINED_REST = struct.Struct("<f")
 _PREDICTED = struct.Struct("<fB")
-_ARRAY = struct.Struct("<H")
+_ARRAY = struct.Struct("<BBHI")
 _POLYGONS = struct.Struct("<II")
 _IS_MIXED, _IS_ABSOLUTE, _IS_DERIVED = 16, 32, 64
 
@@ -416,7 +415,22 @@ def pack_corrections(step: float, stream: bytes) -> bytes:
 
 _ZSTD_WINDOW = 8 << 20
 _ZSTD_SINGLE_SEGMENT = 0x20
-ITEM_BYTES = 1 << 20
+
+# Types of static arrays: NumPy's letters in the order of FORMAT.md, and the bytes that an element may have.
+_KINDS = "buifcSV"
+_ANY_SIZE = range(1, (1 << 20) + 1)
+_INTEGER_SIZES = 1, 2, 4, 8
+_KIND_SIZES: dict[str, Container[int]] = {
+    "b": (1,),
+    "u": _INTEGER_SIZES,
+    "i": _INTEGER_SIZES,
+    "f": (2, 4, 8),
+    "c": (8, 16),
+    "S": _ANY_SIZE,
+    "V": _ANY_SIZE,
+}
+_BIG_ENDIAN = 8
+_MOST_DIMENSIONS = 32
 
 
 def _compress(array: np.ndarray) -> bytes:
@@ -455,56 +469,6 @@ def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits)
         raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
 
 
-def _type_of(dtype: np.dtype) -> object:
-    return np.lib.format.dtype_to_descr(dtype)
-
-
-_PLAIN_TYPE = re.compile(r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}")
-
-
-def _is_type(description: object, nesting: int = 16) -> bool:
-    """Whether a type follows the grammar of FORMAT.md: a plain one, or a record's [name, type(, shape)] entries."""
-    if isinstance(description, str):
-        return _PLAIN_TYPE.fullmatch(description) is not None
-    return (
-        isinstance(description, list)
-        and nesting > 0
-        and bool(description)
-        and all(
-            isinstance(entry, list)
-            and 2 <= len(entry) <= 3
-            and isinstance(entry[0], str)
-            and (entry[0] or (len(entry) == 2 and str(entry[1]).startswith("|V")))
-            and _is_type(entry[1], nesting - 1)
-            and all(map(_is_shape, entry[2:]))
-            for entry in description
-        )
-    )
-
-
-def _is_shape(shape: object) -> bool:
-    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < 1 << 40 for n in shape)
-
-
-def _as_numpy(description: list) -> list:
-    """Record entries as NumPy wants them: tuples."""
-    return [
-        (name, _as_numpy(kind) if isinstance(kind, list) else kind, *map(tuple, shape))
-        for name, kind, *shape in description
-    ]
-
-
-def _dtype_from(description: object, what: str) -> np.dtype:
-    dtype = None
-    if _is_type(description):
-        record = isinstance(description, list)
-        with suppress(TypeError, ValueError, OverflowError):
-            dtype = np.lib.format.descr_to_dtype(_as_numpy(description) if record else description)
-    if dtype is None or not 0 < dtype.itemsize <= ITEM_BYTES:
-        raise BadChunk(f"{what}: got type {brief(description)}; expected plain numbers, bytes or records")
-    return dtype
-
-
 def pack_polygons(shape: CorePolygons, is_absolute: bool, stream: bytes) -> bytes:
     """FACES or EDGES of this shape."""
     flags = _IS_MIXED * shape.is_mixed | _IS_ABSOLUTE * is_absolute
@@ -517,25 +481,21 @@ def pack_derived_edges(index_type: int) -> bytes:
     return bytes([index_type | _IS_DERIVED])
 
 
-def pack_array(array: np.ndarray | None, name: str = "", **notes: object) -> bytes:
-    """A named static array, any plain dtype and shape; None stores only the notes.
+def pack_array(name: str, array: np.ndarray) -> bytes:
+    """A named static array of numbers, booleans or bytes, of any shape.
 
     Raises ClipError for what no reader would accept.
     """
-    what, limits = f"array {brief(name)}" if name else "array", Limits()
-    head: dict[str, object] = notes | ({"name": name} if name else {})
+    what, limits = f"array {brief(name)}", Limits()
+    if array.nbytes > limits.decoded_chunk_bytes:  # before it is compressed
+        raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
     with _refusals(what):
-        if array is not None:
-            description = json.loads(json.dumps(_type_of(array.dtype)))
-            if array.nbytes > limits.decoded_chunk_bytes:  # before it is compressed
-                raise LimitExceeded(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
-            _dtype_from(description, what)
-            head |= {"dtype": description, "shape": list(array.shape)}
-        text = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
-        packed = _ARRAY.pack(len(text)) + text + (_compress(array) if array is not None and array.size else b"")
+        text = name.encode()
+        kind = _KINDS.index(array.dtype.kind) | _BIG_ENDIAN * (array.dtype.str[0] == ">")
+        head = _ARRAY.pack(kind, array.ndim, len(text), array.dtype.itemsize)
+        shape = struct.pack(f"<{array.ndim}I", *array.shape)
+        packed = head + shape + text + (_compress(array) if array.size else b"")
         parse_array(packed, what, limits)
-        if name:
-            array_name(packed, what, limits)
     return packed
 
 
@@ -550,40 +510,46 @@ def _refusals(what: str) -> Iterator[None]:
         raise ClipError(f"{what}: {error}; expected plain data that a file can hold") from None
 
 
-def _array_head(data: bytes, what: str) -> tuple[dict, bytes]:
+def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
+    """Name and array of ATTRIBUTE."""
     if len(data) < _ARRAY.size:
         raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {_ARRAY.size}")
-    (length,) = _ARRAY.unpack_from(data)
-    if length > len(data) - _ARRAY.size:
-        raise BadChunk(f"{what}: got a head of {length} bytes; expected at most what the chunk holds")
-    return _parse_json(data[_ARRAY.size : _ARRAY.size + length], what), data[_ARRAY.size + length :]
-
-
-def parse_array(data: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
-    """(head, array): array is None where only notes were stored."""
-    head, body = _array_head(data, what)
-    array = None
-    if "dtype" in head:
-        dtype, shape = _dtype_from(head["dtype"], what), head.get("shape")
-        if not _is_shape(shape):
-            raise BadChunk(f"{what}: got shape {brief(shape)}; expected a list of sizes")
-        if math.prod(shape) > 0:
-            return head, _decompress(body, dtype, tuple(shape), what, limits)
-        if math.prod(n or 1 for n in shape) * dtype.itemsize > limits.decoded_chunk_bytes:
-            raise LimitExceeded(f"{what}: got shape {brief(shape)}; the limit is {limits.decoded_chunk_bytes} bytes")
-        array = np.zeros(shape, dtype)
+    code, dimensions, length, size = _ARRAY.unpack_from(data)
+    start = _ARRAY.size + 4 * dimensions
+    if start + length > len(data):
+        raise BadChunk(f"{what}: got a head of {start + length} bytes; expected at most what the chunk holds")
+    dtype = _array_type(code, size, what)
+    shape, body = struct.unpack_from(f"<{dimensions}I", data, _ARRAY.size), data[start + length :]
+    name = _array_name(data[start : start + length], what, limits)
+    if dimensions > _MOST_DIMENSIONS:
+        raise BadChunk(f"{what}: got {dimensions} dimensions; expected at most {_MOST_DIMENSIONS}")
+    if math.prod(n or 1 for n in shape) * size > limits.decoded_chunk_bytes:
+        raise LimitExceeded(f"{what}: got shape {shape}; the limit is {limits.decoded_chunk_bytes} bytes")
+    if math.prod(shape):
+        return name, _decompress(body, dtype, shape, what, limits)
     if body:
-        raise BadChunk(f"{what}: got {len(body)} bytes behind a head without data; expected none")
-    return head, array
+        raise BadChunk(f"{what}: got {len(body)} bytes behind an array without elements; expected none")
+    return name, np.zeros(shape, dtype)
 
 
-def array_name(data: bytes, what: str, limits: Limits) -> str:
-    """The name of a static array without its data."""
-    name = _array_head(data, what)[0].get("name")
-    if not isinstance(name, str) or not name:
-        raise BadChunk(f"{what}: got name {brief(name)}; expected text")
-    if len(name.encode(errors="replace")) > limits.string_bytes:
-        raise LimitExceeded(f"{what}: got a name of {len(name)} characters; the limit is {limits.string_bytes} bytes")
+def _array_type(code: int, size: int, what: str) -> np.dtype:
+    """Of Type and Item_Bytes."""
+    kind, big_endian = code & ~_BIG_ENDIAN, code & _BIG_ENDIAN
+    sizes = _KIND_SIZES[_KINDS[kind]] if kind < len(_KINDS) else ()
+    if size not in sizes or big_endian and (size == 1 or _KINDS[kind] in "SV"):
+        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or bytes")
+    return np.dtype(f"{'>' if big_endian else '<'}{_KINDS[kind]}{size}")
+
+
+def _array_name(text: bytes, what: str, limits: Limits) -> str:
+    if len(text) > limits.string_bytes:
+        raise LimitExceeded(f"{what}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
+    try:
+        name = text.decode()
+    except UnicodeDecodeError:
+        name = ""
+    if not name:
+        raise BadChunk(f"{what}: got name {brief(text)}; expected text")
     return name
 
 

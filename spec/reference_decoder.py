@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import re
 import struct
 import sys
 from dataclasses import dataclass, field, replace
@@ -3450,11 +3449,15 @@ def turn_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 ZSTD_WINDOW = 8 << 20
-ELEMENT_BYTES, FIELD_BYTES = 1 << 20, 1 << 31
-PLAIN_TYPE = re.compile(
-    r"\|b1|[|<>]?[iu]1|[<>][iu][248]|[<>]f[248]|[<>]c(8|16)"
-    r"|\|S\d{1,7}|[<>]U\d{1,6}|\|V\d{1,7}",
-    re.ASCII,
+# Kinds of Item_Type: NumPy's letter, and what Item_Bytes may be.
+ITEM_KINDS = (
+    ("b", (1,)),
+    ("u", (1, 2, 4, 8)),
+    ("i", (1, 2, 4, 8)),
+    ("f", (2, 4, 8)),
+    ("c", (8, 16)),
+    ("S", range(1, 1 + (1 << 20))),
+    ("V", range(1, 1 + (1 << 20))),
 )
 
 
@@ -3510,63 +3513,42 @@ def unshuffle(data: bytes, size: int) -> bytes:
     return np.frombuffer(data, np.uint8).reshape(size, -1).T.tobytes()
 
 
-def is_shape(shape: object, below: int = 1 << 40) -> bool:
-    return isinstance(shape, list) and len(shape) <= 32 and all(type(n) is int and 0 <= n < below for n in shape)
+def item_type(code: int, size: int, what: str) -> np.dtype:
+    """Of Item_Type and Item_Bytes, as NumPy's."""
+    kind, big_endian = code & 7, code >> 3
+    require(kind < len(ITEM_KINDS) and big_endian <= 1, f"{what}: has an unknown type")
+    letter, sizes = ITEM_KINDS[kind]
+    require(size in sizes, f"{what}: has elements of {size} bytes")
+    require(not big_endian or letter in "uifc" and size > 1, f"{what}: has a byte order without numbers")
+    return np.dtype(f"{'<>'[big_endian]}{letter}{size}")
 
 
-def parse_type(description: object, what: str, nesting: int = 16) -> np.dtype:
-    """A Type of FORMAT.md, "Static arrays", as NumPy's."""
-    if isinstance(description, str):
-        require(PLAIN_TYPE.fullmatch(description) is not None, f"{what}: has an unknown type")
-        return np.dtype(description)
-    require(isinstance(description, list) and len(description) > 0 and nesting > 0, f"{what}: has an unknown type")
-    names, formats, offsets, size = [], [], [], 0
-    for entry in description:
-        require(
-            isinstance(entry, list) and len(entry) in (2, 3) and isinstance(entry[0], str), f"{what}: has a bad field"
-        )
-        kind = field_type(parse_type(entry[1], what, nesting - 1), entry[2:], what)
-        if entry[0]:
-            names.append(entry[0])
-            formats.append(kind)
-            offsets.append(size)
-        else:
-            require(len(entry) == 2 and isinstance(entry[1], str) and entry[1][:2] == "|V", f"{what}: has a bad gap")
-        size += kind.itemsize
-    require(len(set(names)) == len(names), f"{what}: has two fields of the same name")
-    require(size < FIELD_BYTES, f"{what}: has a record that is too long")
-    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
-
-
-def field_type(kind: np.dtype, shapes: list, what: str) -> np.dtype:
-    """The Type of a field with its Shape, if it has one."""
-    if not shapes:
-        return kind
-    require(
-        is_shape(shapes[0], FIELD_BYTES) and kind.itemsize * math.prod(shapes[0]) < FIELD_BYTES,
-        f"{what}: has a field with a bad shape",
-    )
-    require(kind.itemsize > 0 or kind.names is not None, f"{what}: has a field of many texts without characters")
-    return np.dtype((kind, tuple(shapes[0])))
-
-
-def parse_array(chunk: bytes, what: str, limits: Limits) -> tuple[dict, np.ndarray | None]:
-    """Head and array of a static array; None where there is none."""
-    require(len(chunk) >= 2 and u16(chunk, 0) <= len(chunk) - 2, f"{what}: Head_Length is more than the chunk holds")
-    head, body = parse_json(chunk[2 : 2 + u16(chunk, 0)], what), chunk[2 + u16(chunk, 0) :]
-    if "dtype" not in head:
-        require(len(body) == 0, f"{what}: has data without a type")
-        return head, None
-    kind, shape = parse_type(head["dtype"], what), head.get("shape")
-    require(0 < kind.itemsize <= ELEMENT_BYTES, f"{what}: has elements of {kind.itemsize} bytes")
-    require(is_shape(shape), f"{what}: has a bad shape")
-    widest = math.prod(n or 1 for n in shape) * kind.itemsize
+def parse_array(chunk: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
+    """Name and array of ATTRIBUTE."""
+    require(len(chunk) >= 8, f"{what}: is too short")
+    dimensions, length, size = chunk[1], u16(chunk, 2), u32(chunk, 4)
+    start = 8 + 4 * dimensions
+    require(start + length <= len(chunk), f"{what}: is too short for its shape and name")
+    kind, body = item_type(chunk[0], size, what), chunk[start + length :]
+    name = array_name(chunk[start : start + length], what, limits)
+    require(dimensions <= 32, f"{what}: has too many dimensions")
+    shape = [u32(chunk, at) for at in range(8, start, 4)]
+    widest = math.prod(n or 1 for n in shape) * size
     require(widest <= limits.decoded_chunk_bytes, f"{what}: is too large", "LIMIT_EXCEEDED")
     if math.prod(shape) == 0:
         require(len(body) == 0, f"{what}: has data though it has no elements")
-        return head, np.zeros(shape, kind)
-    data = unshuffle(unzstd(body, widest, what, limits.decoded_chunk_bytes), kind.itemsize)
-    return head, np.frombuffer(data, kind).reshape(shape)
+        return name, np.zeros(shape, kind)
+    data = unshuffle(unzstd(body, widest, what, limits.decoded_chunk_bytes), size)
+    return name, np.frombuffer(data, kind).reshape(shape)
+
+
+def array_name(text: bytes, what: str, limits: Limits) -> str:
+    require(len(text) <= limits.string_bytes, f"{what}: has too long a name", "LIMIT_EXCEEDED")
+    require(len(text) > 0, f"{what}: has no name")
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError:
+        raise AthError("BAD_CHUNK", f"{what}: has a name that is not UTF-8") from None
 
 
 def parse_metadata(chunk: bytes, limits: Limits) -> bytes:
@@ -4015,14 +3997,7 @@ class AthFile:
             if chunk.kind != ATTRIBUTE or not self.is_available(chunk):
                 continue
             require(len(arrays) < self.limits.attributes, "there are too many attributes", "LIMIT_EXCEEDED")
-            head, array = parse_array(self.bytes_of(chunk), "ATTRIBUTE", self.limits)
-            name = head.get("name")
-            require(isinstance(name, str) and name != "" and array is not None, "an attribute has no name or no array")
-            require(
-                len(name.encode("utf-8")) <= self.limits.string_bytes,
-                "the name of an attribute is too long",
-                "LIMIT_EXCEEDED",
-            )
+            name, array = parse_array(self.bytes_of(chunk), "ATTRIBUTE", self.limits)
             require(name not in arrays, "two attributes have the same name")
             arrays[name] = array
             total = sum(array.nbytes for array in arrays.values())

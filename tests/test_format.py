@@ -266,9 +266,9 @@ def test_a_stream_with_bytes_too_many_is_refused_by_the_document_too(spec, chang
 
 def test_shuffle_of_the_document_restores_an_array(spec):
     array = np.arange(30, dtype="<i4").reshape(10, 3) * 70_001
-    data = container.pack_array(array, "numbers")
-    (length,) = struct.unpack_from("<H", data)
-    assert spec.unshuffle(zstandard.decompress(data[2 + length :]), array.size, 4) == array.tobytes()
+    data = container.pack_array("numbers", array)
+    body = data[8 + 4 * array.ndim + len("numbers") :]
+    assert spec.unshuffle(zstandard.decompress(body), array.size, 4) == array.tobytes()
 
 
 def test_pseudo_code_decodes_what_the_encoder_writes(spec, forked_clip, tmp_path):

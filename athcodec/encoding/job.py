@@ -501,7 +501,7 @@ class EncodingJob:
             for name, array in self.clip.attributes.items():
                 if name in in_faces:
                     continue
-                store.add(ct.ATTRIBUTE, ct.pack_array(array, name))
+                store.add(ct.ATTRIBUTE, ct.pack_array(name, array))
 
     def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Some segments, coded a few at a time, while the next one is read."""

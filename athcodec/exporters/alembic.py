@@ -2,7 +2,7 @@
 
 Faces and static arrays are written once; samples go to disk as they come. Points are float32, a clip in float64 is
 rounded. Everything lies below one transform, which turns a clip whose Z is up to Alembic's custom, Y up, and keeps what
-Alembic has no place for (unit, branches, records); sources/alembic.py takes it back from there.
+Alembic has no place for (unit, branches, bytes); sources/alembic.py takes it back from there.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Faces, texture coordinates and other static arrays are written once. Frames are written as they come and saved now and
 then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are float32, a clip in
 float64 is rounded. Prims are in world space and hold no transforms. What USD has no place for (branches, arrays per
-branch, records) lies in the namespace "athcodec" of the root prim, from where sources/usd.py takes it back.
+branch, bytes) lies in the namespace "athcodec" of the root prim, from where sources/usd.py takes it back.
 """
 
 from __future__ import annotations

@@ -109,8 +109,8 @@ class SceneObject:
 
 
 class ArrayDescriptor(NamedTuple):
-    """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it, a
-    record's as JSON; shape as JSON; domain: what its rows stand for, "" for nothing."""
+    """What makes an array of its bytes again, as text that files of other formats can hold: dtype as NumPy writes it;
+    shape as JSON; domain: what its rows stand for, "" for nothing."""
 
     name: str = ""
     dtype: str = ""
@@ -119,15 +119,12 @@ class ArrayDescriptor(NamedTuple):
 
     @classmethod
     def of(cls, name: str, values: np.ndarray, domain: str) -> ArrayDescriptor:
-        dtype = json.dumps(values.dtype.descr) if values.dtype.names else values.dtype.str
-        return cls(name, dtype, json.dumps(list(values.shape)), domain)
+        return cls(name, values.dtype.str, json.dumps(list(values.shape)), domain)
 
     def array(self, raw: bytes) -> np.ndarray | None:
         """The array; None where the bytes do not make one."""
         try:
-            dtype = np.dtype(
-                [tuple(item) for item in json.loads(self.dtype)] if self.dtype.startswith("[") else self.dtype
-            )
+            dtype = np.dtype(self.dtype)
             return None if dtype.hasobject else np.frombuffer(raw, dtype).reshape(json.loads(self.shape))
         except (ValueError, TypeError, RecursionError):
             return None

@@ -6,10 +6,13 @@ import { decompress } from "fzstd";
 const METADATA = 0x8004, ATTRIBUTE = 0x8020;
 const MOST_BYTES = 2 ** 30; // of one array
 const MOST_TEXT = 2 ** 24;
-const NUMBERS = {
-  "|b1": Uint8Array, "i1": Int8Array, "u1": Uint8Array, "i2": Int16Array, "u2": Uint16Array, "i4": Int32Array,
-  "u4": Uint32Array, "f4": Float32Array, "f8": Float64Array, "i8": BigInt64Array, "u8": BigUint64Array,
-};
+// Typed arrays of kinds and sizes of elements (FORMAT.md, "ATTRIBUTE"); others have none: halves, pairs, texts.
+const NUMBERS = [
+  { 1: Uint8Array },
+  { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array, 8: BigUint64Array },
+  { 1: Int8Array, 2: Int16Array, 4: Int32Array, 8: BigInt64Array },
+  { 4: Float32Array, 8: Float64Array },
+];
 const text = new TextDecoder("utf-8", { fatal: true });
 
 function wrong(what) {
@@ -70,25 +73,30 @@ function swap(bytes, size) {
   for (let at = 0; at < bytes.length; at += size) bytes.subarray(at, at + size).reverse();
 }
 
-// A static array as {name, dtype, shape, array, derived}; `array` is null where there is none, or where its
-// Type has no typed array (records, text, halves).
+// A static array as {name, shape, array}; `array` is null where its type has no typed array.
 function readArray(bytes) {
-  if (bytes.length < 2) throw wrong("static array: got less than its head");
-  const headLength = bytes[0] | (bytes[1] << 8);
-  if (2 + headLength > bytes.length) throw wrong("static array: got less than its head");
-  const head = parse(bytes.subarray(2, 2 + headLength), "static array");
-  const { name, dtype, shape = [], derived } = head;
-  const Type = typeof dtype === "string" ? NUMBERS[dtype] ?? NUMBERS[dtype.slice(1)] : undefined;
-  if (!Type) return { name, dtype, shape, array: null, derived: dtype === undefined ? derived : undefined };
-  const whole = Array.isArray(shape) && shape.every((n) => Number.isInteger(n) && n >= 0);
-  const count = whole ? shape.reduce((product, n) => product * n, 1) : -1, size = Type.BYTES_PER_ELEMENT;
-  if (count < 0 || count * size > MOST_BYTES) throw wrong(`static array ${name ?? ""}: got a shape of ${count} numbers`);
-  if (count === 0) return { name, dtype, shape, array: new Type(0) };
-  const frame = bytes.subarray(2 + headLength);
-  if (contentSize(frame) !== count * size) throw wrong(`static array ${name ?? ""}: got a frame of another size`);
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const start = bytes.length < 8 ? 8 : 8 + 4 * bytes[1], end = start + (bytes.length < 8 ? 0 : view.getUint16(2, true));
+  if (end > bytes.length) throw wrong("static array: got less than its head");
+  const size = view.getUint32(4, true), Type = NUMBERS[bytes[0] & 7]?.[size];
+  const shape = Array.from({ length: bytes[1] }, (_, k) => view.getUint32(8 + 4 * k, true));
+  const name = readName(bytes.subarray(start, end)), count = shape.reduce((product, n) => product * n, 1);
+  if (!Type) return { name, shape, array: null };
+  if (count * size > MOST_BYTES) throw wrong(`static array ${name}: got a shape of ${count} numbers`);
+  if (count === 0) return { name, shape, array: new Type(0) };
+  const frame = bytes.subarray(end);
+  if (contentSize(frame) !== count * size) throw wrong(`static array ${name}: got a frame of another size`);
   const values = unshuffle(unpack(frame, count * size), count, size);
-  if (dtype[0] === ">") swap(values, size);
-  return { name, dtype, shape, array: new Type(values.buffer, values.byteOffset, count) };
+  if (bytes[0] & 8) swap(values, size);
+  return { name, shape, array: new Type(values.buffer, values.byteOffset, count) };
+}
+
+function readName(bytes) {
+  try {
+    return text.decode(bytes);
+  } catch {
+    throw wrong("static array: got a name that is no text");
+  }
 }
 
 // The edges of a plant without stored ones, (u, v) for every vertex v but a root's first, in source order.
@@ -117,13 +125,13 @@ export function readPrelude(file) {
   return { ...found, skeleton: found.edges ?? derivedEdges(file) };
 }
 
-/** Named arrays, as far as they are here: {name: {array, shape, dtype}}. */
+/** Named arrays of numbers, as far as they are here: {name: {array, shape}}. */
 export function readAttributes(file) {
   const attributes = {};
   for (const [index, { kind, fed }] of file.chunks().entries()) {
     if (kind !== ATTRIBUTE || !fed) continue;
-    const { name, dtype, shape, array } = readArray(file.chunkBytes(index));
-    if (array && typeof name === "string") attributes[name] = { array, shape, dtype };
+    const { name, shape, array } = readArray(file.chunkBytes(index));
+    if (array) attributes[name] = { array, shape };
   }
   checkPolygons(attributes, file.info.vertexCount);
   return attributes;

@@ -60,10 +60,9 @@ export interface ATHFailure extends Error {
 }
 
 export interface StaticArray {
+  /** A typed array of the source's type. */
   readonly array: ArrayLike<number | bigint>;
   readonly shape: number[];
-  /** As in NumPy, such as "<f4". */
-  readonly dtype: string;
 }
 
 /** A loaded file. Event: "arrays", when what is stored behind the motion is here (uv, normals, colors, radius, polygons of
