@@ -13,9 +13,10 @@ from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_
 import numpy as np
 
 from athcodec._library import load_library
+from athcodec.options import MAX_SEGMENT
 
 PIECE_VERTICES = 64
-SEGMENT_FRAMES = 256
+SEGMENT_FRAMES = MAX_SEGMENT
 SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
 RIGID = 8

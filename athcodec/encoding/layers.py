@@ -40,8 +40,6 @@ from athcodec.encoding.segment import (
 )
 from athcodec.encoding.shape import rest_steps
 
-LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
-DEFAULT_LADDER = "decades"
 COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
 # Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names,
 # and else to keep the tightest of these limits, over its own.
@@ -107,22 +105,6 @@ class Layers:
         """Of the streams up to the rest pose of the first layer."""
         refined = self.each[0].rest
         return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
-
-
-def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
-    """Largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas between them.
-
-    Raises ValueError.
-    """
-    if isinstance(ladder, str) and ladder in LADDERS:
-        return LADDERS[ladder]
-    try:
-        errors = tuple(sorted(map(float, ladder.split(",") if isinstance(ladder, str) else ladder), reverse=True))
-    except (TypeError, ValueError):
-        errors = (math.nan,)
-    if not all(0 < error < 1 for error in errors):
-        raise ValueError(f"ladder: got {ladder!r}; expected {', '.join(LADDERS)} or errors between 0 and 1")
-    return errors
 
 
 def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
