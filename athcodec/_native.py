@@ -198,7 +198,10 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_analyse": (
         None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double],
+        [
+            *[POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32],
+            *[c_void_p, c_double, c_void_p, c_int, c_void_p],
+        ],
     ),
     "ath_analyse_nodes": (
         None,

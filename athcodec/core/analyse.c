@@ -294,8 +294,9 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     return before;
 }
 
-static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t p,
-                          const ath_scratch *scratch, const double *source, double dead_zone)
+/* Returns the vertices as decoded. */
+static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                   int32_t p, const ath_scratch *scratch, const double *source, double dead_zone)
 {
     const ath_piece *piece = plan->pieces + p;
     ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
@@ -319,13 +320,20 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
                    rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
     if (motion->decoded) note_piece(motion, piece, p, &rows, scratch, placed);
+    return placed;
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                 int32_t stop, const double *source, double dead_zone)
+                 int32_t stop, const double *source, double dead_zone, const double origin[3], int is_float64,
+                 void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
-    for (int32_t p = first; p < stop; p++) analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+    for (int32_t p = first; p < stop; p++) {
+        const ath_piece *piece = plan->pieces + p;
+        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+        if (positions)
+            ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
+    }
 }
 
 void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])

@@ -270,7 +270,7 @@ class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
     def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
-        self._origin, self._dtype, self.positions = prelude.origin, prelude.dtype, positions
+        self._origin, self._dtype, self.positions = *prelude.output, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
@@ -285,10 +285,11 @@ class _SegmentCoder:
         """The levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
         bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
-        segment = analyse(plan, settings, self.positions, layer.modes, bases, layered=self._layered)
+        output = self._origin, self._dtype
+        segment, decoded = analyse(plan, output, settings, self.positions, layer.modes, bases, layered=self._layered)
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
-        self._finish_with(segment, layer, plan.level_count - 1)
+        self._finish_with(decoded, layer, plan.level_count - 1)
         segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
@@ -325,15 +326,17 @@ class _SegmentCoder:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
-        segment = analyse(layer.plan, settings, self.positions, layer.modes, bases, before, ratio, layered=True)
+        output = self._origin, self._dtype
+        segment, decoded = analyse(
+            layer.plan, output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
+        )
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
-        self._finish_with(segment, layer, level)
+        self._finish_with(decoded, layer, level)
         return segment
 
-    def _finish_with(self, segment: SegmentMotion, layer: Layer, level: int) -> None:
-        """Corrections of the level that a layer ends with, and its errors."""
-        decoded = self.pose(segment, layer.plan.level_count - 1)
+    def _finish_with(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
+        """Corrections of the level that a layer ends with, and its errors; decoded: the positions without."""
         self._shown.append(_ShownLevel(lambda: decoded, layer))
         self.errors.append(self._finish_level(layer, level, decoded))
 

@@ -524,9 +524,9 @@ class Search:
 
     def _analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
         """A sample in its integers."""
-        plan, sample = self.prelude(settings).plan, self.samples[number]
+        prelude, sample = self.prelude(settings), self.samples[number]
         own = settings.of_segment(sample.whole_loop)
-        return analyse(plan, own, sample.positions, modes, self._bases(settings, number))
+        return analyse(prelude.plan, prelude.output, own, sample.positions, modes, self._bases(settings, number))[0]
 
     def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
         """The time bases of the levels that learn theirs."""
