@@ -270,7 +270,7 @@ class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
     def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
-        self._origin, self._dtype, self.positions = *prelude.output, positions
+        self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
@@ -285,8 +285,9 @@ class _SegmentCoder:
         """The levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
         bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
-        output = self._origin, self._dtype
-        segment, decoded = analyse(plan, output, settings, self.positions, layer.modes, bases, layered=self._layered)
+        segment, decoded = analyse(
+            plan, self._output, settings, self.positions, layer.modes, bases, layered=self._layered
+        )
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(decoded, layer, plan.level_count - 1)
@@ -294,7 +295,7 @@ class _SegmentCoder:
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._shown = [
-            _ShownLevel(partial(own.pose, level, self._origin, self._dtype)) for level, own in enumerate(shown)
+            _ShownLevel(partial(own.pose, level, *self._output)) for level, own in enumerate(shown)
         ] + self._shown
         self._keep_last_level_best(layer, plan.level_count - 1, self._shown[-1].pose())
         for level, nodes in enumerate(shown):
@@ -326,9 +327,8 @@ class _SegmentCoder:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
-        output = self._origin, self._dtype
         segment, decoded = analyse(
-            layer.plan, output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
         )
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
@@ -434,7 +434,7 @@ class _SegmentCoder:
 
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """As it is put out, neither joined nor corrected."""
-        return shown.pose(level, self._origin, self._dtype)
+        return shown.pose(level, *self._output)
 
     def error(self, decoded: np.ndarray) -> tuple[float, ...]:
         return position_errors(decoded, self.positions, self._origin, self._pool)
