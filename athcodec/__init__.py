@@ -3,20 +3,19 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from athcodec import errors, metrics
-from athcodec.ath import Ath, Thresholds, build_ath
-from athcodec.ath_file import AthFile
-from athcodec.clip import MotionClip
-from athcodec.clip_view import ClipView
-from athcodec.decoder import Decoder, open
-from athcodec.joining import join, looped, split
-from athcodec.truncate import truncate
-
 if TYPE_CHECKING:  # what __getattr__ finds, for type checkers and the reference
+    from athcodec import errors, metrics
+    from athcodec.ath import Ath, Thresholds, build_ath
+    from athcodec.ath_file import AthFile
+    from athcodec.clip import MotionClip
+    from athcodec.clip_view import ClipView
+    from athcodec.decoder import Decoder, open
     from athcodec.discovery import Found, find_branches
     from athcodec.encoding import Summary, encode
     from athcodec.exporters import write, write_hdf5
+    from athcodec.joining import join, looped, split
     from athcodec.sources import read, read_hdf5, sample_path
+    from athcodec.truncation import truncate
 
 __version__ = "0.1.0"
 __all__ = [
@@ -44,16 +43,30 @@ __all__ = [
     "write",
     "write_hdf5",
 ]
-_LAZY = {  # what decoding does not need, by module
+_LAZY = {  # by module: to import the package loads none, so that a command or a program pays for what it uses
+    "ath": ("Ath", "Thresholds", "build_ath"),
+    "ath_file": ("AthFile",),
+    "clip": ("MotionClip",),
+    "clip_view": ("ClipView",),
+    "decoder": ("Decoder", "open"),
     "discovery": ("Found", "find_branches"),
     "encoding": ("Summary", "encode"),
     "exporters": ("write", "write_hdf5"),
+    "joining": ("join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
+    "truncation": ("truncate",),
 }
+_MODULES = ("errors", "metrics")
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"athcodec.{name}")
     for module, names in _LAZY.items():
         if name in names:
             return getattr(import_module(f"athcodec.{module}"), name)
     raise AttributeError(f"module 'athcodec' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -13,9 +13,10 @@ from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_
 import numpy as np
 
 from athcodec._library import load_library
+from athcodec.options import MAX_SEGMENT
 
 PIECE_VERTICES = 64
-SEGMENT_FRAMES = 256
+SEGMENT_FRAMES = MAX_SEGMENT
 SHAPE_MODES = 16
 SHEET, LOOSE, WHOLE = 1, 2, 4
 RIGID = 8
@@ -197,7 +198,10 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_analyse": (
         None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double],
+        [
+            *[POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32],
+            *[c_void_p, c_double, c_void_p, c_int, c_void_p],
+        ],
     ),
     "ath_analyse_nodes": (
         None,

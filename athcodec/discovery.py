@@ -23,9 +23,9 @@ from athcodec.atomic_files import new_file
 from athcodec.clip import MotionClip, check_branches, check_stem_index, source_stem_index, stands_still
 from athcodec.errors import ClipError
 from athcodec.hierarchy import branch_orders, branches_from_edges
+from athcodec.options import METHODS
 from athcodec.point_runs import base_points, run_links, scipy_module
 
-METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
 PARENT_NAMES = ("branch_parent", "branchparent", "branch_parents", "parent_branch", "parent")
 

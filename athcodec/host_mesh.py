@@ -12,9 +12,6 @@ import numpy.typing as npt
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError
 
-HOST = "host"
-"""The word for it where a rest pose is chosen: `--rest host`."""
-
 HostMesh: TypeAlias = npt.ArrayLike | MotionClip | str | os.PathLike[str]
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from athcodec._native import PIECE_VERTICES, SEGMENT_FRAMES
+from athcodec._native import PIECE_VERTICES
+from athcodec.options import DEFAULT_SEGMENT, MAX_SEGMENT
 
-MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, SEGMENT_FRAMES, 128
 SEGMENT_BYTES = 128 << 20
 SMALL_BYTES = 32 << 20  # of the float32 positions of a clip that may be one segment of MAX_SEGMENT frames
 

@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec.encoding import EFFORTS
-from athcodec.encoding.layers import LADDERS, ladder_of
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.metrics import ErrorMeter
+from athcodec.options import EFFORTS, LADDERS, ladder_of
 
 REL_ERROR = 1e-4
 FRAMES_AHEAD = 7

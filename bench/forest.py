@@ -52,8 +52,7 @@ import numpy as np
 
 import athcodec
 from athcodec import container as ct
-from athcodec.encoding.layers import LADDERS
-from athcodec.segmentation import DEFAULT_SEGMENT
+from athcodec.options import DEFAULT_SEGMENT, LADDERS
 from bench.clips import add_effort, add_rel_error, add_source
 from bench.decode import compile_program
 from bench.tables import table

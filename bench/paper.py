@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from athcodec.ath import Thresholds
+from athcodec.ath import Thresholds, survey
 from athcodec.hierarchy import hierarchy_of
 from bench.clips import measure
 from bench.data import SAMPLE
@@ -97,7 +97,7 @@ def thresholds_for(clip: athcodec.MotionClip, nodes: int) -> Thresholds:
     hierarchy = hierarchy_of(clip)
     eta = round(PAPER["eta"] * clip.frame_count / PAPER["frames"])
     lam = max(1, round(PAPER["lambda"] * clip.vertex_count / PAPER["vertices"]))
-    diagonal = athcodec.ath.survey(clip, hierarchy).diagonal
+    diagonal = survey(clip, hierarchy).diagonal
     low, high = (diagonal * end for end in XI_RANGE)
     tried: dict[Thresholds, int] = {}
     for _ in range(TRIALS):

@@ -11,9 +11,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from athcodec.encoding import EFFORTS
-from athcodec.encoding.layers import LADDERS
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
+from athcodec.options import EFFORTS, LADDERS
 from bench.clips import Encoded, add_clips, encoded, measure
 from bench.tables import table
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.encoding.layers import LADDERS
+from athcodec.options import LADDERS
 from bench.browser import chromium
 from bench.clips import add_clips, add_rel_error, encoded
 from bench.tables import table

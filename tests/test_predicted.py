@@ -109,7 +109,7 @@ ODD = {
 }
 
 
-def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) -> athcodec.encoding.Summary:
+def size(clip: athcodec.MotionClip, folder: Path, fraction: float, **options) -> athcodec.Summary:
     given = {"rel_error": fraction} | options
     return athcodec.encode(clip, folder / "a.ath", attributes="none", **{"ladder": "none"} | given)
 

@@ -21,15 +21,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from athcodec import discovery
 from athcodec.ath import Thresholds
 from athcodec.atomic_files import is_url
-from athcodec.encoding.layers import ladder_of
-from athcodec.encoding.search import EFFORTS
 from athcodec.encoding.shape import RestPrecision
 from athcodec.errors import ClipError
-from athcodec.host_mesh import HOST
-from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
+from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, ladder_of
 from athcodec.sources import FORMATS, format_named
 from athcodec.units import parse_length, parse_size
 
@@ -107,7 +103,7 @@ def check_settings(
             checked[name] = _CHECKS[name](value)
         except (ValueError, TypeError, ArithmeticError) as error:
             raise ClipError(f"{where}: {name}: got {value!r}: {error}") from None
-        if name == "mesh" or name == "hierarchy" and value not in ("auto", *discovery.METHODS):
+        if name == "mesh" or name == "hierarchy" and value not in ("auto", *METHODS):
             checked[name] = os.path.abspath(os.path.join(folder, checked[name]))
     given = [name for name in BOUNDS if name in checked]
     if len(given) > 1:

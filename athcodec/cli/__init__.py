@@ -1,5 +1,7 @@
 """The command `athcodec`: verbs.py does what arguments.py understands; clips.py opens the files, printing.py shows.
 
+The words themselves import nothing heavy; what a verb works with is imported when it runs.
+
 Results go to stdout, as a table or with --json as one JSON object; messages and progress go to stderr,
 progress only where that is a terminal. Exit codes: 0 done, 1 an error or a failed check, 2 wrong usage,
 130 interrupted. An error is one line; its traceback comes with --debug. How a clip is coded is not known here
@@ -15,9 +17,9 @@ import threading
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 
 from athcodec.cli.arguments import make_parser
-from athcodec.cli.printing import one_line, say
 
 INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143
 """Exit codes: 128 and the number of the signal, as shells have it."""
@@ -33,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name need not be valid text
     try:
         with _termination_unwinds():
-            code = args.run(args)
+            code = getattr(import_module("athcodec.cli.verbs"), args.verb)(args)
             sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -45,6 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:
         if args.debug:
             traceback.print_exc()
+        from athcodec.cli.printing import one_line, say
+
         say("error", one_line(error))
         return 1
 

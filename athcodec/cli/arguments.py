@@ -9,16 +9,22 @@ from collections.abc import Callable
 from typing import Any
 
 import athcodec
-from athcodec import discovery
-from athcodec.cli import verbs
-from athcodec.encoding import DEFAULT_REL_ERROR, EFFORTS, LOSSLESS_REL_ERROR
-from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
-from athcodec.encoding.shape import RestPrecision
-from athcodec.host_mesh import HOST
-from athcodec.segmentation import DEFAULT_SEGMENT, MAX_SEGMENT, MIN_SEGMENT
-from athcodec.sources import SAMPLES
+from athcodec.options import (
+    DEFAULT_LADDER,
+    DEFAULT_REL_ERROR,
+    DEFAULT_SEGMENT,
+    EFFORTS,
+    HOST,
+    LOSSLESS_REL_ERROR,
+    MAX_SEGMENT,
+    METHODS,
+    MIN_SEGMENT,
+    SAMPLES,
+    ladder_of,
+)
 from athcodec.units import METRES, Length, parse_length, parse_size
 
+DEMO_PAGE = "athcodec_demo.html"
 TRACEBACK = "show the traceback of an error"
 WRITTEN = "file to write; replaced when the new one is complete"
 READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
@@ -37,16 +43,15 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--debug", action="store_true", help=TRACEBACK)
     choices = parser.add_subparsers(metavar="VERB", required=True)
 
-    def verb(name: str, run: Callable, text: str, more: str = "") -> argparse.ArgumentParser:
+    def verb(name: str, text: str, more: str = "") -> argparse.ArgumentParser:
         description = f"{text[0].upper()}{text[1:]}. {more}"
         sub = choices.add_parser(name, parents=[shared], allow_abbrev=False, help=text, description=description)
-        sub.set_defaults(run=run)
+        sub.set_defaults(verb=name)
         return sub
 
     _encode_arguments(
         verb(
             "encode",
-            verbs.encode,
             "compress a motion into an .ath file",
             f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
             f"{LOSSLESS_REL_ERROR:g}.",
@@ -55,7 +60,6 @@ def make_parser() -> argparse.ArgumentParser:
     _batch_arguments(
         verb(
             "batch",
-            verbs.batch,
             "compress many motions, by several processes",
             "An interrupted run goes on where it ended when the command is given again. "
             "Exit code 1 where a clip failed; the others are done all the same.",
@@ -64,35 +68,31 @@ def make_parser() -> argparse.ArgumentParser:
     _decode_arguments(
         verb(
             "decode",
-            verbs.decode,
             "write the motion of an .ath file in another format",
             "A file that was cut off is decoded to its deepest complete level, with a warning.",
         )
     )
-    _info_arguments(verb("info", verbs.info, "show what an .ath file holds, level by level"))
+    _info_arguments(verb("info", "show what an .ath file holds, level by level"))
     _verify_arguments(
         verb(
             "verify",
-            verbs.verify,
             "check that an .ath file is whole and undamaged, and how far off its source it is",
             "Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says.",
         )
     )
-    _truncate_arguments(verb("truncate", verbs.truncate, "leave out the levels beyond one, without decoding"))
+    _truncate_arguments(verb("truncate", "leave out the levels beyond one, without decoding"))
     _hierarchy_arguments(
         verb(
             "hierarchy",
-            verbs.hierarchy,
             "find the branches of a source that names none",
             "Encoding does so by itself; here the result is shown, and saved to be edited.",
         )
     )
-    formats = verb("formats", verbs.formats, "list the formats that are read and written, and what each needs")
+    formats = verb("formats", "list the formats that are read and written, and what each needs")
     formats.add_argument("--json", action="store_true", help="print as JSON")
     _view_arguments(
         verb(
             "view",
-            verbs.view,
             "play an .ath file in a browser",
             "Serves the viewer on this computer only, until it is interrupted.",
         )
@@ -100,9 +100,8 @@ def make_parser() -> argparse.ArgumentParser:
     _demo_arguments(
         verb(
             "demo",
-            verbs.demo,
             "encode an included sample, decode and measure every level",
-            f"Ends with a page that shows it, {verbs.DEMO_PAGE}, in DIR or in the current folder.",
+            f"Ends with a page that shows it, {DEMO_PAGE}, in DIR or in the current folder.",
         )
     )
     return parser
@@ -258,7 +257,7 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--hierarchy",
         metavar="FILE|METHOD",
         help="branches from a file of `athcodec hierarchy --save` or a .mtg, or "
-        f"found by auto, {', '.join(discovery.METHODS)} (default: the source's own, "
+        f"found by auto, {', '.join(METHODS)} (default: the source's own, "
         "else those of several candidates that make the smallest file)",
     )
     verb.add_argument(
@@ -404,7 +403,7 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
     verb.add_argument(
         "--method",
-        choices=("auto", *discovery.METHODS),
+        choices=("auto", *METHODS),
         default="auto",
         help="by attributes named like branch ids, the joints of a skin, an edge graph, the pieces of a "
         "mesh, or motion (default auto: the first of them that applies)",
@@ -512,6 +511,8 @@ def _positive_length(text: str) -> Length:
 
 def _rest_error(text: str) -> float | str:
     """A fraction, a length with its unit, or OF_BOUND."""
+    from athcodec.encoding.shape import RestPrecision  # heavy, as all that encodes is
+
     option = float(text) if re.fullmatch(r"[\d.]+([eE][+-]?\d+)?", text) else text
     RestPrecision.of(option)
     return option

@@ -19,9 +19,9 @@ from athcodec.clip import MotionClip
 from athcodec.clip_view import ClipView
 from athcodec.decoder import Decoder
 from athcodec.errors import AthError, ClipError, LevelUnavailable, NeedsHostMesh, RemoteError
-from athcodec.host_mesh import HOST
 from athcodec.joining import BLEND
 from athcodec.metrics import ErrorMeter, MotionMeter, SmoothnessMeter, compare_clips, level_meters
+from athcodec.options import HOST
 from athcodec.units import Length
 
 ROUNDING = 1e-6

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -19,9 +19,12 @@ from rich.table import Table
 from rich.text import Text
 
 from athcodec.decoder import Decoder
-from athcodec.encoding import DEFAULT_REL_ERROR, Seam
 from athcodec.errors import AthError
 from athcodec.metrics import ErrorMeter
+from athcodec.options import DEFAULT_REL_ERROR
+
+if TYPE_CHECKING:
+    from athcodec.encoding import Seam
 
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""

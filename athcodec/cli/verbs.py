@@ -15,6 +15,7 @@ import numpy as np
 
 import athcodec
 from athcodec import discovery
+from athcodec.cli.arguments import DEMO_PAGE
 from athcodec.cli.clips import (
     bound,
     check_output,
@@ -46,13 +47,9 @@ from athcodec.cli.printing import (
     say,
     say_seam,
 )
-from athcodec.encoding import DEFAULT_REL_ERROR
-from athcodec.encoding.layers import DEFAULT_LADDER, ladder_of
 from athcodec.errors import AthError
 from athcodec.hierarchy import branch_orders
-from athcodec.host_mesh import HOST
-
-DEMO_PAGE = "athcodec_demo.html"
+from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 
 def encode(args: argparse.Namespace) -> int:

@@ -1,8 +1,10 @@
 /* From positions to quantised coefficients, piece by piece in closed loop: every piece is predicted from what the
  * decoder will have of its parent. Encoder only. */
 #include "encode.h"
+#include "lanes.h"
 
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
+enum { WAVES = 8 }; /* that a row is projected on at once */
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -14,28 +16,44 @@ static int32_t quantise(double value, double dead_zone)
     return value < 0.0 ? -magnitude : magnitude;
 }
 
-/* Transforms one axis over time into units of `step`. A row whose length is below the dead zone has no coefficient
- * beyond it, so the transform is left out; returns 0 then. */
-ATH_HOT static int forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
-                                    const double *row, double *units)
+/* units = the row times `count` waves, in units of a step. */
+ATH_INLINE void project_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
+                              double *units)
+{
+    ath_lanes sums[WAVES];
+    for (int32_t k = 0; k < count; k++) lanes_set(sums + k, 0.0);
+    int32_t t = 0;
+    for (; t + ATH_LANES <= T; t += ATH_LANES)
+        for (int32_t k = 0; k < count; k++) lanes_add_product(sums + k, waves + (size_t)k * (size_t)T + t, row + t);
+    for (int32_t k = 0; k < count; k++) {
+        double sum[ATH_LANES];
+        lanes_store(sum, sums + k);
+        for (int32_t i = t; i < T; i++) sum[0] += waves[(size_t)k * (size_t)T + i] * row[i];
+        units[k] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) * inverse;
+    }
+}
+
+/* Transforms one axis over time into units of `step`; returns how many coefficients were needed: at least `known`, and all
+ * that are beyond the dead zone. The waves are orthonormal, so that none of the rest is where its whole length is not. */
+ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
+                                        int32_t known, const double *row, double *units)
 {
     double length2 = 0.0, inverse = 1.0 / step;
     for (int32_t t = 0; t < T; t++) length2 += row[t] * row[t];
-    if (!(length2 > dead_zone * step * dead_zone * step * 0.9)) return 0;
-    for (int32_t k = 0; k < stream->temporal_rank; k++) {
-        const double *wave = stream->temporal + (size_t)k * (size_t)T;
-        double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0, sum3 = 0.0;
-        int32_t t = 0;
-        for (; t + 4 <= T; t += 4) {
-            sum0 += wave[t] * row[t];
-            sum1 += wave[t + 1] * row[t + 1];
-            sum2 += wave[t + 2] * row[t + 2];
-            sum3 += wave[t + 3] * row[t + 3];
-        }
-        for (; t < T; t++) sum0 += wave[t] * row[t];
-        units[k] = ((sum0 + sum1) + (sum2 + sum3)) * inverse;
+    length2 *= inverse * inverse;
+    double least = 0.9 * dead_zone * dead_zone, left = length2;
+    int is_sharp = stream->temporal_rank == T && 1e-12 * length2 < 0.01 * least; /* a learned basis has rounded rows */
+    for (int32_t k = 0; k < stream->temporal_rank;) {
+        if (k >= known && (k == 0 || is_sharp) && !(left > least)) return k;
+        const double *waves = stream->temporal + (size_t)k * (size_t)T;
+        int32_t count = k + WAVES <= stream->temporal_rank ? WAVES : 1;
+        if (count == WAVES)
+            project_waves(waves, WAVES, T, row, inverse, units + k);
+        else
+            project_waves(waves, 1, T, row, inverse, units + k);
+        for (int32_t stop = k + count; k < stop; k++) left -= units[k] * units[k];
     }
-    return 1;
+    return stream->temporal_rank;
 }
 
 /* How many integers near (axis, k) are not zero. */
@@ -62,25 +80,33 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
         }
 }
 
+/* Where the zeros at the end of a row begin. */
+static int32_t row_extent(const int32_t *row, int32_t count)
+{
+    while (count > 0 && row[count - 1] == 0) count--;
+    return count;
+}
+
 /* Quantises a track of three axes about its prediction, if there is one, and replaces it by what the decoder will have. */
 static void code_track(const ath_stream *stream, int32_t T, double step, double dead_zone, double *track,
                        const int32_t *predicted, int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
+    int32_t longest = 0;
     memset(quantised, 0, 3 * (size_t)T * sizeof *quantised);
     for (int32_t axis = 0; axis < 3; axis++) {
-        if (!forward_temporal(stream, T, step, predicted ? 0.0 : dead_zone, track + axis * T, units[axis]))
-            memset(units[axis], 0, sizeof units[axis]);
-        for (int32_t k = 0; k < stream->temporal_rank; k++) {
-            int32_t about = predicted ? predicted[axis * T + k] : 0;
-            units[axis][k] -= (double)about;
-            quantised[axis * T + k] = quantise(units[axis][k], about ? 0.5 : dead_zone);
-        }
+        const int32_t *about = predicted ? predicted + axis * T : 0;
+        int32_t known = about ? row_extent(about, stream->temporal_rank) : 0;
+        int32_t count = forward_temporal(stream, T, step, dead_zone, known, track + axis * T, units[axis]);
+        for (int32_t k = 0; k < known; k++) units[axis][k] -= (double)about[k];
+        for (int32_t k = 0; k < count; k++)
+            quantised[axis * T + k] = quantise(units[axis][k], k < known && about[k] ? 0.5 : dead_zone);
+        longest = ath_max(longest, count);
     }
-    drop_lone_ones(T, stream->temporal_rank, units, predicted, quantised);
+    drop_lone_ones(T, longest, units, predicted, quantised);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
-        ath_inverse_temporal(stream, T, stream->temporal_rank, step, quantised + axis * T, track + axis * T);
+        ath_inverse_temporal(stream, T, longest, step, quantised + axis * T, track + axis * T);
 }
 
 /* The unit quaternion of a rotation matrix, of the two the one nearer to the last. */
@@ -268,8 +294,9 @@ static ath_piece_before piece_before(const ath_plan *plan, const ath_motion *mot
     return before;
 }
 
-static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t p,
-                          const ath_scratch *scratch, const double *source, double dead_zone)
+/* Returns the vertices as decoded. */
+static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
+                                   int32_t p, const ath_scratch *scratch, const double *source, double dead_zone)
 {
     const ath_piece *piece = plan->pieces + p;
     ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
@@ -293,13 +320,20 @@ static void analyse_piece(const ath_plan *plan, const ath_motion *motion, const 
                    rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
     const double *placed = ath_pose_rows(plan, motion, p, &rows, scratch);
     if (motion->decoded) note_piece(motion, piece, p, &rows, scratch, placed);
+    return placed;
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                 int32_t stop, const double *source, double dead_zone)
+                 int32_t stop, const double *source, double dead_zone, const double origin[3], int is_float64,
+                 void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
-    for (int32_t p = first; p < stop; p++) analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+    for (int32_t p = first; p < stop; p++) {
+        const ath_piece *piece = plan->pieces + p;
+        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, source, dead_zone);
+        if (positions)
+            ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
+    }
 }
 
 void ath_mode_weights(int32_t flags, double weights[ATH_SHAPE_MODES])

@@ -90,6 +90,23 @@ static void open_track(track *track, int32_t v, const void *positions, const dou
     find_worst(track);
 }
 
+/* Whether all frames of a vertex are within the limit, as those of most are. */
+ATH_HOT static int is_within(int32_t frames, int is_float64, const void *positions, const double *source,
+                             const double origin[3], double limit, size_t first)
+{
+    double squares[ATH_SEGMENT_FRAMES] = {0.0};
+    int beyond = 0;
+    for (size_t k = 0; k < 3; k++) {
+        size_t row = first + k * (size_t)frames;
+        for (int32_t t = 0; t < frames; t++) {
+            double error = number_at(is_float64, positions, row + (size_t)t) - (source[row + (size_t)t] + origin[k]);
+            squares[t] += error * error;
+        }
+    }
+    for (int32_t t = 0; t < frames; t++) beyond |= squares[t] > limit * limit;
+    return !beyond;
+}
+
 /* How much the error moves before it is corrected. */
 static void weigh_bends(track *track)
 {
@@ -261,6 +278,10 @@ int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float6
     ath_correction above[ATH_SEGMENT_FRAMES] = {{{0}, 0}};
     int64_t count = 0;
     for (int32_t v = 0; v < vertex_count; v++) {
+        if (is_within(frames, is_float64, positions, source, origin, limits[v], (size_t)v * 3 * (size_t)frames)) {
+            memset(above, 0, (size_t)frames * sizeof above[0]);
+            continue;
+        }
         int32_t widest = narrow[v] ? 0 : ATH_FOOTPRINTS - 1; /* those of one frame cannot be in each other's way */
         for (int corrected = 0; !corrected; widest--) {
             if (widest < 0) return -1;

@@ -81,12 +81,18 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
  * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
  * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
  * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
- * each with scratch memory of its own, once the pieces that theirs hang on are done. */
+ * each with scratch memory of its own, once the pieces that theirs hang on are done. positions: where those of
+ * the last level go, as ath_pose has them; 0: nowhere. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                 int32_t first, int32_t stop, const double *source, double dead_zone);
+                                 int32_t first, int32_t stop, const double *source, double dead_zone,
+                                 const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
                                        double dead_zone);
+
+/* Puts decoded vertices, less the origin, into positions as ath_pose has them. */
+void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t frames, const double origin[3],
+                         int is_float64, void *positions);
 
 /* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
  * double. By ranges of pieces, which keep the rule above, and then of nodes. */

@@ -19,6 +19,12 @@ ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *fro
     *to = *to + weight * *(const ath_lanes *)(const void *)from;
 }
 
+/* to += a * b */
+ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *b)
+{
+    *to = *to + *(const ath_lanes *)(const void *)a * *(const ath_lanes *)(const void *)b;
+}
+
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from) { *(ath_lanes *)(void *)to = *from; }
 
 #else
@@ -35,6 +41,11 @@ ATH_INLINE void lanes_set(ath_lanes *to, double x)
 ATH_INLINE void lanes_add_scaled(ath_lanes *to, double weight, const double *from)
 {
     for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + weight * from[i];
+}
+
+ATH_INLINE void lanes_add_product(ath_lanes *to, const double *a, const double *b)
+{
+    for (int i = 0; i < ATH_LANES; i++) to->lane[i] = to->lane[i] + a[i] * b[i];
 }
 
 ATH_INLINE void lanes_store(double *to, const ath_lanes *from)

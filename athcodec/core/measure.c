@@ -77,8 +77,8 @@ void ath_gather(int32_t vertex_count, int32_t frames, const int32_t *vertex_sour
                 }
 }
 
-static void store(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3], int is_float64,
-                  void *positions)
+void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t T, const double origin[3],
+                         int is_float64, void *positions)
 {
     for (int32_t row = 0; row < 3 * count; row++) {
         const double *from = placed + (size_t)row * (size_t)T;
@@ -105,7 +105,7 @@ static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_
             for (int32_t t = 0; t < motion->frames; t++)
                 scratch->placed[axis * motion->frames + t] = x0[axis] - a[axis];
         ath_move(motion->frames, &scratch->at, scratch->placed);
-        store(scratch->placed, v, 1, motion->frames, origin, is_float64, positions);
+        ath_store_positions(scratch->placed, v, 1, motion->frames, origin, is_float64, positions);
     }
 }
 
@@ -118,7 +118,7 @@ void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers
         ath_piece_rows rows = ath_rows_of_piece(plan, integers, motion->frames, p);
         if (piece->level > level) continue;
         const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
-        store(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
+        ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
 }
 

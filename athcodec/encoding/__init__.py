@@ -5,22 +5,8 @@ analysed (motion.py, learned_modes.py), quantised (quantise.py) and coded (segme
 file together. encoder.py has the entry points. Decoding imports nothing from here.
 """
 
-from athcodec.encoding.bounds import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 from athcodec.encoding.encoder import code_segments, draft, encode, write
 from athcodec.encoding.job import CodedSegment, Draft
-from athcodec.encoding.search import EFFORTS
 from athcodec.encoding.summary import Seam, Summary
 
-__all__ = [
-    "DEFAULT_REL_ERROR",
-    "EFFORTS",
-    "LOSSLESS_REL_ERROR",
-    "CodedSegment",
-    "Draft",
-    "Seam",
-    "Summary",
-    "code_segments",
-    "draft",
-    "encode",
-    "write",
-]
+__all__ = ["CodedSegment", "Draft", "Seam", "Summary", "code_segments", "draft", "encode", "write"]

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
-
-DEFAULT_REL_ERROR = 1e-4
-LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
+from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 
 
 @dataclass(frozen=True)

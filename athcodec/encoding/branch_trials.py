@@ -18,7 +18,7 @@ from athcodec.encoding.progress import Progress
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
 from athcodec.hierarchy import hierarchy_of
-from athcodec.segmentation import DEFAULT_SEGMENT
+from athcodec.options import DEFAULT_SEGMENT
 
 TRIAL_FRAMES = 64
 

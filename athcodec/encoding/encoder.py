@@ -18,13 +18,14 @@ from athcodec import container as ct
 from athcodec.ath import Thresholds
 from athcodec.atomic_files import check_target, new_file
 from athcodec.clip import MotionClip
-from athcodec.encoding.bounds import DEFAULT_REL_ERROR, BoundOption
+from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
-from athcodec.encoding.layers import DEFAULT_LADDER, layer_ratios
+from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
 from athcodec.encoding.search import SAMPLES
 from athcodec.encoding.summary import Summary
+from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR
 from athcodec.segmentation import split_segments
 from athcodec.units import Length
 

@@ -30,26 +30,24 @@ from athcodec.discovery import Found, with_branches
 from athcodec.encoding import polygons, streams
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.layers import (
-    DEFAULT_LADDER,
     MOST_LAYERS,
     MOST_LEVELS,
     CodedMotion,
     Layers,
-    ladder_of,
     layer_chunks,
     layer_ratios,
     layers_of,
 )
 from athcodec.encoding.prediction import FoundPrediction, best_prediction, code_predicted_segment, predicted_layers
 from athcodec.encoding.progress import Progress, silent
-from athcodec.encoding.search import EFFORTS, Choice, Search, still_choice, typical_segments
+from athcodec.encoding.search import Choice, Search, still_choice, typical_segments
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.errors import BoundError, ClipError
 from athcodec.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.options import DEFAULT_LADDER, EFFORTS, MAX_SEGMENT, MIN_SEGMENT, ladder_of
 from athcodec.polygons import POLYGON_ARRAYS, Polygons, type_code
-from athcodec.segmentation import MAX_SEGMENT, MIN_SEGMENT
 from athcodec.threads import ThreadPool, default_jobs
 from athcodec.units import Length
 

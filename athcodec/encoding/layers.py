@@ -40,8 +40,6 @@ from athcodec.encoding.segment import (
 )
 from athcodec.encoding.shape import rest_steps
 
-LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
-DEFAULT_LADDER = "decades"
 COARSER = 2.0  # steps of layers before the last than those of a file of their own with the same bound
 # Of the bytes up to a layer before the last, what its corrections may take: to keep the error that the ladder names,
 # and else to keep the tightest of these limits, over its own.
@@ -107,22 +105,6 @@ class Layers:
         """Of the streams up to the rest pose of the first layer."""
         refined = self.each[0].rest
         return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
-
-
-def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
-    """Largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas between them.
-
-    Raises ValueError.
-    """
-    if isinstance(ladder, str) and ladder in LADDERS:
-        return LADDERS[ladder]
-    try:
-        errors = tuple(sorted(map(float, ladder.split(",") if isinstance(ladder, str) else ladder), reverse=True))
-    except (TypeError, ValueError):
-        errors = (math.nan,)
-    if not all(0 < error < 1 for error in errors):
-        raise ValueError(f"ladder: got {ladder!r}; expected {', '.join(LADDERS)} or errors between 0 and 1")
-    return errors
 
 
 def layer_ratios(ladder: Sequence[float], bound: float, diagonal: float) -> list[int]:
@@ -288,7 +270,7 @@ class _SegmentCoder:
     """Chunks {(level, kind): payload} and errors of stopping at each level, by each of MEASURES, of one segment."""
 
     def __init__(self, prelude: CodedPrelude, layers: Layers, segment_count: int, positions: np.ndarray):
-        self._origin, self._dtype, self.positions = prelude.origin, prelude.dtype, positions
+        self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0 = layers.level_0
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
@@ -303,15 +285,17 @@ class _SegmentCoder:
         """The levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
         bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
-        segment = analyse(plan, settings, self.positions, layer.modes, bases, layered=self._layered)
+        segment, decoded = analyse(
+            plan, self._output, settings, self.positions, layer.modes, bases, layered=self._layered
+        )
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
-        self._finish_with(segment, layer, plan.level_count - 1)
+        self._finish_with(decoded, layer, plan.level_count - 1)
         segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._shown = [
-            _ShownLevel(partial(own.pose, level, self._origin, self._dtype)) for level, own in enumerate(shown)
+            _ShownLevel(partial(own.pose, level, *self._output)) for level, own in enumerate(shown)
         ] + self._shown
         self._keep_last_level_best(layer, plan.level_count - 1, self._shown[-1].pose())
         for level, nodes in enumerate(shown):
@@ -343,15 +327,16 @@ class _SegmentCoder:
         """One further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
         bases = self._bases.refined(layer, last, level)
-        segment = analyse(layer.plan, settings, self.positions, layer.modes, bases, before, ratio, layered=True)
+        segment, decoded = analyse(
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio, layered=True
+        )
         head = stems_head(settings, last, bases)
         self.chunks[level, ct.STEMS] = ct.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
-        self._finish_with(segment, layer, level)
+        self._finish_with(decoded, layer, level)
         return segment
 
-    def _finish_with(self, segment: SegmentMotion, layer: Layer, level: int) -> None:
-        """Corrections of the level that a layer ends with, and its errors."""
-        decoded = self.pose(segment, layer.plan.level_count - 1)
+    def _finish_with(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
+        """Corrections of the level that a layer ends with, and its errors; decoded: the positions without."""
         self._shown.append(_ShownLevel(lambda: decoded, layer))
         self.errors.append(self._finish_level(layer, level, decoded))
 
@@ -449,7 +434,7 @@ class _SegmentCoder:
 
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """As it is put out, neither joined nor corrected."""
-        return shown.pose(level, self._origin, self._dtype)
+        return shown.pose(level, *self._output)
 
     def error(self, decoded: np.ndarray) -> tuple[float, ...]:
         return position_errors(decoded, self.positions, self._origin, self._pool)

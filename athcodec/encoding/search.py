@@ -20,7 +20,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams
 from athcodec.encoding.learned_modes import Components, LearnedModes, components, estimated_bits, learn
 from athcodec.encoding.motion import Plan, SegmentMotion, position_errors
-from athcodec.encoding.progress import TRIALS, Progress, trials
+from athcodec.encoding.progress import Progress, trials
 from athcodec.encoding.reference import mean_pose
 from athcodec.encoding.rigid import TURN_STEP, rigid_layers
 from athcodec.encoding.sample import ExtrapolationFactors, PlantSample, sample_plant
@@ -44,9 +44,8 @@ from athcodec.encoding.segment import (
 from athcodec.encoding.shape import finer_than
 from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
-from athcodec.segmentation import DEFAULT_SEGMENT
+from athcodec.options import DEFAULT_SEGMENT
 
-EFFORTS = tuple(TRIALS)
 WALKS = 3  # of both steps
 SAMPLES = 3  # of several clips
 LEARNING_SEGMENTS = 4  # of a clip, that modes are learned from
@@ -525,9 +524,9 @@ class Search:
 
     def _analysed(self, settings: Settings, number: int, modes: LearnedModes | None) -> SegmentMotion:
         """A sample in its integers."""
-        plan, sample = self.prelude(settings).plan, self.samples[number]
+        prelude, sample = self.prelude(settings), self.samples[number]
         own = settings.of_segment(sample.whole_loop)
-        return analyse(plan, own, sample.positions, modes, self._bases(settings, number))
+        return analyse(prelude.plan, prelude.output, own, sample.positions, modes, self._bases(settings, number))[0]
 
     def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
         """The time bases of the levels that learn theirs."""

@@ -268,6 +268,11 @@ class CodedPrelude:
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
 
+    @property
+    def output(self) -> tuple[np.ndarray, np.dtype]:
+        """Origin and type of decoded positions."""
+        return self.origin, self.dtype
+
 
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[ct.Rest, np.ndarray]:
     """REST, and the rest pose as decoded."""
@@ -520,6 +525,7 @@ def correction_chunk(corrections: np.ndarray, step: float, shape: tuple[int, int
 
 def analyse(
     plan: Plan,
+    output: tuple[np.ndarray, np.dtype],
     settings: Settings,
     positions: np.ndarray,
     learned_modes: LearnedModes | None,
@@ -527,13 +533,12 @@ def analyse(
     before: SegmentMotion | None = None,
     ratio: int = 1,
     layered: bool = False,
-) -> SegmentMotion:
-    """The integers of the stems; bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has
-    them."""
+) -> tuple[SegmentMotion, np.ndarray]:
+    """The integers of the stems, and the positions at the last level without corrections; output: the origin and the
+    type of these. bases: of the levels that learn theirs; before, ratio, layered: as SegmentMotion has them."""
     own = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
-    segment.analyse(positions, qz.DEAD_ZONE)
-    return segment
+    return segment, segment.analyse_and_pose(positions, qz.DEAD_ZONE, *output)
 
 
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> ct.StemsHead:
@@ -603,8 +608,7 @@ def code_stems(
     """Streams of the stems of a single layer and the corrections that keep the limit. bases: None: to be learned."""
     if bases is None:
         bases = learned_bases(prelude.plan, settings, positions)
-    segment = analyse(prelude.plan, settings, positions, learned_modes, bases)
+    segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    decoded = segment.pose(prelude.plan.level_count - 1, prelude.origin, prelude.dtype)
     corrections, step = correct(decoded, positions, prelude.origin, settings, prelude.plan)
     return Coded(segment, stems, corrections, decoded, step, heads)

@@ -22,11 +22,11 @@ import numpy as np
 from athcodec.clip import MotionClip
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.frames import Frames
+from athcodec.options import SAMPLES
 from athcodec.sources.opening import closing_on_failure
 from athcodec.units import METRES, unit_symbol
 
 HEAD_BYTES = 4096
-SAMPLES = ("tree", "growth")
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
+from athcodec.container import Limits
 from athcodec.errors import AthError, LimitExceeded
 from athcodec.sources import sample_path
 from spec.robust import Row
@@ -392,7 +393,7 @@ def budgets(path: Path) -> Row:
     while budget < 1 << 31:
         row.tried += 1
         try:
-            with athcodec.open(path, limits=athcodec.container.Limits(memory_bytes=budget)) as decoder:
+            with athcodec.open(path, limits=Limits(memory_bytes=budget)) as decoder:
                 row.wrong += not np.array_equal(decoder.positions(), expected)
         except LimitExceeded:
             refused += 1

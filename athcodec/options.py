@@ -1,0 +1,34 @@
+"""What options may say: their words, defaults and limits. It imports nothing heavy, for the command line needs it to
+explain itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+DEFAULT_REL_ERROR = 1e-4
+LOSSLESS_REL_ERROR = 4e-7  # about where a lossless file is smallest
+EFFORTS = ("fast", "default", "best")
+LADDERS = {"none": (), "decades": (1e-2, 1e-3, 1e-4, 1e-5)}  # largest errors over the diagonal
+DEFAULT_LADDER = "decades"
+MIN_SEGMENT, MAX_SEGMENT, DEFAULT_SEGMENT = 16, 256, 128  # frames
+METHODS = ("attributes", "skeleton", "edges", "components", "runs", "motion")  # that find branches
+SAMPLES = ("tree", "growth")  # that ship with the package
+HOST = "host"
+"""The word for a rest pose that whoever plays the file has: `--rest host`."""
+
+
+def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
+    """Largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas between them.
+
+    Raises ValueError.
+    """
+    if isinstance(ladder, str) and ladder in LADDERS:
+        return LADDERS[ladder]
+    try:
+        errors = tuple(sorted(map(float, ladder.split(",") if isinstance(ladder, str) else ladder), reverse=True))
+    except (TypeError, ValueError):
+        errors = (math.nan,)
+    if not all(0 < error < 1 for error in errors):
+        raise ValueError(f"ladder: got {ladder!r}; expected {', '.join(LADDERS)} or errors between 0 and 1")
+    return errors
