@@ -1,9 +1,9 @@
 """The clips that the benchmark measures: made once, kept in a folder, the same for everyone.
 
 The shipped sample; trees moved by the physics engine MuJoCo (see bench/trees); the same with many more
-vertices; render meshes with leaves; small clips of many kinds (see bench/odd); and any HDF5 clip by its path. All are
-seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it was made; when
-the recipe changes, the file is made again.
+vertices; render meshes of trees with leaves in wind; small clips of many kinds (see bench/odd); and any HDF5 clip by
+its path. All are seeded and differ between machines by rounding only. The attribute "recipe" of a file describes how it
+was made; when the recipe changes, the file is made again.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import athcodec
 from athcodec.hierarchy import branch_orders
 from bench import odd
 from bench.tables import table
+from bench.trees.beams import bend
 from bench.trees.mesh import dress
 from bench.trees.plant import grow
 from bench.trees.refine import refine
@@ -32,6 +33,7 @@ from bench.trees.wind import Wind
 
 FOLDER_VARIABLE = "ATHCODEC_BENCH_DATA"
 DEFAULT_FOLDER = Path("~/.cache/athcodec-bench")
+FPS = 30.0
 RECIPE_VERSION = 1  # goes up when the code below or in bench/trees gives other motion
 SAMPLE = "sample"
 
@@ -96,22 +98,40 @@ class Refined:
 
 
 @dataclass(frozen=True)
-class Dressed:
-    """A simulated clip as a render mesh: bark tubes, and leaf cards that flutter."""
+class Canopy:
+    """A tree of beams in turbulent wind as a render mesh: bark tubes, and leaves hinged on the outer stems."""
 
-    source: str
+    nodes: int
+    orders: int
     frames: int
+    height: float
+    wind_speed: float
     leaves: int
+    species: str
     seed: int
+    version: int = 1  # goes up when the code below bench/trees gives other leaves or beams
+    source: ClassVar[None] = None
 
-    def make(self, source: athcodec.MotionClip) -> athcodec.MotionClip:
-        return dress(source, RECIPES[self.source].wind, self.frames, self.leaves, self.seed)
+    def make(self, source: None) -> athcodec.MotionClip:
+        plant = grow(self.nodes, self.orders, self.height, self.seed)
+        wind = Wind(self.wind_speed, self.height, seed=self.seed)
+        tree = athcodec.MotionClip(
+            bend(plant, wind, self.frames, FPS),
+            np.arange(self.frames) / FPS,
+            plant.branch,
+            plant.branch_parent,
+            rest=plant.position.astype(np.float32),
+            edges=plant.edges,
+            attributes={"radius": plant.radius.astype(np.float32)},
+            metadata={"unit": "m", "up_axis": "y", "fps": FPS, "wind_speed": self.wind_speed, "leaves": self.species},
+        )
+        return dress(tree, wind, self.frames, self.leaves, self.seed, self.species)
 
     def __str__(self) -> str:
-        return f"{self.source} as a mesh: bark tubes and {self.leaves:,} leaf cards"
+        return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"
 
 
-Recipe = Simulated | Refined | Dressed | odd.Odd
+Recipe = Simulated | Refined | Canopy | odd.Odd
 
 RECIPES: dict[str, Recipe] = {
     "mj_1k_200f": Simulated(1000, 2, 200, 8.0, 11.0, seed=1),
@@ -123,12 +143,14 @@ RECIPES: dict[str, Recipe] = {
     "mj_8k_1200f": Simulated(8000, 6, 1200, 12.0, 6.5, seed=6),
     "refined_50k_200f": Refined("mj_4k_200f", 200, 6, 2600, 10, seed=7),
     "refined_200k_60f": Refined("mj_8k_200f", 60, 12, 10400, 10, seed=8),
-    "leaves_8k_60f": Dressed("mj_1k_200f", 60, 500, seed=9),
-    "leaves_67k_200f": Dressed("mj_4k_200f", 200, 10000, seed=10),
+    "canopy_4k_60f": Canopy(400, 2, 60, 6.0, 8.0, 260, "broadleaf", seed=11),
+    "canopy_15k_200f": Canopy(1000, 2, 200, 8.0, 8.0, 1400, "broadleaf", seed=12),
+    "canopy_67k_200f": Canopy(4000, 3, 200, 10.0, 8.0, 10000, "poplar", seed=13),
+    "canopy_300k_60f": Canopy(16000, 3, 60, 14.0, 9.0, 16000, "compound", seed=14),
 }
 
 SUITES = {
-    "quick": (SAMPLE, "mj_1k_200f", "leaves_8k_60f"),
+    "quick": (SAMPLE, "mj_1k_200f", "canopy_4k_60f"),
     "full": (SAMPLE, *RECIPES),
     "odd": tuple(odd.CLIPS),
     "odd-quick": odd.FEW,

@@ -29,7 +29,7 @@ Right: per cent of branches found that are true ones on their true parents. Seco
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "clips", nargs="*", default=["leaves_67k_200f"], metavar="CLIP", help="a name of `data`, or an HDF5 file"
+        "clips", nargs="*", default=["canopy_67k_200f"], metavar="CLIP", help="a name of `data`, or an HDF5 file"
     )
     add_rel_error(parser)
 

@@ -17,15 +17,18 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT))  # for bench, which is not installed; athcodec stays the installed one
 
 from bench import data  # noqa: E402
+from bench.trees import beams  # noqa: E402
 from bench.trees import simulate as simulation  # noqa: E402
+from bench.trees.leaves import SPECIES, Leaves, Plates, sheltered  # noqa: E402
 from bench.trees.mesh import SIDES, dress  # noqa: E402
 from bench.trees.plant import grow  # noqa: E402
 from bench.trees.refine import refine  # noqa: E402
-from bench.trees.ride import rotations, smallest_turns, sway  # noqa: E402
+from bench.trees.ride import Skeleton, rotations, smallest_turns, sway  # noqa: E402
 from bench.trees.wind import DIRECTION, Wind  # noqa: E402
 
 SMALL = data.Simulated(nodes=100, orders=2, frames=20, height=4.0, wind_speed=10.0, seed=1)
 BREEZE = Wind(8.0, 8.0, seed=2)
+CANOPY = data.Canopy(nodes=120, orders=1, frames=40, height=5.0, wind_speed=8.0, leaves=80, species="poplar", seed=3)
 
 
 @pytest.fixture
@@ -161,20 +164,121 @@ def test_refined_stems_pass_through_the_nodes_and_twigs_stay_on_them(sample_clip
     assert len(fine.edges) == fine.vertex_count - 1
 
 
-def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sample_clip):
-    mesh = dress(sample_clip, BREEZE, frames=12, leaves=50, seed=7)
+@pytest.fixture(scope="module")
+def canopy():
+    return CANOPY.make(None)
+
+
+def still(frames: int) -> Skeleton:
+    """A plant that does not move."""
+    plant = grow(60, 1, 4.0, seed=5)
+    positions = np.repeat(plant.position[None], frames, axis=0)
+    parts = plant.position, plant.parent, plant.branch, plant.branch_parent, plant.radius
+    return Skeleton(positions, *parts, np.arange(frames) / 30)
+
+
+def test_a_pole_of_beams_bends_and_swings_as_theory_says():
+    grown = grow(31, 0, 3.0, seed=1)
+    upright = np.linspace(0, 3, 31)[:, None] * [0, 1, 0]
+    pole = replace(grown, position=upright, radius=np.full(31, 0.02), foliage=np.zeros(31))
+    stiffness, mass = beams._stiffness(pole), beams._mass(pole)
+    force = np.zeros(6 * 31)
+    force[6 * 30] = 2.0
+    bent = np.linalg.solve(stiffness.toarray(), force)
+    moment = simulation.YOUNG * np.pi / 4 * 0.02**4
+    assert bent[6 * 30] == pytest.approx(2.0 * 3.0**3 / (3 * moment), rel=1e-4)
+    expected = 1.8751**2 / 3.0**2 * np.sqrt(moment / (simulation.DENSITY * np.pi * 0.02**2))
+    assert beams._lowest_frequency(stiffness, mass) == pytest.approx(expected, rel=0.01)
+    assert np.allclose(lengths(beams._placed(pole, bent.reshape(-1, 6)[:, :3]), pole.edges), 0.1)
+
+
+def test_a_tree_of_beams_leans_down_wind_sways_and_keeps_its_lengths():
+    plant = grow(100, 2, 4.0, seed=1)
+    positions = beams.bend(plant, BREEZE, 60)
+    assert np.allclose(lengths(positions, plant.edges), lengths(plant.position, plant.edges), rtol=1e-4)
+    assert ((positions - plant.position).mean(axis=(0, 1)) @ DIRECTION) > 0.01
+    tips = positions[:, np.bincount(plant.parent[1:], minlength=100) == 0]
+    assert 0.005 < np.sqrt(((tips - tips.mean(axis=0)) ** 2).sum(axis=2).mean()) / plant.height < 0.1
+    assert (positions[:, 0] == 0).all()
+
+
+@pytest.mark.parametrize("species", SPECIES)
+def test_a_mesh_has_closed_rings_around_its_stems_and_rigid_leaves_on_them(sample_clip, species):
+    mesh = dress(sample_clip, BREEZE, frames=12, leaves=50, seed=7, species=species)
+    blade, quads = len(SPECIES[species].blade), len(SPECIES[species].faces)
     rings = 1001 + 98
     tubes = SIDES * rings
-    assert mesh.vertex_count == tubes + 200 and mesh.branch_count == 99 + 50
-    assert len(mesh.faces) == SIDES * (rings - 99) + 50
+    assert mesh.vertex_count == tubes + 50 * blade and mesh.branch_count == 99 + 50
+    assert len(mesh.faces) == SIDES * (rings - 99) + 50 * quads
     circles = mesh.positions[:, :tubes].reshape(12, rings, SIDES, 3).astype(np.float64)
     radius = np.linalg.norm(circles - circles.mean(axis=2, keepdims=True), axis=-1)
     assert np.abs(np.ptp(radius, axis=0)).max() < 1e-5, "a ring changes its size"
-    cards = mesh.faces[-50:]
-    sides = lengths(mesh.positions, cards[:, :2])
-    assert np.ptp(sides, axis=0).max() < 1e-5
+    for card in mesh.positions[:, tubes:].reshape(12, 50, blade, 3).astype(np.float64).transpose(1, 0, 2, 3):
+        apart = np.linalg.norm(card[:, :, None] - card[:, None], axis=-1)
+        assert np.ptp(apart, axis=0).max() < 1e-5, "a leaf changes its shape"
     assert np.array_equal(np.unique(mesh.faces), np.arange(mesh.vertex_count))
     athcodec.build_ath(mesh, max_error=1.0)
+
+
+def test_a_canopy_comes_out_the_same_again_and_otherwise_by_its_seed(canopy):
+    canopy.check()
+    assert (canopy.frame_count, round(canopy.fps, 6), canopy.metadata["unit"]) == (40, 30, "m")
+    assert np.array_equal(canopy.positions, CANOPY.make(None).positions)
+    assert not np.array_equal(canopy.positions, replace(CANOPY, seed=4).make(None).positions)
+    assert np.ptp(canopy.rest[:, 1]) == pytest.approx(5.0, rel=0.1)
+
+
+@pytest.mark.parametrize("species", SPECIES)
+def test_leaves_come_to_rest_in_still_air(species):
+    leaves = Leaves(still(240), SPECIES[species], 40, np.random.default_rng(1))
+    plates = Plates(leaves)
+    plates.speed[:] = np.random.default_rng(2).normal(0, 10, plates.speed.shape)
+    start = plates.energy()
+    for _ in range(1920):
+        plates.step(np.zeros((3, 40)), 1 / 240)
+        assert (plates.energy() < 1.1 * start).all()
+    assert (plates.energy() < 1e-3 * start).all()
+
+
+def test_leaves_swing_in_the_species_time_and_line_up_with_the_wind():
+    kind = SPECIES["broadleaf"]
+    leaves = Leaves(still(60), kind, 200, np.random.default_rng(1))
+    plates = Plates(leaves)
+    plates.area[:] = 0  # no air
+    plates.turn[[0, 3]] = [[np.cos(0.005)], [np.sin(0.005)]]
+    crossings, last = np.zeros(200), plates.turn[3] > 0
+    for _ in range(480):
+        plates.step(np.zeros((3, 200)), 1 / 240)
+        crossings += last != (plates.turn[3] > 0)
+        last = plates.turn[3] > 0
+    assert np.allclose(crossings / 4, kind.hertz[2] * np.sqrt(leaves.stiffness), atol=0.4)
+    turns = leaves.turned(lambda points, seconds: np.broadcast_to(12.0 * DIRECTION, points.shape), Plates(leaves))
+    along = leaves.at(leaves.skeleton.rest, leaves.unturned()), leaves.at(leaves.skeleton.rest, turns[-1])
+    into = [(tips.reshape(200, -1, 3)[:, -1] - tips.reshape(200, -1, 3)[:, 0]) @ DIRECTION for tips in along]
+    assert into[1].mean() > into[0].mean() + 0.3 * leaves.length.mean()
+
+
+def test_neighbouring_leaves_feel_the_same_gusts_and_far_ones_others():
+    plant = grow(60, 1, 4.0, seed=5)
+    skeleton = still(150)
+    skeleton.positions[:] *= 5.0  # 20 m, so that gusts differ
+    leaves = Leaves(skeleton, SPECIES["broadleaf"], 300, np.random.default_rng(1))
+    leaves.axes[:] = leaves.axes[0]  # all stand alike
+    leaves.stiffness[:], leaves.length[:] = 1.0, 0.1
+    turns = leaves.turned(Wind(6.0, 20.0, length=3.0, seed=4).at, Plates(leaves))[:, :, 2].astype(np.float64)
+    feet = 5.0 * plant.position[leaves.node]
+    apart = np.linalg.norm(feet[:, None] - feet, axis=2)
+    alike = np.corrcoef(turns.T)
+    near, far = (apart > 0) & (apart < 1), apart > 8
+    assert near.sum() > 50 and np.median(alike[near]) > 0.4
+    assert np.median(alike[near]) > np.median(np.abs(alike[far])) + 0.2
+
+
+def test_leaves_behind_others_get_less_wind():
+    points = np.array([1.0, 0.0, -1.0])[:, None] * -DIRECTION + [0.001, 0.001, 0.001]
+    left = sheltered(points, np.full(3, 0.05), 0.5)
+    assert left[0] == 1 and 1 > left[1] > left[2] > 0.5
+    assert sheltered(points + [[0, 0, 0], [0, 2, 0], [0, 4, 0]], np.full(3, 0.05), 0.5).min() == 1
 
 
 def test_rotations_turn_by_the_angle_about_the_axis():

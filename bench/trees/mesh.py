@@ -1,11 +1,7 @@
-"""A render mesh on a simulated plant: bark tubes around the stems, and leaf cards that flutter on the outer
-ones.
+"""A render mesh on a simulated plant: bark tubes around the stems, and leaves in the wind on the outer ones.
 
-A tube is a ring of vertices per node, and one where the stem leaves its parent; a leaf is one rigid quad that
-turns about the node it stands on. It bends in the wind as an oscillator does and rolls about its own axis,
-the more the stronger the wind (after the sinusoids of Sousa, "Vegetation procedural animation and shading in
-Crysis", GPU Gems 3, chapter 16, 2007). The branches of the clip are the stems, with their tubes, and then one
-per leaf. No normals, no texture coordinates.
+A tube is a ring of vertices per node, and one where the stem leaves its parent; for the leaves see leaves.py. The
+branches of the clip are the stems, with their tubes, and then one per leaf. No normals, no texture coordinates.
 """
 
 from __future__ import annotations
@@ -13,35 +9,29 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec import MotionClip
-from bench.trees.ride import BLOCK_FRAMES, Skeleton, drag_at, limited, rotations, sideways, sway
+from bench.trees.leaves import SPECIES, Leaves
+from bench.trees.ride import BLOCK_FRAMES, Skeleton
 from bench.trees.wind import Wind
 
 SIDES = 6
-LEAF_LENGTH = 0.02  # over the plant's height: a card stands for a cluster of leaves
-LEAF_ANGLE = np.radians(60.0)
-LEAF_BEND = 0.25  # rad in the mean wind
-LEAF_HERTZ = (2.0, 4.0)
-LEAF_DAMPING = 0.2
-FLUTTER = 0.3  # rad in the mean wind
-FLUTTER_HERTZ = (3.0, 6.0)
-CARD = np.array([[0.3, -0.35], [0.3, 0.35], [1.3, -0.35], [1.3, 0.35]])  # along and across, over the length
 
 
-def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int) -> MotionClip:
+def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar") -> MotionClip:
     """The first frames of a simulated clip as a mesh with so many leaves."""
-    skeleton = Skeleton.of(clip, frames)
+    skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
     tubes = _Tubes(skeleton)
-    cards = _Leaves(skeleton, wind, leaves, np.random.default_rng(seed))
-    shape = (tubes.count + 4 * leaves, 3)
+    cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
+    turns = cards.flown(wind)
+    shape = (tubes.count + len(kind.blade) * leaves, 3)
     positions, rest = np.empty((frames, *shape), np.float32), np.empty(shape, np.float32)
     for start in range(0, frames, BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
         nodes = skeleton.positions[block]
         positions[block, : tubes.count] = tubes.at(nodes)
-        positions[block, tubes.count :] = cards.at(nodes, cards.bend[block], cards.roll[block])
+        positions[block, tubes.count :] = cards.at(nodes, turns[block])
     rest[: tubes.count] = tubes.at(skeleton.rest)
-    rest[tubes.count :] = cards.at(skeleton.rest, np.zeros((leaves, 3)), np.zeros(leaves))
-    leaf_branch = np.repeat(len(skeleton.branch_parent) + np.arange(leaves), 4)
+    rest[tubes.count :] = cards.at(skeleton.rest, cards.unturned())
+    leaf_branch = np.repeat(len(skeleton.branch_parent) + np.arange(leaves), len(kind.blade))
     return MotionClip(
         positions=positions,
         time=skeleton.time,
@@ -102,42 +92,3 @@ def _tube_faces(ring_branch: np.ndarray) -> np.ndarray:
     side, following = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
     upper = lower + SIDES
     return np.stack([lower + side, lower + following, upper + following, upper + side], axis=2).reshape(-1, 4)
-
-
-class _Leaves:
-    """Leaves at random nodes of the outer stems, sorted by node."""
-
-    def __init__(self, skeleton: Skeleton, wind: Wind, leaves: int, rng: np.random.Generator) -> None:
-        self.skeleton = skeleton
-        self.node = np.sort(rng.choice(skeleton.outer_nodes(), leaves))
-        below = skeleton.direction(skeleton.rest, self.node)
-        self.axis = sideways(below, rng.uniform(0, 2 * np.pi, leaves), LEAF_ANGLE)
-        across = np.cross(self.axis, below)
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        length = LEAF_LENGTH * skeleton.height * rng.uniform(0.7, 1.3, leaves)
-        along = CARD[None, :, :1] * self.axis[:, None, :]
-        self.corners = length[:, None, None] * (along + CARD[None, :, 1:] * across[:, None, :])
-        self.faces = 4 * np.arange(leaves)[:, None] + [0, 1, 3, 2]
-        drag = drag_at(wind, skeleton.positions[:, self.node], skeleton.time)
-        # about axes of the rest pose, which the stem then carries: its own turn is small beside the gusts
-        self.bend = self._bend(drag, rng)
-        self.roll = self._roll(np.linalg.norm(drag, axis=-1), rng)
-
-    def _bend(self, drag: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        step = 1.0 if len(drag) < 2 else self.skeleton.time[1] - self.skeleton.time[0]
-        torque = LEAF_BEND * np.cross(self.axis, drag)
-        return limited(sway(torque, rng.uniform(*LEAF_HERTZ, len(self.node)), LEAF_DAMPING, step))
-
-    def _roll(self, drag: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """(T, leaves) angles about the leaves' axes: two sinusoids that beat, in step with the gusts."""
-        shape = (2, 1, len(self.node))
-        cycles = rng.uniform(size=shape) + rng.uniform(*FLUTTER_HERTZ, shape) * self.skeleton.time[:, None]
-        phase = 2 * np.pi * cycles
-        return FLUTTER * np.minimum(drag, 3.0) * (0.6 * np.sin(phase[0]) + 0.4 * np.sin(phase[1]))
-
-    def at(self, nodes: np.ndarray, bend: np.ndarray, roll: np.ndarray) -> np.ndarray:
-        """(..., 4 leaves, 3) corners from nodes, (..., leaves, 3) rotation vectors, (..., leaves) angles."""
-        own = rotations(bend) @ rotations(roll[..., None] * self.axis)
-        turns = self.skeleton.turns(nodes, self.node) @ own
-        points = nodes[..., self.node, None, :] + np.einsum("...lij,lcj->...lci", turns, self.corners)
-        return points.reshape(*nodes.shape[:-2], -1, 3)

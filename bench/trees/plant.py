@@ -11,6 +11,7 @@ meant, and there are no roots.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -54,6 +55,14 @@ class Plant:
     def edges(self) -> np.ndarray:
         """(N - 1, 2) node below and node."""
         return np.stack([self.parent[1:], np.arange(1, len(self.parent))], axis=1).astype(np.int32)
+
+    @cached_property
+    def generations(self) -> list[np.ndarray]:
+        """Nodes by the number of elements below them."""
+        depth = np.zeros(len(self.parent), int)
+        for node, below in enumerate(self.parent[1:].tolist(), start=1):
+            depth[node] = depth[below] + 1
+        return np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def preorder(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes, each followed at once by all that it carries; (N,) how many these are, itself included."""

@@ -71,7 +71,7 @@ def simulate(plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: 
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     lowest = _lowest_frequency(mujoco, model, data, joint_stiffness)
-    mass_factor, stiffness_factor = _rayleigh(lowest, damping)
+    mass_factor, stiffness_factor = rayleigh(lowest, damping)
     model.dof_damping.reshape(model.nv, -1)[:, 0] = stiffness_factor * joint_stiffness
     per_frame = max(2, int(np.ceil(1.0 / (fps * LONGEST_STEP * stiffness_factor))))
     model.opt.timestep = 1.0 / (fps * per_frame)
@@ -242,7 +242,7 @@ def _lowest_frequency(mujoco: ModuleType, model: Any, data: Any, stiffness: np.n
     return 1.0 / np.sqrt(period)
 
 
-def _rayleigh(lowest: float, damping: float) -> tuple[float, float]:
+def rayleigh(lowest: float, damping: float) -> tuple[float, float]:
     """Factors of mass and stiffness: `damping` at the lowest frequency and at SECOND_DAMPED times it."""
     high = SECOND_DAMPED * lowest
     return 2 * damping * lowest * high / (lowest + high), 2 * damping / (lowest + high)
