@@ -103,6 +103,12 @@ class Integers(ctypes.Structure):
     ]
 
 
+class Rounding(ctypes.Structure):
+    """ath_rounding."""
+
+    _fields_ = [("dead_zone", c_double), ("ends", c_double * 3)]
+
+
 class Header(ctypes.Structure):
     """ath_header."""
 
@@ -197,11 +203,20 @@ _ENCODING = {  # core/plan.h, core/motion.h, core/encode.h
     "ath_gather": (None, [c_int32, c_int32, c_void_p, c_int32, c_int, c_void_p, c_void_p, c_void_p]),
     "ath_analyse": (
         None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_double],
+        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, POINTER(Rounding)],
     ),
     "ath_analyse_nodes": (
         None,
-        [POINTER(CorePlan), POINTER(Motion), POINTER(Integers), c_int32, c_int32, c_void_p, c_void_p, c_double],
+        [
+            POINTER(CorePlan),
+            POINTER(Motion),
+            POINTER(Integers),
+            c_int32,
+            c_int32,
+            c_void_p,
+            c_void_p,
+            POINTER(Rounding),
+        ],
     ),
     "ath_pose": (
         None,

@@ -77,16 +77,24 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
                                 int32_t source_count, int is_float64, const void *source, const double origin[3],
                                 double *out);
 
+enum { ATH_END_PARTS = 3 };
+
+/* How numbers become integers: below `dead_zone` steps they are 0, and what is left of a row's value, slope and bend at
+ * either end weighs as many squared steps as `ends` says; 0: it does not. */
+typedef struct ath_rounding {
+    double dead_zone, ends[ATH_END_PARTS];
+} ath_rounding;
+
 /* Quantised coefficients and tracks of all pieces in closed loop, then the maps of the nodes in between. source:
  * vertex-major doubles less the origin. A map's step is that of its level (height + 2 lengths) over the root of its
  * number of vertices: the same error in all of them together costs the same everywhere. Attach caches are to be kept
  * (ath_build_plan). Only pieces, or nodes, first to stop - 1: several threads may work on ranges of one segment,
  * each with scratch memory of its own, once the pieces that theirs hang on are done. */
 ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                 int32_t first, int32_t stop, const double *source, double dead_zone);
+                                 int32_t first, int32_t stop, const double *source, const ath_rounding *rounding);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                        int32_t first, int32_t stop, const double *source, const double *level_steps,
-                                       double dead_zone);
+                                       const ath_rounding *rounding);
 
 /* Positions at `level` as a decoder has them before corrections: origin added, vertex-major, float or (is_float64)
  * double. By ranges of pieces, which keep the rule above, and then of nodes. */

@@ -152,6 +152,7 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
             step=qz.single(settings.step * ratio),
             limit=settings.limit * ratio,
             layer=i,
+            end_weights=source.end_weights(settings.bound * ratio),
         )
         layers.append(Layer(plan, own, _modes(plan, choice, own, ratio), ratio, refined))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
@@ -307,7 +308,7 @@ class _SegmentCoder:
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
         self._finish_with(segment, layer, plan.level_count - 1)
-        segment.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE)
+        segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
         shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
         self.errors = _EvenLevels(self, shown, settings).errors
         self._shown = [
@@ -336,7 +337,7 @@ class _SegmentCoder:
         if self._level_0 is segment.plan:
             return segment
         shown = SegmentMotion(self._level_0, segment.frames, segment.streams, periodic=settings.periodic)
-        shown.analyse_nodes(self.positions, settings.node_steps, qz.DEAD_ZONE, level=0)
+        shown.analyse_nodes(self.positions, settings.node_steps, settings.rounding, level=0)
         return shown
 
     def refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
@@ -464,6 +465,7 @@ class _EvenLevels:
 
     def __init__(self, coder: _SegmentCoder, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
+        self._rounding = settings.rounding
         self.errors = [coder.error_at(own, level) for level, own in enumerate(shown)] + coder.errors
         for level in range(1, len(shown)):
             self._move(level, level, level, 0.5**0.5, FINER_MAPS)
@@ -505,7 +507,7 @@ class _EvenLevels:
             self.errors[level] = self._coder.error_at(self._shown[level], level)
 
     def _analyse(self, level: int) -> None:
-        self._shown[level].analyse_nodes(self._coder.positions, self._steps, qz.DEAD_ZONE, level)
+        self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)
 
 
 class CodedMotion:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from athcodec import container as ct
-from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, address, lib
+from athcodec._native import BRANCH, LOOSE, SHEET, WHOLE, Rounding, address, lib
 from athcodec.ath import Ath, Survey
 from athcodec.clip import MotionClip, stands_still
 from athcodec.encoding import quantise as qz
@@ -88,6 +88,11 @@ class Source:
             for start, stop in self.clip.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
+
+    def end_weights(self, bound: float) -> tuple[float, float, float]:
+        """What the ends of rows weigh at a bound, see qz.end_weights."""
+        relative = bound / self.seen.diagonal if self.seen.diagonal > 0 else 1.0
+        return qz.end_weights(relative, has_seams=len(self.segments) > len(self.clip_range_segments))
 
     def about(self, reference: np.ndarray | None) -> Source:
         """The same about another reference pose."""
@@ -227,11 +232,17 @@ class Settings:
     node_steps: np.ndarray  # (levels,) of the maps of nodes, scene units; see SegmentMotion.analyse_nodes
     rest_slack: float = 0.0  # what the rest pose may be off by, to save bits
     periodic: bool = False  # waves over time are, of loops that are one segment
+    end_weights: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rows, see qz.end_weights
 
     @property
     def learning_levels(self) -> list[int]:
         """Levels that learn their time bases."""
         return [level for level, learned in enumerate(self.learned_bases) if learned]
+
+    @property
+    def rounding(self) -> Rounding:
+        """How numbers become integers."""
+        return Rounding(qz.DEAD_ZONE, self.end_weights)
 
     def step_of(self, level: int) -> float:
         """Of the stems of a level."""
@@ -466,7 +477,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray) -> Seg
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, qz.DEAD_ZONE)
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE))
     return segment
 
 
@@ -532,7 +543,7 @@ def analyse(
     them."""
     own = level_streams(settings, plan.level_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], own, learned_modes, before, ratio, layered, settings.periodic)
-    segment.analyse(positions, qz.DEAD_ZONE)
+    segment.analyse(positions, settings.rounding)
     return segment
 
 
