@@ -121,13 +121,24 @@ ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, int is_floa
 
 enum { ATH_CORRECTION_ROW = 6 }; /* numbers */
 
+/* How the corrections of a segment meet those of the segments beside it: at ends that are closed (1: its first frame, 2: its
+ * last) no footprint is cut off, but for its faint end. count: of the vertices and frames, of either end, whose corrections
+ * are decided, rows as below in ascending order, since they stand in the first frame of one segment like in the last
+ * of the other. They are given up where a vertex cannot be corrected with them. */
+typedef struct ath_met_ends {
+    const int32_t *decided;
+    int64_t count;
+    int32_t closed, reserved;
+} ath_met_ends;
+
 /* Finds the corrections that bring every vertex within its own limit: up to `capacity` rows of vertex, frame and
  * ath_correction. narrow: of each vertex whether its corrections are to be of one frame. Returns how many there are; -1:
  * the step cannot express them. */
 ATH_ENCODER_API int64_t ath_find_corrections(int32_t vertex_count, int32_t frames, int is_float64,
                                              const void *positions, const double *source, const double origin[3],
                                              const double *limits, const uint8_t *narrow, double step,
-                                             int32_t *corrections, int64_t capacity);
+                                             const ath_met_ends *ends, int32_t *corrections,
+                                             int64_t capacity);
 ATH_ENCODER_API void ath_apply_corrections(int32_t frames, int is_float64, void *positions, double step,
                                            const int32_t *corrections, int64_t count);
 

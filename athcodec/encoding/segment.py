@@ -134,6 +134,11 @@ class Source:
                 return start + len(own) - 1 if loop else None
         return segment - 1
 
+    def goes_on(self, segment: int) -> bool:
+        """Whether a segment of the same clip is behind it."""
+        following = {segment + 1, *self.clip_range_starts} - {len(self.segments)}
+        return any(self.segment_before(other) == segment for other in following)
+
     @cached_property
     def mesh(self) -> Mesh | None:
         """What rest poses may go by."""
@@ -576,6 +581,11 @@ def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, St
     return stems, heads
 
 
+def correction_step(limit: float | np.ndarray) -> float:
+    """That is tried first."""
+    return qz.single(qz.CORRECTION_STEP * float(np.min(limit)))
+
+
 def correct(
     decoded: np.ndarray,
     positions: np.ndarray,
@@ -583,21 +593,23 @@ def correct(
     settings: Settings,
     plan: Plan,
     keeps_all: bool = True,
+    ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> tuple[np.ndarray, float]:
     """Corrections (K, 6) that keep the limit, applied to `decoded`, and their step; those of a rigid part move all
-    of it where that serves, and else, unless each vertex is to keep the limit, there are none. Raises BoundError."""
+    of it where that serves, and else, unless each vertex is to keep the limit, there are none. ends: what they meet;
+    in the step of correction_step. Raises BoundError."""
     factor, stored, is_rigid = 1.0, decoded.dtype.type, np.repeat(plan.is_rigid, plan.pieces["count"])
     limit = settings.limit if keeps_all else np.where(is_rigid, np.inf, settings.limit)
     while True:
-        step = qz.single(qz.CORRECTION_STEP * float(np.min(settings.limit)) * factor)
+        step = qz.single(correction_step(settings.limit) * factor)
         tried = decoded.copy() if is_rigid.any() else decoded
         parts = move_rigid_parts(plan, tried, positions, origin, settings.limit, step, stored)
-        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid)
+        corrections = streams.find_corrections(tried, positions, origin, limit, step, plan.pool, is_rigid, ends)
         if corrections is not None:
             decoded[...] = tried
             corrections = np.concatenate([parts, corrections])
             return corrections[np.lexsort(corrections[:, 1::-1].T)], step
-        factor *= 0.5
+        factor, ends = 0.5 * factor, streams.FREE_ENDS
         if factor < 1e-3:
             raise BoundError(
                 f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {decoded.dtype.name} numbers"
